@@ -12,7 +12,7 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock, WallClock
 from swarmwire.comms.messages import encode_rows
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 
 RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
@@ -22,7 +22,7 @@ RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 class Overhead:
     """Times of one robot's step, in µs."""
 
-    step_us: float  # with nothing heard
+    step_us: float  # with nothing received
     packet_us: float  # more, for each packet that it reads
 
 
@@ -30,16 +30,16 @@ def overhead(clock: Clock, robots: int, packets: int, ticks: int) -> Overhead:
     """The overhead for so many robots in a process, each of which reads so many packets a step, or none."""
     backend = LocalBackend(_assignment(robots))
     backend.start()
-    nothing, all_heard = Heard.none(("range_m",)), _heard(robots, packets)
+    nothing, all_received = ReceivedPackets.none(("range_m",)), _received(robots, packets)
     silent_us = _step_us(clock, backend, robots, nothing, ticks)
-    return Overhead(silent_us, (_step_us(clock, backend, robots, all_heard, ticks) - silent_us) / packets)
+    return Overhead(silent_us, (_step_us(clock, backend, robots, all_received, ticks) - silent_us) / packets)
 
 
-def _step_us(clock: Clock, backend: LocalBackend, robots: int, heard: Heard, ticks: int) -> float:
+def _step_us(clock: Clock, backend: LocalBackend, robots: int, received: ReceivedPackets, ticks: int) -> float:
     senses = {"bots": GroupSenses(np.arange(robots), {"proximity.value": np.zeros((robots, RAYS))})}
     start_ns = clock.now_ns()
     for tick in range(ticks):
-        backend.act(tick, senses, heard)
+        backend.act(tick, senses, received)
     return (clock.now_ns() - start_ns) / 1e3 / ticks / robots
 
 
@@ -51,12 +51,14 @@ def _assignment(robots: int) -> Assignment:
     )
 
 
-def _heard(robots: int, packets: int) -> Heard:
+def _received(robots: int, packets: int) -> ReceivedPackets:
     """As many packets for each robot, each from another sender."""
     receiver, payload = np.repeat(np.arange(robots), packets), np.arange(robots * packets)
     sent = encode_rows(Ping, len(payload), {"number": 0.5})
     zero, range_m = np.zeros(len(payload), np.int64), np.ones(len(payload))
-    return Heard(receiver, np.tile(np.arange(packets), robots), zero, zero, {"range_m": range_m}, payload, sent)
+    return ReceivedPackets(
+        receiver, np.tile(np.arange(packets), robots), zero, zero, {"range_m": range_m}, payload, sent
+    )
 
 
 def agent_overhead(name: str, repeats: int) -> None:

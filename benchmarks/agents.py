@@ -24,8 +24,8 @@ class TalkingDiffusion(Diffusion):
     def step(self, robots: Robots, state: State) -> None:
         """Move, read, broadcast."""
         super().step(robots, state)
-        heard = robots.radio.heard(Ping)
-        robots.radio.send(Ping, number=heard.sum(heard.message.number * 0.5))
+        received = robots.radio.received(Ping)
+        robots.radio.send(Ping, number=received.sum(received.message.number * 0.5))
 
 
 class ScanDiffusion(VectorAgent):
@@ -61,15 +61,15 @@ class Relay(VectorAgent):
 
     def step(self, robots: Robots, state: State) -> None:
         """Drive, pass on what waited, and now and then tell something."""
-        self.hear(robots, state)
+        self.on_receive(robots, state)
         robots.drive(0.05, self.turn_radps)
         robots.radio.send(Word, rows=robots.draw.uniform("news") < 0.1, hops=self.hops)
 
-    def hear(self, robots: Robots, state: State) -> None:
-        """Pass on the newest of what each robot heard, if it has hops left."""
-        heard = robots.radio.heard(Word)
+    def on_receive(self, robots: Robots, state: State) -> None:
+        """Pass on the newest of what each robot received, if it has hops left."""
+        received = robots.radio.received(Word)
         hops = np.zeros(robots.n, np.int64)
-        hops[heard.row] = heard.message.hops
+        hops[received.row] = received.message.hops
         robots.radio.send(Word, rows=hops > 0, hops=hops - 1)
 
 
@@ -81,7 +81,7 @@ class Listener(Agent):
     def step(self, robot: Robot) -> None:
         """Read, and drive."""
         near = robot.proximity.value
-        for packet in robot.radio.heard(Ping):
+        for packet in robot.radio.received(Ping):
             _ = packet.message.number, packet.range_m
         robot.drive(float(near[0]), 0.0)
 
@@ -101,15 +101,15 @@ class Boid(Agent):
 
     def step(self, robot: Robot) -> None:
         """Steer to the sum of all pulls, and broadcast the heading."""
-        heading, heard = robot.compass.heading_rad, robot.radio.heard(Beacon)
+        heading, received = robot.compass.heading_rad, robot.radio.received(Beacon)
         x = y = 0.0
-        for packet in heard:
+        for packet in received:
             bearing, turn = packet.bearing_rad, packet.message.heading_rad - heading
             pull = 0.6 * min((packet.range_m - self.separation_m) / self.separation_m, 1.0)
             x += pull * math.cos(bearing) + math.cos(turn)
             y += pull * math.sin(bearing) + math.sin(turn)
         near_x, near_y = robot.proximity.vector_sum()
-        x, y = 0.3 + x / max(len(heard), 1) - 3.0 * near_x, y / max(len(heard), 1) - 3.0 * near_y
+        x, y = 0.3 + x / max(len(received), 1) - 3.0 * near_x, y / max(len(received), 1) - 3.0 * near_y
         angle = math.atan2(y, x)
         robot.drive(self.speed_mps * max(math.cos(angle), 0.0), 2.0 * angle)
         robot.radio.send(Beacon(heading_rad=heading))

@@ -15,7 +15,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.phy.propagation import range_of
@@ -78,7 +78,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
     alive = np.ones(robots, np.bool_)
-    sent = Sent(np.arange(robots), np.full(robots, BROADCAST), Payloads.of([bytes(case.payload_bytes)] * robots))
+    sent = SentPackets(np.arange(robots), np.full(robots, BROADCAST), Payloads.of([bytes(case.payload_bytes)] * robots))
     spent_ns, in_range, fates = 0, 0, np.zeros(len(Fate), np.int64)
     for tick in range(WARM_UP + ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)
@@ -101,7 +101,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
         "keys": list(case.keys),
         "side_m": round(side_m, 1),
         "in_range": round(in_range / packets, 1),
-        "heard": round(float(fates[Fate.HEARD]) / packets, 1),
+        "received": round(float(fates[Fate.RECEIVED]) / packets, 1),
         "collided": round(float(fates[Fate.COLLIDED]) / packets, 1),
         "ticks": ticks,
     }

@@ -19,7 +19,9 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
         "ticks": result.ticks,
         "rate_hz": 10,
         **config,
-        "packets_heard_per_robot_tick": round(radio.fates["heard"] / result.robots / result.ticks, 2) if radio else 0,
+        "packets_received_per_robot_tick": round(radio.fates["received"] / result.robots / result.ticks, 2)
+        if radio
+        else 0,
         "collisions": sum(arena.metrics["collisions"].final or 0.0 for arena in result.arenas),
         "wall_contacts": sum(arena.metrics["wall_contacts"].final or 0.0 for arena in result.arenas),
     }

@@ -33,7 +33,7 @@ class Contention(Protocol):
     def __call__(
         self, *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
     ) -> Mapping[str, float | None]:
-        """`delivery_ratio` in [0, 1] and `mean_delay_s`, which is None if nothing was heard."""
+        """`delivery_ratio` in [0, 1] and `mean_delay_s`, which is None if nothing was received."""
         ...
 
 

@@ -11,7 +11,7 @@ from benchmarks.ns3_reference import radio_far_apart, recorded
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db
@@ -65,15 +65,15 @@ def delivered(distance_m: float, payload_bytes: int, seeds: Sequence[int], packe
     air = Air(radio, keys, 2, (2.0 * distance_m, 2.0), obstacle_arrays(((),) * arenas), RATE_HZ)
     pose = np.tile([[-0.5 * distance_m, 0.0, 0.0], [0.5 * distance_m, 0.0, 0.0]], (arenas, 1))
     sender = 2 * np.arange(arenas)
-    sent = Sent(sender, np.full(arenas, BROADCAST), Payloads.of([bytes(payload_bytes)] * arenas))
+    sent = SentPackets(sender, np.full(arenas, BROADCAST), Payloads.of([bytes(payload_bytes)] * arenas))
     air.hold(pose, np.ones(2 * arenas, np.bool_))
-    heard = 0
+    received = 0
     for tick in range(packets + QUIET_TICKS):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        heard += int(air.advance(at_ns).tally.fates[:, Fate.HEARD].sum())
+        received += int(air.advance(at_ns).tally.fates[:, Fate.RECEIVED].sum())
         if tick < packets:
             air.send(at_ns, tick, sent)
-    return heard / (arenas * packets)
+    return received / (arenas * packets)
 
 
 def table(seeds: Sequence[int] = range(SEEDS), packets: int = PACKETS) -> Iterator[str]:

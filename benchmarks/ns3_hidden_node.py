@@ -12,7 +12,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Walls
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.propagation.path_loss import reach_m
@@ -53,7 +53,7 @@ def cases() -> list[Case]:
 
 
 def delivered(case: Case, seeds: Sequence[int], packets: int) -> tuple[float, float]:
-    """The shares of both senders' packets that are heard, of so many each for each seed; an arena per seed."""
+    """The shares of both senders' packets that are received, of so many each for each seed; an arena per seed."""
     radio = replace(radio_far_apart(case.technology), walls=Walls(APART_DB))
     curve, arenas = radio.loss_model.curve(radio.frequency_hz), len(seeds)
     pose, pillar = places(float(reach_m(curve, case.loss_a_db)), float(reach_m(curve, case.loss_b_db)))
@@ -62,13 +62,13 @@ def delivered(case: Case, seeds: Sequence[int], packets: int) -> tuple[float, fl
     air = Air(radio, keys, ROBOTS, SIZE_M, obstacle_arrays(((pillar,),) * arenas), rate_hz)
     air.hold(np.tile(pose, (arenas, 1)), np.ones(ROBOTS * arenas, np.bool_))
     last = WARM_UP + packets
-    heard = np.zeros(2, np.int64)
+    received = np.zeros(2, np.int64)
 
     def listen(until_ns: int) -> None:
         done = air.advance(until_ns).finished
-        counts = (done.fate == Fate.HEARD) & (done.receiver == ROBOTS - 1)
+        counts = (done.fate == Fate.RECEIVED) & (done.receiver == ROBOTS - 1)
         counts &= (done.sequence >= WARM_UP) & (done.sequence < last)
-        heard[:] += np.bincount(done.sender[counts], minlength=2)
+        received[:] += np.bincount(done.sender[counts], minlength=2)
 
     now_ns = 0
     for tick, sender in enumerate(schedule(keys, last + 1)):  # one more: the last that count have company, too
@@ -76,9 +76,9 @@ def delivered(case: Case, seeds: Sequence[int], packets: int) -> tuple[float, fl
         listen(now_ns)
         if len(sender):
             payloads = Payloads.of([bytes(case.payload_bytes)] * len(sender))
-            air.send(now_ns, tick, Sent(sender, np.full(len(sender), BROADCAST), payloads))
+            air.send(now_ns, tick, SentPackets(sender, np.full(len(sender), BROADCAST), payloads))
     listen(now_ns + LATE_NS)
-    a, b = heard / (arenas * packets)
+    a, b = received / (arenas * packets)
     return float(a), float(b)
 
 

@@ -35,7 +35,7 @@ def robot_step(name: str, repeats: int, *, kind: str) -> None:
         "steps": sum(int(of["steps"]) for of in told),
         "step_p99_ms": round(statistics.median(of["step_p99_ms"] for of in told), 3),
         "process_ms_per_step": round(statistics.median(of["process_ms"] for of in told), 3),
-        "heard_per_step": round(statistics.median(of["heard"] for of in told), 2),
+        "received_per_step": round(statistics.median(of["received"] for of in told), 2),
     }
     print_line(name, statistics.median(step_ms), "ms per step", {**config, **spread(step_ms)})
     print_line(f"{name}-memory", statistics.median(rss_mb), "MB", {**config, **spread(rss_mb)})
@@ -88,6 +88,6 @@ def _told(agent: "subprocess.Popen[str]") -> dict[str, float]:
         raise RuntimeError("an agent failed: the others' steps say nothing")
     *lines, last = out.splitlines()
     told: dict[str, float] = json.loads(last)
-    ended = lines[-1]  # "…; connections 1, packets_heard 745, packets_sent 150"
+    ended = lines[-1]  # "…; connections 1, packets_received 745, packets_sent 150"
     counts = dict(item.rsplit(" ", 1) for item in ended.rpartition("; ")[2].split(", "))
-    return told | {"heard": int(counts.get("packets_heard", "0")) / int(counts["packets_sent"])}
+    return told | {"received": int(counts.get("packets_received", "0")) / int(counts["packets_sent"])}

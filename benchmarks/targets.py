@@ -39,13 +39,13 @@ TARGETS = {
     "replicas-100x10": Target(500_000, "100 arenas of 10 foot-bots side by side"),
     "wire-1000x2": Target(60_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
     "start-1000": most(2, "from the call to the first tick of a world with a radio, kernels cached, imports left out"),
-    "agent-overhead-step": most(20, "what an `Agent` costs in a step beyond its own code, alone with nothing heard"),
+    "agent-overhead-step": most(20, "what an `Agent` costs in a step beyond its own code, alone with nothing received"),
     "agent-overhead-packet": most(2.5, "and for each packet that it reads"),
     "record-cost": most(1.10, "`inprocess-1000-d1` for 600 ticks with its ticks and metrics recorded and joined"),
     "record-cost-size": most(25, "Parquet of that run"),
     "view-cost": most(15, "the same, recorded for the viewer; without a radio, so of a short tick"),
     "view-cost-size": most(60, "`run.rrd` of that run"),
-    "view-cost-radio": most(15, "with the radio, 8.7 packets heard per robot and tick"),
+    "view-cost-radio": most(15, "with the radio, 8.7 packets received per robot and tick"),
     "view-cost-radio-size": most(60, "`run.rrd` of that run"),
     "metrics-share": most(20, "what the metrics of every run cost of `inprocess-1000-d1`"),
     "metrics-share-radio": most(20, "the same, of `inprocess-1000-d1-radio`"),
@@ -58,10 +58,10 @@ TARGETS = {
     "campaign-1000x10": most(
         25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),
-    "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets heard per robot and tick"),
+    "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets received per robot and tick"),
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(15, "memory that a runner does not share with others"),
-    "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets heard"),
+    "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets received"),
     "processes-200-plain": Target(2, "the same flock by 200 of `examples/protocol/runner.py`: zenoh and msgpack alone"),
     "processes-1000": Target(0.4, "1,000 of them"),
     "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
@@ -80,7 +80,7 @@ TARGETS = {
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a radio of signals"),
     "robot-step": most(
-        1, "a step on a robot, CPU time of its thread: e-puck2 over TCP, Flocking, own network, 5 heard"
+        1, "a step on a robot, CPU time of its thread: e-puck2 over TCP, Flocking, own network, 5 received"
     ),
     "robot-step-memory": most(60, "the most memory that the process of such an agent held"),
     "robot-step-ros2": most(1, "the same on a TurtleBot behind a bridge of ROS 2"),

@@ -14,7 +14,7 @@ from swarmwire.agent import runner
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import BROADCAST, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
 from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
@@ -79,16 +79,16 @@ def _joining(page: _Page) -> Iterator[Comparison]:
 
 def _frames(page: _Page) -> Iterator[Comparison]:
     one, zeros = np.zeros(1, np.int64), np.zeros(2)
-    heard = Heard(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.of([b"abc"]))
+    received = ReceivedPackets(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.of([b"abc"]))
     senses = {"GROUP": GroupSenses(ROWS, {"SENSE.FIELD": np.zeros(2)})}
-    sent = Sent(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
+    sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, Notes(ROWS, np.array([0, 0]), ("x",))),
         leds=LedChanges(ROWS, ROWS, ROWS),
         own=Actuations(ROWS, ROWS, zeros),
         values=Values(ROWS, zeros),
     )
-    tick = encode_tick(0, senses, heard, Outcomes(one, one, one))
+    tick = encode_tick(0, senses, received, Outcomes(one, one, one))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):
         ours = {array: (value.dtype.str, value.ndim) for array, value in frames.decode(data).arrays.items()}
         yield f"arrays of {name}", page.arrays(name), ours

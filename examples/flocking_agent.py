@@ -21,7 +21,7 @@ class Heading(Message):
 
 
 class MyFlocking(Agent):
-    """Keep together, apart and aligned with the neighbours that were heard; keep away from what is near."""
+    """Keep together, apart and aligned with the neighbours that were received; keep away from what is near."""
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
     speed_mps: float = 0.1
@@ -35,7 +35,7 @@ class MyFlocking(Agent):
     def step(self, robot: Robot) -> None:
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robot.compass.heading_rad
-        packets = robot.radio.heard(Heading)
+        packets = robot.radio.received(Heading)
         x = y = 0.0
         for packet in packets:
             pull = min((packet.range_m - self.separation_m) / self.separation_m, 1.0)

@@ -28,17 +28,17 @@ LETTERS = {"<f8": "d", "<i8": "q", "<u8": "Q", "|b1": "?", "|u1": "B"}  # of Pyt
 HEADING = "Heading(heading_rad:<f4)"  # the message that the robots send, as its tag is made from it
 TAG = 1 + int.from_bytes(hashlib.blake2b(HEADING.encode(), digest_size=2).digest(), "little") % 0xFFFF
 
-Neighbour = tuple[float, float, float]  # range, bearing and heading, of a packet that was heard
+Neighbour = tuple[float, float, float]  # range, bearing and heading, of a packet that was received
 
 
-def steer(heading: float, angles: Iterable[float], rays: Iterable[float], heard: Sequence[Neighbour]) -> list[float]:
+def steer(heading: float, angles: Iterable[float], rays: Iterable[float], received: Sequence[Neighbour]) -> list[float]:
     """Forward speed and turn rate."""
     x = y = 0.0
-    for distance, bearing, theirs in heard:
+    for distance, bearing, theirs in received:
         pull = 0.6 * min((distance - 0.4) / 0.4, 1.0)
         x += pull * math.cos(bearing) + math.cos(theirs - heading)
         y += pull * math.sin(bearing) + math.sin(theirs - heading)
-    x, y = 0.3 + x / max(len(heard), 1), y / max(len(heard), 1)
+    x, y = 0.3 + x / max(len(received), 1), y / max(len(received), 1)
     for angle, value in zip(angles, rays, strict=True):
         x, y = x - 3.0 * value * math.cos(angle), y - 3.0 * value * math.sin(angle)
     angle = math.atan2(y, x)
@@ -60,24 +60,24 @@ def frame(kind: str, tick: int, arrays: dict[str, Any], values: dict[str, Any]) 
 
 
 def neighbours(arrays: dict[str, Any], gives: list[str]) -> dict[int, list[Neighbour]]:
-    """What each robot row heard of headings."""
-    heard: dict[int, list[Neighbour]] = {}
-    if "heard/numbers" in arrays:
-        count = arrays["heard/numbers"][1][1]
-        numbers, given = unpacked(arrays["heard/numbers"]), unpacked(arrays["heard/given"])
-        data, offset = arrays["heard/data"][2], unpacked(arrays["heard/offset"])
+    """What each robot row received of headings."""
+    received: dict[int, list[Neighbour]] = {}
+    if "received/numbers" in arrays:
+        count = arrays["received/numbers"][1][1]
+        numbers, given = unpacked(arrays["received/numbers"]), unpacked(arrays["received/given"])
+        data, offset = arrays["received/data"][2], unpacked(arrays["received/offset"])
         range_m, bearing_rad = (given[gives.index(name) * count :] for name in ("range_m", "bearing_rad"))
         for at, payload in enumerate(numbers[4 * count :]):
             message = data[offset[payload] : offset[payload + 1]]
             if len(message) == 6 and int.from_bytes(message[:2], "little") == TAG:
                 theirs = range_m[at], bearing_rad[at], *struct.unpack_from("<f", message, 2)
-                heard.setdefault(numbers[at], []).append(theirs)
-    return heard
+                received.setdefault(numbers[at], []).append(theirs)
+    return received
 
 
 def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
     """A command and a packet of each robot that acts in a tick."""
-    heard = neighbours(arrays, assignment["gives"])
+    received = neighbours(arrays, assignment["gives"])
     rows: list[int] = []
     commands: list[list[float]] = []
     messages = b""
@@ -88,7 +88,7 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
             headings, values = unpacked(arrays[f"{of}/compass.heading_rad"]), unpacked(arrays[f"{of}/proximity.value"])
             for at, row in enumerate(unpacked(arrays[f"{of}/rows"])):
                 rays = values[at * len(angles) : (at + 1) * len(angles)]
-                commands.append([1.0, *steer(headings[at], angles, rays, heard.get(row, ())), 0.0])
+                commands.append([1.0, *steer(headings[at], angles, rays, received.get(row, ())), 0.0])
                 messages += struct.pack("<Hf", TAG, headings[at])
                 rows.append(row)
     n = len(rows)

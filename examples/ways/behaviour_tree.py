@@ -49,14 +49,14 @@ class Seeker(Agent):
         self.tree = first_of(
             all_of("at the lamp", Leaf("is it bright?", self.is_bright), Leaf("calls", self.call)),
             all_of("something is near", Leaf("in the way?", self.is_blocked), Leaf("turns away", self.turn)),
-            all_of("a call was heard", Leaf("lately?", self.is_called), Leaf("comes", self.come)),
+            all_of("a call was received", Leaf("lately?", self.is_called), Leaf("comes", self.come)),
             Leaf("wanders", self.wander),
         )
 
     def step(self, robot: Robot) -> None:
         """Listen, look, and tick the tree."""
         self.robot = robot
-        for packet in robot.radio.heard(Call):
+        for packet in robot.radio.received(Call):
             self.call_rad, self.called_until_s = packet.bearing_rad, robot.time_s + self.patience_s
         self.look_ahead()
         self.tree.tick_once()
@@ -83,7 +83,7 @@ class Seeker(Agent):
         return self.side != 0.0
 
     def is_called(self) -> bool:
-        """Whether a call was heard lately."""
+        """Whether a call was received lately."""
         return self.robot.time_s < self.called_until_s
 
     def call(self) -> None:

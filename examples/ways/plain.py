@@ -31,7 +31,7 @@ class Seeker(Agent):
 
     def step(self, robot: Robot) -> None:
         """Listen, then do what comes first."""
-        for packet in robot.radio.heard(Call):
+        for packet in robot.radio.received(Call):
             self.call_rad, self.called_until_s = packet.bearing_rad, robot.time_s + self.patience_s
 
         self.side = side_from_obstacle(robot, self.safe_m, self.side)

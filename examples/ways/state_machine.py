@@ -50,7 +50,7 @@ class Seeker(Agent):
 
     def step(self, robot: Robot) -> None:
         """Listen, go over to the next state, and act as it says."""
-        for packet in robot.radio.heard(Call):
+        for packet in robot.radio.received(Call):
             self.call_rad, self.called_until_s = packet.bearing_rad, robot.time_s + self.patience_s
         self.doing = self.next_state(robot)
         robot.note(self.doing.value)

@@ -82,7 +82,7 @@ def test_the_readmes_agent_runs_with_the_readmes_table(tmp_path):
     (tmp_path / "mine.toml").write_text(f"{before}{blocks_of('README.md', 'toml')[0].text}\n{after}")
     result = run(tmp_path / "mine.toml", overrides=["duration_s=1"], runners=2)
     assert result.radio is not None
-    assert result.radio.fates["heard"] > 0
+    assert result.radio.fates["received"] > 0
 
 
 def test_the_readmes_python_runs(monkeypatch, capsys):

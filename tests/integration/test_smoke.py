@@ -33,7 +33,7 @@ def test_over_a_lossy_radio_every_packet_has_one_fate_at_each_intended_receiver(
     radio = local.radio
     assert radio is not None
     assert sum(radio.fates.values()) == radio.intended
-    decided = radio.fates["heard"] + radio.fates["lost"]
+    decided = radio.fates["received"] + radio.fates["lost"]
     # The scenario loses 30 %; the bound is four standard deviations of a binomial share.
     assert radio.fates["lost"] / decided == pytest.approx(0.3, abs=4 * np.sqrt(0.21 / decided))
     assert radio.latency_air_s.p50 == pytest.approx(0.11, abs=0.02)

@@ -6,11 +6,11 @@ from contextlib import contextmanager
 import numpy as np
 import zenoh
 
-from swarmwire.agent.radios.radio import HeardPacket, NoRadioLog, SentPacket
+from swarmwire.agent.radios.radio import NoRadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import Message, f4
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
@@ -40,11 +40,11 @@ class KeptLog(NoRadioLog):
     """What a radio told its log."""
 
     def __init__(self) -> None:
-        self.heard_packets: list[HeardPacket] = []
+        self.received_packets: list[ReceivedPacket] = []
         self.sent_packets: list[SentPacket] = []
 
-    def heard(self, packet: HeardPacket) -> None:
-        self.heard_packets.append(packet)
+    def received(self, packet: ReceivedPacket) -> None:
+        self.received_packets.append(packet)
 
     def sent(self, packet: SentPacket) -> None:
         self.sent_packets.append(packet)
@@ -89,7 +89,7 @@ def meet(session: zenoh.Session, others: list[ZenohRadio]) -> None:
     def reached() -> bool:
         session.put(PROBE, b"")
         for other in others:
-            other.heard(0)
+            other.received(0)
         return all(
             other.counts().get("packets_of_unknown", 0) > its for other, its in zip(others, unknown, strict=True)
         )
@@ -100,23 +100,23 @@ def meet(session: zenoh.Session, others: list[ZenohRadio]) -> None:
     session.put(PROBE, bytes(2 * MAX_BYTES))  # counted as soon as it arrives, and last
     for other, its in zip(others, large, strict=True):
         until(lambda other=other, its=its: other.counts().get("packets_oversized", 0) > its)
-        other.heard(0)
+        other.received(0)
 
 
-def words(*numbers: float, to: int = BROADCAST, row: int = 0) -> Sent:
+def words(*numbers: float, to: int = BROADCAST, row: int = 0) -> SentPackets:
     """A packet with each of these numbers."""
     payloads = Payloads.of([Word(number=number).encode() for number in numbers])
-    return Sent(np.full(len(numbers), row), np.full(len(numbers), to), payloads)
+    return SentPackets(np.full(len(numbers), row), np.full(len(numbers), to), payloads)
 
 
-def heard_by(of, packets: int, now_ns: int = 0) -> list[tuple[int, int, float]]:
+def received_by(of, packets: int, now_ns: int = 0) -> list[tuple[int, int, float]]:
     """Sender, sequence and number of so many words that a radio hears."""
     found: list[tuple[int, int, float]] = []
 
     def all_there() -> bool:
-        heard, _ = of.heard(now_ns)
-        its = zip(heard.sender.tolist(), heard.sequence.tolist(), heard.payload.tolist(), strict=True)
-        found.extend((sender, number, Word.decode(heard.payloads.row(at)).number) for sender, number, at in its)
+        received, _ = of.received(now_ns)
+        its = zip(received.sender.tolist(), received.sequence.tolist(), received.payload.tolist(), strict=True)
+        found.extend((sender, number, Word.decode(received.payloads.row(at)).number) for sender, number, at in its)
         return len(found) >= packets
 
     until(all_there)

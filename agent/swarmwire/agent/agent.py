@@ -30,7 +30,7 @@ class Agent(ABC):
     def step(self, robot: Robot) -> None:
         """Called once a tick in which the robot acts: read `robot`, then drive and send."""
 
-    def hear(self, robot: Robot) -> None:  # noqa: B027 - most agents read in `step` alone
+    def on_receive(self, robot: Robot) -> None:  # noqa: B027 - most agents read in `step` alone
         """If it is defined: called between steps when packets have come, in real time with a quantum; read and send.
 
         What it is given, the next step is not. The senses are those of the last step, the time is now. Driving, lights,

@@ -1,8 +1,8 @@
 """An agent host: one process that imports what runners need, then forks a runner for each name it is given.
 
 Forking after the import makes a thousand runners cheap: they start in milliseconds and share the code's memory. The
-agent host itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a program
-of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
+agent host itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a
+program of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
 
 Only some runners are on their way to their robots at a time; the next is forked as soon as one has got its own. If a
 thousand connected and asked at once, each would wait for all others, and some longer than a query is kept.
@@ -92,12 +92,12 @@ def _tend(names: Sequence[str], forked: Callable[[str], int], joined: int, repor
             child = forked(name)
             children[child] = name
             joining.add(child)
-        heard = {of for of, _ in news.poll(POLL_MS)}
-        if 0 in heard:
+        received = {of for of, _ in news.poll(POLL_MS)}
+        if 0 in received:
             for child in children:
                 os.kill(child, signal.SIGKILL)
             return False
-        if joined in heard:
+        if joined in received:
             joining.difference_update(pid for (pid,) in PID.iter_unpack(os.read(joined, AT_ONCE * PID.size)))
         child, status = os.waitpid(-1, os.WNOHANG)
         while child:

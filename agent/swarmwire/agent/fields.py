@@ -62,7 +62,7 @@ def ahead(n: int) -> Vectors:
     return Vectors(np.ones(n), np.zeros(n))
 
 
-# --- Fields of neighbours that were heard: a vector for each packet, and their mean over the packets of a robot.
+# --- Fields of neighbours that were received: a vector for each packet, and their mean over the packets of a robot.
 #
 # The three rules are Reynolds's (Flocks, Herds, and Schools, 1987) as primitives of one formula each. All their vectors
 # are between 0 and 1 long.
@@ -89,15 +89,15 @@ def spacing(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> Vect
 def alignment(their_heading_rad: FloatArray, own_heading_rad: FloatArray) -> Vectors:
     """Where each neighbour is heading, (k,), of length 1; both headings (k,) by compasses that agree.
 
-    Of packets heard the receiver's own is `heading_rad[heard.row]`.
+    Of packets received the receiver's own is `heading_rad[received.row]`.
     """
     return along(their_heading_rad - own_heading_rad)
 
 
-def mean_heard(heard: Packets[Any], of: Vectors) -> Vectors:
-    """The mean of vectors (k,) over the packets that each robot heard, (n,); no length for who heard nothing."""
-    packets = np.maximum(heard.count(), 1)
-    return Vectors(heard.sum(of.x) / packets, heard.sum(of.y) / packets)
+def mean_received(received: Packets[Any], of: Vectors) -> Vectors:
+    """The mean of vectors (k,) over the packets that each robot received, (n,); no length for who received nothing."""
+    packets = np.maximum(received.count(), 1)
+    return Vectors(received.sum(of.x) / packets, received.sum(of.y) / packets)
 
 
 # --- Fields of what rays see: a vector for each robot, away from what is near.

@@ -1,4 +1,4 @@
-"""What robots are told of the radio: packets heard, and outcomes of their own."""
+"""What robots are told of the radio: packets received, and outcomes of their own."""
 
 import traceback
 from abc import ABC, abstractmethod
@@ -17,23 +17,25 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
 
 class Told(NamedTuple):
-    """Packets heard and outcomes, in the orders that these promise; true if there is any."""
+    """Packets received and outcomes, in the orders that these promise; true if there is any."""
 
-    heard: Heard
+    received: ReceivedPackets
     outcomes: Outcomes
 
     def __bool__(self) -> bool:
-        return bool(len(self.heard) or len(self.outcomes))
+        return bool(len(self.received) or len(self.outcomes))
 
     def followed_by(self, other: "Told") -> "Told":
         """Both together."""
-        return Told(Heard.joined([self.heard, other.heard]), Outcomes.joined([self.outcomes, other.outcomes]))
+        return Told(
+            ReceivedPackets.joined([self.received, other.received]), Outcomes.joined([self.outcomes, other.outcomes])
+        )
 
     def of(self, rows: IntArray) -> "Told":
         """What is for these robot rows, (n,), rising."""
@@ -41,12 +43,12 @@ class Told(NamedTuple):
 
     def parted(self, rows: IntArray) -> "tuple[Told, Told]":
         """What is for these robot rows, (n,), and what is for others."""
-        heard, told = np.isin(self.heard.receiver, rows), np.isin(self.outcomes.row, rows)
-        if heard.all() and told.all():
-            return self, Told(self.heard.select(NONE), self.outcomes.select(NONE))
+        received, told = np.isin(self.received.receiver, rows), np.isin(self.outcomes.row, rows)
+        if received.all() and told.all():
+            return self, Told(self.received.select(NONE), self.outcomes.select(NONE))
         ours, theirs = (
-            Told(self.heard.select(np.flatnonzero(h)).compacted(), self.outcomes.select(np.flatnonzero(o)))
-            for h, o in ((heard, told), (~heard, ~told))
+            Told(self.received.select(np.flatnonzero(h)).compacted(), self.outcomes.select(np.flatnonzero(o)))
+            for h, o in ((received, told), (~received, ~told))
         )
         return ours, theirs
 
@@ -75,33 +77,33 @@ class Host:
         for name, kept in (memory or {}).items():
             self._groups[name].recall(kept)
 
-    def receive(self, heard: Heard, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
         rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
-        came = Told(heard, outcomes).of(np.sort(rows))
+        came = Told(received, outcomes).of(np.sort(rows))
         if came:
             self._waiting = self._waiting.followed_by(came) if self._waiting else came
 
-    def hear(self, tick: int, at_ns: int) -> Sent:
+    def on_receive(self, tick: int, at_ns: int) -> SentPackets:
         """Let agents that read between ticks read, at a time in this tick: what they sent. AgentFailed as for `act`."""
-        sent: list[Sent] = []
+        sent: list[SentPackets] = []
         for agents in self._groups.values():
-            if self._waiting and agents.hears:
+            if self._waiting and agents.receives:
                 its, self._waiting = self._waiting.parted(agents.rows if agents.has_stepped else NOBODY)
                 if its:
-                    sent.append(agents.hear((tick, at_ns, self._time(tick, agents.group)[2]), its))
-        return Sent.joined(sent)
+                    sent.append(agents.on_receive((tick, at_ns, self._time(tick, agents.group)[2]), its))
+        return SentPackets.joined(sent)
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         if self._waiting:
             acting_rows = [self._groups[name].group.rows for name in senses]
             # Also what waits for the dead of these groups: it is lost with them.
             its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
-            heard, outcomes = Told(heard, outcomes).followed_by(its) if its else (heard, outcomes)
+            received, outcomes = Told(received, outcomes).followed_by(its) if its else (received, outcomes)
         acting = ((self._groups[name], group) for name, group in senses.items())
         return Actions.joined(
-            [agents.act(self._time(tick, agents.group), group, heard, outcomes) for agents, group in acting]
+            [agents.act(self._time(tick, agents.group), group, received, outcomes) for agents, group in acting]
         )
 
     def memory(self, names: Iterable[str]) -> Memory:
@@ -116,9 +118,9 @@ class Host:
 class Hosted(ABC):
     """The agents of one group: what both kinds share."""
 
-    def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, hears: bool) -> None:
+    def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, receives: bool) -> None:
         self.group, self.needs = group, needs
-        self.hears = hears  # between steps, too
+        self.receives = receives  # between steps, too
         self.rows: IntArray = group.rows  # that acted last: state is kept for these
         self._sent_before = np.zeros(len(group.rows), np.int64)
         self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that the agent itself sent
@@ -126,7 +128,11 @@ class Hosted(ABC):
         self._hearings = 0  # since it
 
     def act(
-        self, time: tuple[int, int, int], senses: GroupSenses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+        self,
+        time: tuple[int, int, int],
+        senses: GroupSenses,
+        received: ReceivedPackets,
+        outcomes: Outcomes = NO_OUTCOMES,
     ) -> Actions:
         """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
@@ -143,7 +149,7 @@ class Hosted(ABC):
             self.needs,
             time,
             senses,
-            _own(heard, senses.rows),
+            _own(received, senses.rows),
             self._own_outcomes(outcomes, senses.rows, place),
             self.group.keys[place],
             sent_before,
@@ -151,11 +157,11 @@ class Hosted(ABC):
         if turn.n:  # no step for nobody: an agent must not tell whether others share its process
             self.step(turn)
         self._sent_before[place] = sent_before
-        if self.hears:
+        if self.receives:
             self._senses, self._hearings = senses, 0
         return turn.end()
 
-    def hear(self, time: tuple[int, int, int], told: Told) -> Sent:
+    def on_receive(self, time: tuple[int, int, int], told: Told) -> SentPackets:
         """What robots send that read, between steps, what they were `told`; `time` is as for `act`, but now."""
         senses = self._senses
         if senses is None:
@@ -168,7 +174,7 @@ class Hosted(ABC):
             self.needs,
             time,
             senses,
-            _own(told.heard, self.rows),
+            _own(told.received, self.rows),
             self._own_outcomes(told.outcomes, self.rows, place),
             self.group.keys[place],
             sent_before,
@@ -242,7 +248,7 @@ class _Vector(Hosted):
     """One VectorAgent for all robots of the group, and the State that it works on."""
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
-        super().__init__(group, kind.needs, hears=kind.hear is not VectorAgent.hear)
+        super().__init__(group, kind.needs, receives=kind.on_receive is not VectorAgent.on_receive)
         self._agent = make(kind, group.params, len(group.rows))
         per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
         self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
@@ -253,7 +259,7 @@ class _Vector(Hosted):
         self._call(self._agent.step, turn)
 
     def listen(self, turn: Turn) -> None:
-        self._call(self._agent.hear, turn)
+        self._call(self._agent.on_receive, turn)
 
     def _call(self, method: Callable[[Robots, State], None], turn: Turn) -> None:
         if self._per_robot:
@@ -283,7 +289,7 @@ class _Single(Hosted):
     """An Agent for each robot of the group."""
 
     def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
-        super().__init__(group, kind.needs, hears=kind.hear is not Agent.hear)
+        super().__init__(group, kind.needs, receives=kind.on_receive is not Agent.on_receive)
         self._kind = kind
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
@@ -292,10 +298,10 @@ class _Single(Hosted):
             self._call(self._agents[row].step, turn, at, row)
 
     def listen(self, turn: Turn) -> None:
-        told = np.union1d(turn.heard.receiver, turn.outcome_rows)
+        told = np.union1d(turn.received.receiver, turn.outcome_rows)
         for at in cast("list[int]", told.tolist()):
             row = int(turn.senses.rows[at])
-            self._call(self._agents[row].hear, turn, at, row)
+            self._call(self._agents[row].on_receive, turn, at, row)
 
     def _call(self, method: Callable[[Robot], None], turn: Turn, at: int, row: int) -> None:
         try:
@@ -347,18 +353,26 @@ def _failed(robots: list[str], error: BaseException, turn: Turn | None = None) -
     return AgentFailed(robots_text(robots), "".join(traceback.format_exception(type(error), error, own)) + when)
 
 
-def _own(heard: Heard, rows: IntArray) -> Heard:
-    """What the robots `rows` heard, with the receiver as a place in `rows`."""
-    if not len(heard):
-        return heard
+def _own(received: ReceivedPackets, rows: IntArray) -> ReceivedPackets:
+    """What the robots `rows` received, with the receiver as a place in `rows`."""
+    if not len(received):
+        return received
     first, last = (int(rows[0]), int(rows[-1])) if len(rows) else (0, -1)
-    lowest, highest = int(heard.receiver[0]), int(heard.receiver[-1])  # receivers rise, as rows do
-    if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, and nobody beside it heard
-        place = heard.receiver - first if len(rows) > 1 else np.zeros(len(heard), np.int64)
+    lowest, highest = int(received.receiver[0]), int(received.receiver[-1])  # receivers rise, as rows do
+    if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, and nobody beside it received
+        place = received.receiver - first if len(rows) > 1 else np.zeros(len(received), np.int64)
     else:
         places = np.full(max(highest, last) + 1, NOT_OWN)
         places[rows] = np.arange(len(rows))
-        place = places.take(heard.receiver)
+        place = places.take(received.receiver)
         mine = np.flatnonzero(place != NOT_OWN)
-        heard, place = heard.select(mine), place.take(mine)
-    return Heard(place, heard.sender, heard.sequence, heard.heard_at_ns, heard.given, heard.payload, heard.payloads)
+        received, place = received.select(mine), place.take(mine)
+    return ReceivedPackets(
+        place,
+        received.sender,
+        received.sequence,
+        received.received_at_ns,
+        received.given,
+        received.payload,
+        received.payloads,
+    )

@@ -3,12 +3,15 @@
 from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 
 
 class LocalBackend:
-    """A AgentBackend whose agents are called directly; arrays are passed, messages are encoded and decoded all the same."""
+    """A AgentBackend whose agents are called directly.
+
+    Arrays are passed, messages are encoded and decoded all the same.
+    """
 
     def __init__(self, assignment: Assignment) -> None:
         self._assignment = assignment
@@ -18,17 +21,17 @@ class LocalBackend:
         """Make the agents."""
         self._host = Host(self._assignment)
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
-        return self._started().act(tick, _read_only(senses), _heard_read_only(heard), outcomes)
+        return self._started().act(tick, _read_only(senses), _received_read_only(received), outcomes)
 
-    def receive(self, heard: Heard, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Keep this until the robots that it is for step, or hear."""
-        self._started().receive(_heard_read_only(heard), outcomes)
+        self._started().receive(_received_read_only(received), outcomes)
 
-    def hear(self, tick: int, at_ns: int) -> Sent:
+    def on_receive(self, tick: int, at_ns: int) -> SentPackets:
         """Let agents that read between ticks read, at a time in this tick; what they sent."""
-        return self._started().hear(tick, at_ns)
+        return self._started().on_receive(tick, at_ns)
 
     def counts(self) -> dict[str, int]:
         """Nothing is lost within a process."""
@@ -60,15 +63,15 @@ def _read_only(senses: Senses) -> Senses:
     }
 
 
-def _heard_read_only(heard: Heard) -> Heard:
-    if not len(heard):
-        return heard
-    return Heard(
-        _frozen(heard.receiver),
-        _frozen(heard.sender),
-        _frozen(heard.sequence),
-        _frozen(heard.heard_at_ns),
-        {name: _frozen(column) for name, column in heard.given.items()},
-        _frozen(heard.payload),
-        Payloads(_frozen(heard.payloads.data), _frozen(heard.payloads.offset)),
+def _received_read_only(received: ReceivedPackets) -> ReceivedPackets:
+    if not len(received):
+        return received
+    return ReceivedPackets(
+        _frozen(received.receiver),
+        _frozen(received.sender),
+        _frozen(received.sequence),
+        _frozen(received.received_at_ns),
+        {name: _frozen(column) for name, column in received.given.items()},
+        _frozen(received.payload),
+        Payloads(_frozen(received.payloads.data), _frozen(received.payloads.offset)),
     )

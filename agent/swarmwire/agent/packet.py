@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import TAG_BYTES, Heard, SendResult
+from swarmwire.comms.packets import TAG_BYTES, ReceivedPackets, SendResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,13 @@ class Columns:
 
 
 class Packets(Generic[M]):
-    """All packets of one message class that n robots heard, k rows sorted by robot, then by time."""
+    """All packets of one message class that n robots received, k rows sorted by robot, then by time."""
 
     message: Columns  # every field of the message under its name, (k,) each
 
-    def __init__(self, robots: int, table: Heard, fields: dict[str, FloatArray], needs: tuple[str, ...]) -> None:
+    def __init__(
+        self, robots: int, table: ReceivedPackets, fields: dict[str, FloatArray], needs: tuple[str, ...]
+    ) -> None:
         self._robots, self._table, self._needs = robots, table, needs
         self.message = Columns(fields)
 
@@ -60,7 +62,7 @@ class Packets(Generic[M]):
 
     @property
     def row(self) -> IntArray:
-        """The robot that heard it, 0 to n - 1, rising, (k,)."""
+        """The robot that received it, 0 to n - 1, rising, (k,)."""
         return self._table.receiver
 
     @property
@@ -74,9 +76,9 @@ class Packets(Generic[M]):
         return self._table.sequence
 
     @property
-    def heard_at_ns(self) -> IntArray:
-        """When it was heard, ns since the start of the run, (k,)."""
-        return self._table.heard_at_ns
+    def received_at_ns(self) -> IntArray:
+        """When it was received, ns since the start of the run, (k,)."""
+        return self._table.received_at_ns
 
     @property
     def range_m(self) -> FloatArray:
@@ -94,7 +96,7 @@ class Packets(Generic[M]):
         return self._given("radio.rssi", "rssi_dbm")
 
     def count(self) -> IntArray:
-        """How many packets each robot heard, (n,)."""
+        """How many packets each robot received, (n,)."""
         return np.bincount(self.row, minlength=self._robots)
 
     def sum(self, values: FloatArray) -> FloatArray:
@@ -105,12 +107,12 @@ class Packets(Generic[M]):
         return given_column(self._table, self._needs, need, column)
 
 
-class HeardLists:
-    """What the robots of a tick heard, as Python's own lists: for agents that read it number by number."""
+class ReceivedLists:
+    """What the robots of a tick received, as Python's own lists: for agents that read it number by number."""
 
     __slots__ = ("_columns", "_data", "_needs", "_offset", "_payload", "_receiver", "_table")
 
-    def __init__(self, table: Heard, needs: tuple[str, ...]) -> None:
+    def __init__(self, table: ReceivedPackets, needs: tuple[str, ...]) -> None:
         self._table, self._needs = table, needs
         self._receiver: list[int] = table.receiver.tolist()
         self._payload: list[int] = table.payload.tolist()
@@ -119,7 +121,7 @@ class HeardLists:
         self._columns: dict[str, list[Any]] = {}
 
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """What the robot of a row (rising) heard with a tag and, if given, of this size.
+        """What the robot of a row (rising) received with a tag and, if given, of this size.
 
         Each as its place, and the bytes with the span in which it stands.
         """
@@ -149,14 +151,14 @@ class HeardLists:
 
 
 class Packet(Generic[M]):
-    """One packet that a robot heard."""
+    """One packet that a robot received."""
 
     __slots__ = ("_all", "_at", "message")
 
     message: M  # what was sent, frozen; of a dict a copy
 
-    def __init__(self, heard: HeardLists, at: int, message: M) -> None:
-        self._all, self._at, self.message = heard, at, message
+    def __init__(self, received: ReceivedLists, at: int, message: M) -> None:
+        self._all, self._at, self.message = received, at, message
 
     @property
     def sender(self) -> int:
@@ -169,9 +171,9 @@ class Packet(Generic[M]):
         return self._all.column("sequence")[self._at]
 
     @property
-    def heard_at_ns(self) -> int:
-        """When it was heard, ns since the start of the run."""
-        return self._all.column("heard_at_ns")[self._at]
+    def received_at_ns(self) -> int:
+        """When it was received, ns since the start of the run."""
+        return self._all.column("received_at_ns")[self._at]
 
     @property
     def range_m(self) -> float:
@@ -189,7 +191,7 @@ class Packet(Generic[M]):
         return self._all.given("radio.rssi", "rssi_dbm")[self._at]
 
 
-def given_column(table: Heard, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
+def given_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
     """What the medium tells of packets, (k,); NotDeclared if an agent's needs do not name it."""
     if need not in needs:
         raise NotDeclared(f"reads {need!r} of a packet, which its needs do not name: {', '.join(needs) or 'none'}")

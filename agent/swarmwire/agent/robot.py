@@ -102,15 +102,15 @@ class RadioPort:
         self._turn, self._row = turn, row
 
     @overload
-    def heard(self, kind: type[M]) -> "list[Packet[M]]": ...
+    def received(self, kind: type[M]) -> "list[Packet[M]]": ...
     @overload
-    def heard(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
-    def heard(self, kind: type[Any]) -> "list[Packet[Any]]":
-        """The packets of a message class (or `dict`) heard since the robot's last step, by time.
+    def received(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
+    def received(self, kind: type[Any]) -> "list[Packet[Any]]":
+        """The packets of a message class (or `dict`) received since the robot's last step, by time.
 
         What bears the tag and is none, as a runner of others may send it, is left out.
         """
-        lists = self._turn.heard_lists
+        lists = self._turn.received_lists
         if kind is not dict:
             mine = lists.payloads(self._row, message_class(kind).tag, kind.size_bytes)
             return [Packet(lists, at, kind.decode_at(data, start)) for at, data, start, _ in mine]

@@ -162,8 +162,8 @@ class RadioRows:
     def __init__(self, turn: Turn) -> None:
         self._turn = turn
 
-    def heard(self, kind: type[M]) -> Packets[M]:
-        """All packets of a message class heard since the robots' last step."""
+    def received(self, kind: type[M]) -> Packets[M]:
+        """All packets of a message class received since the robots' last step."""
         return self._turn.packets(kind)
 
     @property

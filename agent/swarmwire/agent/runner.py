@@ -26,7 +26,7 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
-from swarmwire.comms.packets import Heard, Outcomes
+from swarmwire.comms.packets import Outcomes, ReceivedPackets
 from swarmwire.comms.tick_io import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, decode_memory
@@ -151,15 +151,17 @@ class Inbox:
                 self.dropped += 1
 
     def ticks(
-        self, assignment: Assignment, receive: Callable[[Heard, Outcomes], None] = lambda _heard, _outcomes: None
-    ) -> Iterator[tuple[int, Senses, Heard, Outcomes] | tuple[int, int]]:
+        self,
+        assignment: Assignment,
+        receive: Callable[[ReceivedPackets, Outcomes], None] = lambda _received, _outcomes: None,
+    ) -> Iterator[tuple[int, Senses, ReceivedPackets, Outcomes] | tuple[int, int]]:
         """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
 
         What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
         """
         gives, rows = assignment.gives or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
-        newest: tuple[int, Senses, Heard, Outcomes] | None = None
+        newest: tuple[int, Senses, ReceivedPackets, Outcomes] | None = None
         between: tuple[int, int] | None = None
         tick = -1
         while True:
@@ -184,10 +186,10 @@ class Inbox:
                     self.ended = _end(frame)
                     return
                 if frame.kind == "packets":
-                    at_ns, number, heard, outcomes = decode_packets(frame, gives)
+                    at_ns, number, received, outcomes = decode_packets(frame, gives)
                     self.missed += max(0, number - self._next_packets)
                     self._next_packets = number + 1
-                    receive(heard, outcomes)
+                    receive(received, outcomes)
                     between = frame.tick, at_ns
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
@@ -274,12 +276,12 @@ def answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iter
         yield frames.encode("ready", -1, {})
         for told in inbox.ticks(assignment, host.receive):
             if len(told) == 2:
-                if len(sent := host.hear(*told)):
+                if len(sent := host.on_receive(*told)):
                     missed, inbox.missed = inbox.missed, 0
                     yield encode_sent(told[0], sent, missed)
                 continue
-            tick, senses, heard, outcomes = told
-            actions = host.act(tick, senses, heard, outcomes)
+            tick, senses, received, outcomes = told
+            actions = host.act(tick, senses, received, outcomes)
             dropped, inbox.dropped = inbox.dropped, 0
             yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(senses))
         return

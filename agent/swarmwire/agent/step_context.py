@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.packet import HeardLists, NotDeclared, Packets
+from swarmwire.agent.packet import NotDeclared, Packets, ReceivedLists
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import NotFitted
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import (
     NO_ACTUATIONS,
     NO_LED_CHANGES,
@@ -30,7 +30,10 @@ NOT_SWITCHED = -1
 
 
 class Turn:
-    """The robots `senses.rows` of a group in one tick; `heard.receiver` and `outcomes.row` count these rows from 0."""
+    """The robots `senses.rows` of a group in one tick.
+
+    `received.receiver` and `outcomes.row` count these rows from 0.
+    """
 
     def __init__(
         self,
@@ -38,7 +41,7 @@ class Turn:
         needs: tuple[str, ...],
         time: tuple[int, int, int],
         senses: GroupSenses,
-        heard: Heard,
+        received: ReceivedPackets,
         outcomes: Outcomes,
         keys: KeyArray,
         sent_before: IntArray,
@@ -47,7 +50,7 @@ class Turn:
         self.first_draw = first_draw  # of the tick that it does not share with those before it
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
-        self.senses, self.heard = senses, heard
+        self.senses, self.received = senses, received
         self._outcomes, self._asks = outcomes, OUTCOMES in needs
         self.outcome_rows = outcomes.row  # (k,) places of robots that there is an outcome for
         self.keys = keys  # (n,) of the robots' draws
@@ -55,14 +58,14 @@ class Turn:
         self.drive = np.zeros(self.n, np.bool_)
         self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
-        self._outbox: list[Sent] = []
+        self._outbox: list[SentPackets] = []
         self._states: dict[str, int] = {}  # that were named in this tick, by code
         self._state: IntArray | None = None  # (n,) codes; -1: none named
         self._value: FloatArray | None = None  # (n,) numbers told in this tick; NaN: none
         self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: none given in this tick
         self._own: FloatArray | None = None  # (n, numbers of all own actuators); NaN: not set in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
-        self._lists: HeardLists | None = None
+        self._lists: ReceivedLists | None = None
 
     def field(self, sense: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
@@ -81,33 +84,33 @@ class Turn:
         return self._outcomes
 
     def packets(self, kind: type[M]) -> Packets[M]:
-        """All packets of a message class that these robots heard."""
+        """All packets of a message class that these robots received."""
         known = self._packets.get(kind)
         if known is None:
             message_class(kind)
-            table = self.heard
+            table = self.received
             fields = decode_alike(kind, table.payloads, table.payload)
-            if fields is None:  # messages of several kinds were heard
+            if fields is None:  # messages of several kinds were received
                 table = self.tagged(kind.tag, kind.size_bytes)
                 fields = decode_rows(kind, table.payloads, table.payload)
             known = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
         return known
 
     @property
-    def heard_lists(self) -> HeardLists:
-        """All that these robots heard, for agents of one robot each."""
+    def received_lists(self) -> ReceivedLists:
+        """All that these robots received, for agents of one robot each."""
         if self._lists is None:
-            self._lists = HeardLists(self.heard, self.needs)
+            self._lists = ReceivedLists(self.received, self.needs)
         return self._lists
 
-    def tagged(self, tag: int, size_bytes: int | None = None) -> Heard:
-        """What was heard with a tag and, if given, of this size."""
-        wanted = self.heard.payloads.tags() == tag
+    def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:
+        """What was received with a tag and, if given, of this size."""
+        wanted = self.received.payloads.tags() == tag
         if size_bytes is not None:
-            wanted &= self.heard.payloads.sizes == size_bytes
+            wanted &= self.received.payloads.sizes == size_bytes
         if wanted.all():
-            return self.heard
-        return self.heard.select(np.flatnonzero(wanted[self.heard.payload]))
+            return self.received
+        return self.received.select(np.flatnonzero(wanted[self.received.payload]))
 
     def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
         """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
@@ -122,7 +125,7 @@ class Turn:
         self._sent_before[place] += 1
         # Whoever does not ask is not told, and nothing of it crosses the wire.
         outcome_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
-        self._outbox.append(Sent(self.senses.rows[place], receiver, payloads, outcome_id))
+        self._outbox.append(SentPackets(self.senses.rows[place], receiver, payloads, outcome_id))
         return ids
 
     def send_one(self, place: int, to: int | None, payload: bytes) -> int:
@@ -137,7 +140,7 @@ class Turn:
         self._sent_before[place] = id_ + 1
         outcome_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
         sender = self.senses.rows[place : place + 1]
-        self._outbox.append(Sent(sender, np.array((receiver,)), Payloads.one(payload), outcome_id))
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), outcome_id))
         return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:
@@ -220,16 +223,16 @@ class Turn:
         def __getattr__(self, name):
             raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
 
-    def end_hearing(self) -> Sent:
+    def end_hearing(self) -> SentPackets:
         """What the robots sent between their steps; RuntimeError if they did anything else."""
         actions = self.end()
         others = actions.notes, actions.leds, actions.own, actions.values
         if actions.drive.any() or any(map(len, others)):
-            raise RuntimeError("hear(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
+            raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return actions.sent
 
     def _actions(self) -> Actions:
-        sent = Sent.joined(self._outbox)
+        sent = SentPackets.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
         return Actions(
             self.senses.rows,

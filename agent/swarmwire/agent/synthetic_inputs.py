@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.bodies.sensors import Camera, GroundColour, OwnSheet
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, UNTOLD, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
 from swarmwire.comms.tick_io import GroupSenses
 
 
@@ -21,9 +21,9 @@ from swarmwire.comms.tick_io import GroupSenses
 class Trial:
     """What to try an agent with: robots whose senses and packets are made up.
 
-    All that the body senses is drawn anew in each tick. What robots send is heard a tick later, by each of the others
-    with probability 0.4, and outcomes of all kinds are told to an agent that needs them. A tenth of the robots is
-    missing in each tick and starts afresh when it is back.
+    All that the body senses is drawn anew in each tick. What robots send is received a tick later, by each of the
+    others with probability 0.4, and outcomes of all kinds are told to an agent that needs them. A tenth of the robots
+    is missing in each tick and starts afresh when it is back.
     """
 
     robots: int = 7  # of one group
@@ -40,8 +40,8 @@ class Trial:
 
 # --- What robots of a trial sense and hear, made up and keyed by its seed.
 #
-# Ragged packets (what robots sent a tick ago, heard by some), outcomes of addressed ones, robots that drop out and come
-# back.
+# Ragged packets (what robots sent a tick ago, received by some), outcomes of addressed ones, robots that drop out and
+# come back.
 
 
 RATE_HZ = 10
@@ -52,13 +52,13 @@ LEARNING = 0.6  # share of the outcomes still to come that come in a tick
 
 
 class _Ether:
-    """What was sent a tick ago, heard at random, and what became of it, told at random."""
+    """What was sent a tick ago, received at random, and what became of it, told at random."""
 
     def __init__(self, key: int) -> None:
-        self._key, self._sent = key, Sent.none()
+        self._key, self._sent = key, SentPackets.none()
         self._untold = NO_OUTCOMES
 
-    def show(self, sent: Sent) -> None:
+    def show(self, sent: SentPackets) -> None:
         self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
         asked = np.flatnonzero(self._sent.outcome_ids != UNTOLD)
         row, id_ = self._sent.sender[asked], self._sent.outcome_ids[asked]
@@ -72,14 +72,14 @@ class _Ether:
         told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
         return told
 
-    def heard(self, tick: int, rows: IntArray) -> Heard:
+    def received(self, tick: int, rows: IntArray) -> ReceivedPackets:
         chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
         receiver, payload = np.nonzero((chance < HEARING) & (self._sent.sender != rows[:, None]))
         given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in GIVEN}
         at_ns = np.full(len(receiver), tick_start_ns(tick, RATE_HZ) - 1, np.int64)
         sender = self._sent.sender[payload]
         payloads: Payloads = self._sent.payloads
-        return Heard(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
+        return ReceivedPackets(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
 
 
 class Given(NamedTuple):
@@ -87,11 +87,11 @@ class Given(NamedTuple):
 
     time: tuple[int, int, int]
     senses: GroupSenses
-    heard: Heard
+    received: ReceivedPackets
     outcomes: Outcomes
 
 
-def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[Sent], None]]]:
+def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
     key, body = draws.derive_key("inputs", trial.seed), trial.sheet
     ether = _Ether(key)
@@ -100,7 +100,7 @@ def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[Sent], None]]]:
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
         senses = GroupSenses(rows, _senses(body, key, tick, rows))
-        yield Given(time, senses, ether.heard(tick, rows), ether.outcomes(tick)), ether.show
+        yield Given(time, senses, ether.received(tick, rows), ether.outcomes(tick)), ether.show
 
 
 def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:

@@ -19,7 +19,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
-from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, Sent
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
@@ -62,7 +62,7 @@ def _actuated(actions: Actions, body: Body) -> Iterator[Deed]:
         yield robot, f"actuate: {places[at]}", repr(number)
 
 
-def _sent(sent: Sent) -> Iterator[Deed]:
+def _sent(sent: SentPackets) -> Iterator[Deed]:
     packets: dict[int, int] = {}  # of each robot, up to now
     columns = sent.sender.tolist(), sent.to.tolist(), sent.outcome_ids.tolist()
     for at, (robot, to, outcome_id) in enumerate(zip(*columns, strict=True)):
@@ -161,5 +161,5 @@ def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
 def _only(row: int, given: Given) -> Given:
     at = np.flatnonzero(given.senses.rows == row)
     own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
-    heard = given.heard.select(np.flatnonzero(given.heard.receiver == row))
-    return Given(given.time, own, heard, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))
+    received = given.received.select(np.flatnonzero(given.received.receiver == row))
+    return Given(given.time, own, received, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))

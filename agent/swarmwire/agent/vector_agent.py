@@ -125,7 +125,7 @@ class VectorAgent(ABC, Generic[S]):
     def step(self, robots: Robots, state: S) -> None:
         """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
 
-    def hear(self, robots: Robots, state: S) -> None:
+    def on_receive(self, robots: Robots, state: S) -> None:
         """If it is defined: called between steps when packets have come, as for Agent, with the last step's robots."""
 
 

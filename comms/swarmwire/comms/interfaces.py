@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 
@@ -15,7 +15,7 @@ class AgentBackend(Protocol):
         """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Actions:
         """What every robot does in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 
@@ -52,7 +52,8 @@ class Judge(Protocol):
         ...
 
 
-# --- The seam within a tick: backends that keep to the wall clock send while it goes on, and hand over what is heard.
+# --- The seam within a tick: backends that keep to the wall clock send while it goes on, and hand over what is
+# received.
 
 
 class Put(NamedTuple):
@@ -60,7 +61,7 @@ class Put(NamedTuple):
 
     at_ns: int  # when they came, simulated time
     tick: int | None  # whose step sent them: a robot sends no sooner than in its turn; None: they go out at once
-    sent: Sent
+    sent: SentPackets
 
 
 class AirTime(Protocol):
@@ -70,18 +71,20 @@ class AirTime(Protocol):
         """Take packets that came no sooner than those before them, and within the tick."""
         ...
 
-    def advance(self, until_ns: int) -> tuple[Heard, Outcomes]:
-        """Let time pass; what robots heard, and learned of their packets, that nobody was handed before."""
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+        """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         ...
 
 
 class TimedBackend(AgentBackend, Protocol):
-    """A backend whose tick takes its time: all that is heard goes through it, whether or not the robot acts."""
+    """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """What every robot does in this tick, but for packets, which were put on the air.
 
-        `heard` and `outcomes` are what came since the last tick, for robots that do not act in this one as well.
+        `received` and `outcomes` are what came since the last tick, for robots that do not act in this one as well.
         """
         ...
 
@@ -89,10 +92,10 @@ class TimedBackend(AgentBackend, Protocol):
 class ReceivingBackend(AgentBackend, Protocol):
     """A backend in this process whose agents can read between ticks."""
 
-    def receive(self, heard: Heard, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Keep this until the robots that it is for step, or hear."""
         ...
 
-    def hear(self, tick: int, at_ns: int) -> Sent:
+    def on_receive(self, tick: int, at_ns: int) -> SentPackets:
         """Let agents that read between ticks read, at a time in this tick; what they sent."""
         ...

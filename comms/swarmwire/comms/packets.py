@@ -11,7 +11,7 @@ from swarmwire.comms.config import Explained
 class Fate(Explained):
     """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
 
-    HEARD = 0, "reached the receiver"
+    RECEIVED = 0, "reached the receiver"
     OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
     BLOCKED = 2, "an obstacle stood in the line of sight"
     LOST = 3, "within reach, but lost by the medium's fixed loss, or a trace's delivery ratio"
@@ -120,7 +120,7 @@ _NO_PAYLOADS = Payloads.of([])
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class SentPackets:
     """Packets that agents sent in one tick; those of one sender stand in the order in which it sent them."""
 
     sender: IntArray  # (k,) robot row: arena x robots + index
@@ -136,18 +136,18 @@ class Sent:
         """`outcome_id`, also where nobody asks, (k,)."""
         return np.full(len(self), UNTOLD) if self.outcome_id is None else self.outcome_id
 
-    def select(self, index: IntArray) -> "Sent":
+    def select(self, index: IntArray) -> "SentPackets":
         """The packets of `index` (k,), in its order."""
         outcome_id = None if self.outcome_id is None else self.outcome_id[index]
-        return Sent(self.sender[index], self.to[index], self.payloads.rows(index), outcome_id)
+        return SentPackets(self.sender[index], self.to[index], self.payloads.rows(index), outcome_id)
 
     @classmethod
-    def none(cls) -> "Sent":
+    def none(cls) -> "SentPackets":
         """No packets."""
         return _NO_PACKETS
 
     @classmethod
-    def joined(cls, parts: "list[Sent]") -> "Sent":
+    def joined(cls, parts: "list[SentPackets]") -> "SentPackets":
         """The packets of all parts."""
         if len(parts) == 1:
             return parts[0]
@@ -163,17 +163,17 @@ class Sent:
         )
 
 
-_NO_PACKETS = Sent(_NOTHING, _NOTHING, _NO_PAYLOADS)
+_NO_PACKETS = SentPackets(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """Packets that reached robots since the last tick, sorted by (receiver, heard_at_ns, sender, sequence)."""
+class ReceivedPackets:
+    """Packets that reached robots since the last tick, sorted by (receiver, received_at_ns, sender, sequence)."""
 
     receiver: IntArray  # (k,) robot row: arena x robots + index
     sender: IntArray  # (k,) index of the sender in the arena
     sequence: IntArray  # (k,) how many packets the sender had sent before this one
-    heard_at_ns: IntArray  # (k,)
+    received_at_ns: IntArray  # (k,)
     given: dict[str, FloatArray]  # what the medium tells: "range_m", "bearing_rad", "rssi_dbm", each (k,)
     payload: IntArray  # (k,) row in `payloads`
     payloads: Payloads  # one row per packet, shared by its receivers
@@ -182,44 +182,44 @@ class Heard:
         return len(self.receiver)
 
     @classmethod
-    def none(cls, gives: tuple[str, ...] = ()) -> "Heard":
-        """Nothing heard over a medium that gives the named columns."""
+    def none(cls, gives: tuple[str, ...] = ()) -> "ReceivedPackets":
+        """Nothing received over a medium that gives the named columns."""
         given = {name: np.empty(0, np.float64) for name in gives}
         return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
 
-    def select(self, index: IntArray) -> "Heard":
+    def select(self, index: IntArray) -> "ReceivedPackets":
         """The rows of `index` (k,); the payload table stays shared."""
-        return Heard(
+        return ReceivedPackets(
             self.receiver[index],
             self.sender[index],
             self.sequence[index],
-            self.heard_at_ns[index],
+            self.received_at_ns[index],
             {name: column[index] for name, column in self.given.items()},
             self.payload[index],
             self.payloads,
         )
 
-    def merged(self, other: "Heard") -> "Heard":
-        """Both, in the order that `Heard` promises; `other` was heard over the same medium."""
-        return Heard.joined([self, other])
+    def merged(self, other: "ReceivedPackets") -> "ReceivedPackets":
+        """Both, in the order that `ReceivedPackets` promises; `other` was received over the same medium."""
+        return ReceivedPackets.joined([self, other])
 
     @classmethod
-    def joined(cls, parts: "list[Heard]") -> "Heard":
-        """All parts, one or more, heard over the same medium, in the order that `Heard` promises."""
+    def joined(cls, parts: "list[ReceivedPackets]") -> "ReceivedPackets":
+        """All parts, one or more, received over the same medium, in the order that `ReceivedPackets` promises."""
         some = [part for part in parts if len(part)]
         if len(some) < 2:
             return some[0] if some else parts[0]
-        columns = zip(*((part.receiver, part.sender, part.sequence, part.heard_at_ns) for part in some), strict=True)
-        receiver, sender, sequence, heard_at_ns = (np.concatenate(column) for column in columns)
+        columns = zip(*((part.receiver, part.sender, part.sequence, part.received_at_ns) for part in some), strict=True)
+        receiver, sender, sequence, received_at_ns = (np.concatenate(column) for column in columns)
         given = {name: np.concatenate([part.given[name] for part in some]) for name in some[0].given}
         first = offsets(np.array([len(part.payloads) for part in some]))
         payload = np.concatenate([part.payload + at for part, at in zip(some, first.tolist(), strict=False)])
         payloads = Payloads.joined([part.payloads for part in some])
-        both = cls(receiver, sender, sequence, heard_at_ns, given, payload, payloads)
-        return both.select(np.lexsort((sequence, sender, heard_at_ns, receiver)))
+        both = cls(receiver, sender, sequence, received_at_ns, given, payload, payloads)
+        return both.select(np.lexsort((sequence, sender, received_at_ns, receiver)))
 
-    def compacted(self) -> "Heard":
-        """The same with those payloads only that somebody heard."""
+    def compacted(self) -> "ReceivedPackets":
+        """The same with those payloads only that somebody received."""
         used, payload = np.unique(self.payload, return_inverse=True)
         return replace(self, payload=payload.reshape(-1), payloads=self.payloads.rows(used))
 
@@ -231,7 +231,7 @@ class SendResult(Explained):
     """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
-    NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not heard, or the answer was not"
+    NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not received, or the answer was not"
     CHANNEL_BUSY = 2, "the radio found the air busy each time it listened, and gave up"
     QUEUE_FULL = 3, "the radio's queue was full: never on air"
     TOO_LARGE = 4, "above the medium's largest payload: never on air"

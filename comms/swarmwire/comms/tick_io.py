@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import SentPackets
 
 MAX_STATE = 64  # characters
 MAX_STATES = 256  # different ones in a run; what a runner names in a tick is bounded by the same number
@@ -154,7 +154,7 @@ class Actions:
     linear_mps: FloatArray  # (n,) forward speed asked for
     angular_radps: FloatArray  # (n,) turn rate asked for, positive to the left
     lateral_mps: FloatArray  # (n,) speed to the left asked for; 0 but for holonomic bodies
-    sent: Sent = field(default_factory=Sent.none)
+    sent: SentPackets = field(default_factory=SentPackets.none)
     notes: Notes = field(default_factory=Notes.none)
     leds: LedChanges = NO_LED_CHANGES
     own: Actuations = NO_ACTUATIONS  # of actuators of the user's own
@@ -175,7 +175,7 @@ class Actions:
             np.concatenate([part.linear_mps for part in parts]),
             np.concatenate([part.angular_radps for part in parts]),
             np.concatenate([part.lateral_mps for part in parts]),
-            Sent.joined([part.sent for part in parts]),
+            SentPackets.joined([part.sent for part in parts]),
             Notes.joined([part.notes for part in parts]),
             LedChanges.joined([part.leds for part in parts]),
             Actuations.joined([part.own for part in parts]),

@@ -143,7 +143,7 @@ class Finished:
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)
-    final_at_ns: IntArray  # (k,) when it was heard, or when the reception ended in another way
+    final_at_ns: IntArray  # (k,) when it was received, or when the reception ended in another way
     fate: IntArray  # (k,) a Fate
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) topic
@@ -196,7 +196,7 @@ class Departed:
     sequence: IntArray  # (k,)
     intended: IntArray  # (k,) receivers that it was meant for
     out_of_range: IntArray  # (k,) of these, receivers out of range; 0 if it never was on air
-    fate: IntArray  # (k,) a Fate; HEARD: it was on air, else why not
+    fate: IntArray  # (k,) a Fate; RECEIVED: it was on air, else why not
     on_air_at_ns: IntArray  # (k,)
     off_air_at_ns: IntArray  # (k,) the same if it never was on air
 
@@ -256,7 +256,7 @@ class Happened:
 class Truth:
     """One tick: the state at its start, what the robots did in it, and what came of the radio up to its start.
 
-    Of an arena that has left the world nothing counts any more: nobody is alive there, nothing moves, is heard or
+    Of an arena that has left the world nothing counts any more: nobody is alive there, nothing moves, is received or
     happens, and its rows stay as they were.
     """
 

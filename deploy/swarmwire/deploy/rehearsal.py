@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static
@@ -35,14 +35,14 @@ class _Extras:
     def __init__(self, static: Static, *, sends: bool) -> None:
         rows = np.arange(static.arenas * static.robots)
         still = np.zeros(len(rows))
-        packets = Sent(rows, np.full(len(rows), BROADCAST), Payloads.of([PACKET] * len(rows)))
-        sent = packets if sends else Sent.none()
+        packets = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.of([PACKET] * len(rows)))
+        sent = packets if sends else SentPackets.none()
         self._actions = Actions(rows, np.ones(len(rows), np.bool_), still + 0.01, still, still, sent)
 
     def start(self) -> None:
         """They are ready."""
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """The same in every tick."""
         return self._actions
 

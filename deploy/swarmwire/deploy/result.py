@@ -26,7 +26,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Percentiles:
-    """Percentiles in s; None if nothing was heard."""
+    """Percentiles in s; None if nothing was received."""
 
     p50: float | None
     p90: float | None
@@ -41,7 +41,7 @@ class RadioResult:
     intended: int  # receivers that they were meant for
     in_range: int  # of these, receivers in range
     fates: dict[str, int]  # receivers; they add up to `intended`
-    pdr: float | None  # heard / in_range
+    pdr: float | None  # received / in_range
     latency_air_s: Percentiles  # from sending to hearing
     latency_agent_s: Percentiles  # from sending to the tick at which the receiver could act
 

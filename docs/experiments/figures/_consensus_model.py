@@ -54,13 +54,13 @@ class Graph:
 
     def after(self, steps: int, loss: float) -> Moments:
         """Exact moments after so many steps."""
-        n, heard = len(self.start), 1.0 - loss
-        mean_step = np.eye(n) - self.gain * heard * self.laplacian
+        n, received = len(self.start), 1.0 - loss
+        mean_step = np.eye(n) - self.gain * received * self.laplacian
         second, degree = np.outer(self.start, self.start), self.adjacency.sum(axis=1)
         for _ in range(steps):
             own = np.diag(second)
             apart = self.adjacency @ own + degree * own - 2.0 * (self.adjacency * second).sum(axis=1)
-            scatter = self.gain**2 * loss * heard * apart
+            scatter = self.gain**2 * loss * received * apart
             second = mean_step @ second @ mean_step.T + np.diag(scatter)
         square_of_mean = second.sum() / n**2
         error = np.sqrt(max(np.trace(second) / n - square_of_mean, 0.0))

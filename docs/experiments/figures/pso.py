@@ -32,7 +32,7 @@ CAMPAIGNS = (
     "pso-inertia",
 )
 COLUMNS = (HALF,)
-RING, KEEPS, INERTIA = (f"robots.particles.params.{name}" for name in ("ring_count", "keeps_heard", "inertia"))
+RING, KEEPS, INERTIA = (f"robots.particles.params.{name}" for name in ("ring_count", "keeps_received", "inertia"))
 SHOWN_M = (1.0, 2.0, 4.0)  # ranges whose distances are drawn
 REACHES = ((2.0, "--", "2 m"), (12.0, "-", "all"))  # at which loss and latency are tried
 KINDS = (Kind("", "robots", CURVE), Kind("-model", "particles", ACCENT), Kind("-places", "robots with places", SOFT))
@@ -77,7 +77,7 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
     if "pso-latency-places" in runs:
         places = {"radio.range_m": "range, m", "radio.latency_s": "latency, s"}
         parts.append(f"Robots that know their places:\n\n{variants_table(runs['pso-latency-places'], places)}")
-    ring = {RING: "on the ring (0: all)", KEEPS: "keeps what it heard", "radio.loss": "loss"}
+    ring = {RING: "on the ring (0: all)", KEEPS: "keeps what it received", "radio.loss": "loss"}
     parts.append(f"Neighbours on a ring, robots:\n\n{variants_table(runs['pso-ring'], ring)}")
     parts.append(f"Inertia, all hear all, robots:\n\n{variants_table(runs['pso-inertia'], {INERTIA: 'w, a = b = 2'})}")
     return "\n\n".join(parts)
@@ -118,7 +118,7 @@ def _by_radio(axes: Any, runs: Mapping[str, pl.DataFrame], campaign: str, column
 
 
 def _on_ring(axes: Any, runs: pl.DataFrame) -> None:
-    """How soon half of them are there; dashed: what was heard counts until the next update."""
+    """How soon half of them are there; dashed: what was received counts until the next update."""
     for count, who, color in ((0, "all", CURVE), (10, "ring", ACCENT)):
         for keeps, style, how in ((True, "-", "kept"), (False, "--", "asked anew")):
             some = runs.filter((pl.col(RING) == count) & (pl.col(KEEPS) == keeps))

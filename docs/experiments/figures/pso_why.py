@@ -18,7 +18,7 @@ CAMPAIGNS = ("pso-why", "pso-why-model", "pso-noise")
 COLUMNS = ("find_time_s",)
 PARAMS = "robots.particles.params."
 AGENT, BODY, SPEED = "robots.particles.agent", "robots.particles.body", f"{PARAMS}speed_mps"
-KEEPS, AGAIN = (f"{PARAMS}{name}" for name in ("keeps_heard", "again_m"))
+KEEPS, AGAIN = (f"{PARAMS}{name}" for name in ("keeps_received", "again_m"))
 KINDS = Kind("", "robots", CURVE), Kind("-model", "particles", ACCENT)
 ROBOTS = (  # what is said, and whether places come by camera, bodies are in the way, and obstacles
     ("e-pucks", False, True, True),
@@ -48,7 +48,7 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
     """Tables: what sets robots apart, and noise."""
     of = steps(runs)
     noisy = runs["pso-noise"].with_columns(pl.when(pl.col(BODY) == "epuck").then(0.05).otherwise(0.3).alias("noise"))
-    noise = {"noise": "noise of a photocell", KEEPS: "keeps what it heard", AGAIN: "measured again within, m"}
+    noise = {"noise": "noise of a photocell", KEEPS: "keeps what it received", AGAIN: "measured again within, m"}
     return "\n\n".join(
         (
             f"Robots and particles with a radio to 2 m:\n\n{steps_table(of, of[0][1])}",

@@ -11,7 +11,7 @@ from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Fate, Payloads, Sent
+from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.medium import Air
 from swarmwire.deploy.radio.probe import radio_of
@@ -32,7 +32,7 @@ def draw() -> None:
     aloha.plot(fine, fine * np.exp(-2.0 * fine), color=line_color(0), lw=1.4, label="G exp(-2G)")
     aloha.plot(LOADS, [throughput(load) for load in LOADS], "o", ms=3.5, color=line_color(1), label="ours")
     aloha.set_ylim(0.0, 0.24)
-    say(aloha, "ALOHA without capture", "load G: frames begun per airtime", "throughput S: frames heard per airtime")
+    say(aloha, "ALOHA without capture", "load G: frames begun per airtime", "throughput S: frames received per airtime")
     legend(aloha, "upper right", ncols=2, columnspacing=1.0)
 
     for index, method in enumerate(METHODS):
@@ -57,7 +57,7 @@ def _over_nodes(axes, title: str) -> None:
     axes.set_xticks(NODES, [str(nodes) for nodes in NODES])
     axes.minorticks_off()
     axes.set_ylim(0.0, 1.05)
-    say(axes, title, "nodes in one spot", "share heard")
+    say(axes, title, "nodes in one spot", "share received")
 
 
 def _curve(
@@ -80,7 +80,7 @@ def _points(axes, file: str, technology: str, payload_bytes: int, interval_s: fl
 
 
 def throughput(load: float) -> float:
-    """Frames heard per airtime by one listener amidst many equal senders, each of which sends one frame a tick."""
+    """Frames received per airtime by one listener amidst many equal senders, each of which sends one frame a tick."""
     bit_rate_bps = round(SENDERS * RATE_HZ * FRAME_BYTES * 8 / load)
     settings = [f"radio.bit_rate_bps={bit_rate_bps}", "radio.access.method=aloha", "radio.overhead_bytes=0"]
     settings += ["radio.reception.model=threshold", "radio.reception.least_sinr_db=3"]
@@ -88,12 +88,12 @@ def throughput(load: float) -> float:
     keys = np.array([derive_key("figure of access")], np.uint64)
     air = Air(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
     rows = np.arange(SENDERS)
-    sent = Sent(rows, np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
+    sent = SentPackets(rows, np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
     air.hold(np.zeros((SENDERS + 1, 3)), np.ones(SENDERS + 1, np.bool_))
-    heard = 0
+    received = 0
     for tick in range(TICKS + 2):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        heard += int(air.advance(at_ns).tally.fates[0, Fate.HEARD])
+        received += int(air.advance(at_ns).tally.fates[0, Fate.RECEIVED])
         if tick < TICKS:
             air.send(at_ns, tick, sent)
-    return load * heard / (SENDERS * TICKS)
+    return load * received / (SENDERS * TICKS)

@@ -1,4 +1,4 @@
-"""Capture: how often a frame is heard though another is on air, over the ratio of the two."""
+"""Capture: how often a frame is received though another is on air, over the ratio of the two."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,7 +10,7 @@ from benchmarks.ns3_reference import PRESETS, radio_far_apart
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Fate, Payloads, Sent
+from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import Air
@@ -29,21 +29,21 @@ def draw() -> None:
     for axes, technology in zip(row, PRESETS, strict=True):
         radio = replace(radio_far_apart(technology), access=Access("aloha"), send_offset="tick")
         for index, (name, place) in enumerate(CASES.items()):
-            heard = [share_heard(radio, float(sir_db), place) for sir_db in SIR_DB]
-            axes.plot(SIR_DB, heard, color=line_color(index), lw=1.4, label=name)
+            received = [share_received(radio, float(sir_db), place) for sir_db in SIR_DB]
+            axes.plot(SIR_DB, received, color=line_color(index), lw=1.4, label=name)
         axes.set_ylim(-0.03, 1.05)
         axes.set_xlim(SIR_DB[0], SIR_DB[-1])
         say(
             axes,
             technology,
             "signal over the other's, in dB",
-            "share of frames that are heard" if axes is row[0] else "",
+            "share of frames that are received" if axes is row[0] else "",
         )
     legend_below(figure, row[0], 3)
     write(figure, "capture")
 
 
-def share_heard(radio: Radio, sir_db: float, place: int) -> float:
+def share_received(radio: Radio, sir_db: float, place: int) -> float:
     """How many of the frames of robot 0 robot 2 hears, while robot 1 sends, too."""
     curve = radio.loss_model.curve(radio.frequency_hz)
     wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
@@ -51,15 +51,15 @@ def share_heard(radio: Radio, sir_db: float, place: int) -> float:
     air = Air(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
     pose = np.array([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]])
     air.hold(np.tile(pose, (ARENAS, 1)), np.ones(3 * ARENAS, np.bool_))
-    heard = 0
+    received = 0
     for frame in range(FRAMES):
         for sender, at_ns in order(place, frame * PAIR_NS):
-            heard += told(air, at_ns)
+            received += told(air, at_ns)
             rows = 3 * np.arange(ARENAS) + sender
             payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * ARENAS)
-            air.send(at_ns, frame, Sent(rows, np.full(ARENAS, 2), payloads))
-    heard += told(air, FRAMES * PAIR_NS)
-    return heard / (ARENAS * FRAMES)
+            air.send(at_ns, frame, SentPackets(rows, np.full(ARENAS, 2), payloads))
+    received += told(air, FRAMES * PAIR_NS)
+    return received / (ARENAS * FRAMES)
 
 
 def order(place: int, at_ns: int) -> list[tuple[int, int]]:
@@ -68,6 +68,6 @@ def order(place: int, at_ns: int) -> list[tuple[int, int]]:
 
 
 def told(air: Air, until_ns: int) -> int:
-    """How many frames of robot 0 were heard."""
+    """How many frames of robot 0 were received."""
     done = air.advance(until_ns).finished
-    return int(np.count_nonzero((done.sender == 0) & (done.fate == Fate.HEARD)))
+    return int(np.count_nonzero((done.sender == 0) & (done.fate == Fate.RECEIVED)))

@@ -137,7 +137,7 @@ class RunFolder:
         command_forward_mps, command_turn_radps (as applied) and, if a robot can move sideways, command_left_mps, all
         float32, alive, state ("": none named); if a robot ever told a number, value (float64; null: none told); if
         obstacles are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the
-        scenario's order; each metric (a count's total so far; null: undefined); sent, heard, in_range since the tick
+        scenario's order; each metric (a count's total so far; null: undefined); sent, received, in_range since the tick
         before (null without a radio).
         """
         return self._read("ticks", arena)
@@ -189,7 +189,7 @@ class RunFolder:
         Columns: arena, robot (name); of its own packets: packets (that left its radio, refused ones too),
         packets_on_air, airtime_s, airtime (share of the run), intended (receivers), as_sender_FATE for every fate
         (receivers, which add up to intended); of those of others: as_receiver_FATE (packets that might have reached it;
-        out of range is not counted), heard_bytes (payload with tags), throughput_bps (over the run).
+        out of range is not counted), received_bytes (payload with tags), throughput_bps (over the run).
 
         A packet that never left the sender's radio until the run ended is not counted. Of a packet sent again for want
         of an acknowledgement the airtime of one try is; that of acknowledgements is not.
@@ -200,10 +200,10 @@ class RunFolder:
         """A row per bin of the distance between sender and receiver, of one arena or of all.
 
         Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets
-        that went on air: all robots alive then, however far, or the one addressed), heard (of these), pdr (heard /
-        intended; null if nobody was meant). Of more than 70 robots one of so many packets is counted
-        as `record.radio_distances.every` says in the summary. Should packets have been on their way for more
-        than 5 s, as `unknown` beside it tells, pdr is null. BadInput without a radio, or of a killed run.
+        that went on air: all robots alive then, however far, or the one addressed), received (of these), pdr (received
+        / intended; null if nobody was meant). Of more than 70 robots one of so many packets is counted as
+        `record.radio_distances.every` says in the summary. Should packets have been on their way for more than 5 s, as
+        `unknown` beside it tells, pdr is null. BadInput without a radio, or of a killed run.
         """
         return self._read("radio_distances", arena)
 

@@ -12,7 +12,7 @@ from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import Joining, join
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import BadInput, RunnerLost
-from swarmwire.comms.packets import NO_OUTCOMES, Heard
+from swarmwire.comms.packets import NO_OUTCOMES, ReceivedPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
@@ -27,7 +27,9 @@ SHORT_S = 0.3
 
 
 def ticks_of(*numbers: int) -> list[bytes]:
-    return [encode_tick(tick, {"flock": senses(tick, [0, 1])}, Heard.none(GIVES), NO_OUTCOMES) for tick in numbers]
+    return [
+        encode_tick(tick, {"flock": senses(tick, [0, 1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES) for tick in numbers
+    ]
 
 
 def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:

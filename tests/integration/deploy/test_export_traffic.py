@@ -54,7 +54,7 @@ def test_a_capture_holds_each_packet_on_air_once_with_headers_and_payload(folder
     assert [one.data[header_bytes:] for one in found.packets] == on_air["payload"].to_list()
     assert all(one.length == len(one.data) == header_bytes + 6 for one in found.packets)
     comments = [comment for one in found.packets for comment in one.comments]
-    assert sum(comment.startswith("heard: ") for comment in comments) > 20
+    assert sum(comment.startswith("received: ") for comment in comments) > 20
     assert comments[0].endswith("to all: Heading, packet 0")
 
 

@@ -75,7 +75,7 @@ def test_without_the_standard_ones_a_run_has_those_that_are_listed(tmp_path, sce
     settings = [f"metrics={names}", "standard_metrics=false"]
     result = run(scenario, overrides=settings, out=tmp_path / "run")
     assert list(result.metrics) == names
-    assert RunFolder(tmp_path / "run").metrics().columns == ["tick", "time_s", *names, "sent", "heard", "in_range"]
+    assert RunFolder(tmp_path / "run").metrics().columns == ["tick", "time_s", *names, "sent", "received", "in_range"]
     assert result.record["ticks"]["rows"] == 10
     assert not [name for name in result.counts if name.startswith("observer_failed")]
     assert result.trajectory_sha256 == run(scenario).trajectory_sha256

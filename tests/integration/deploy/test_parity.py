@@ -135,19 +135,19 @@ def test_a_network_becomes_a_radio_that_a_scenario_takes(folders, tmp_path, monk
 
 
 def test_a_log_that_is_not_there_is_said_not_to_be(tmp_path, monkeypatch, capsys):
-    for name in ("lgos", "heard.csv"):
+    for name in ("lgos", "received.csv"):
         code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / name)
         assert (code, out) == (2, "")
         assert errors.startswith(f"error: {tmp_path / name}: expected a log")
 
 
 def test_one_robots_table_is_enough_for_a_fit(folders, monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "heard.csv")
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "received.csv")
     assert (code, errors) == (0, "")
     assert "on 5 links" in out
-    assert tomllib.loads(out[out.index("# Fitted to heard.csv") :])["radio"]["loss"] == pytest.approx(0.3, abs=0.1)
+    assert tomllib.loads(out[out.index("# Fitted to received.csv") :])["radio"]["loss"] == pytest.approx(0.3, abs=0.1)
     code, _, errors = called(
-        monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "heard.csv", "--within", "0.01"
+        monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "received.csv", "--within", "0.01"
     )
     assert (code, errors.startswith("error: --within: "), "0.01 m" in errors) == (2, True, True)
 
@@ -156,7 +156,7 @@ def test_latencies_that_are_not_uniform_are_drawn_and_become_a_table(tmp_path, m
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     late_s = np.random.default_rng(4).lognormal(-4.0, 0.8, 1000)
     rows = [f"{1000.0 + 0.1 * i:.6f},a,b,{i},{late:.6f}" for i, late in enumerate(late_s.tolist())]
-    log, picture = tmp_path / "heard.csv", tmp_path / "fit.png"
+    log, picture = tmp_path / "received.csv", tmp_path / "fit.png"
     log.write_text("\n".join(["t_s,tx,rx,seq,latency_s", *rows]) + "\n")
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", log, "--to", picture, "--size", "400")
     assert (code, errors) == (0, "")
@@ -165,7 +165,7 @@ def test_latencies_that_are_not_uniform_are_drawn_and_become_a_table(tmp_path, m
 
 
 def test_too_little_to_fit_is_refused(tmp_path, monkeypatch, capsys):
-    (tmp_path / "heard.csv").write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,2\n")
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / "heard.csv")
+    (tmp_path / "received.csv").write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,2\n")
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / "received.csv")
     assert (code, out) == (2, "")
     assert "range: needs 100 packets" in errors

@@ -108,7 +108,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
             glimpses = []
             for tick in range(100):  # a hundredth of a second each
                 kill = (Happened(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
-                now = truth(of, tick, tally=tally({Fate.HEARD: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
+                now = truth(of, tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
                 metrics.see(now)
                 clock.time_ns += NS_PER_S // 100
                 before = observer.frames
@@ -120,7 +120,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
     last = glimpses[-1].truth.tick
     assert len(glimpses) == 25  # every fourth tick is the first after a thirtieth of a second
     assert sum(glimpse.ticks for glimpse in glimpses) == last + 1
-    assert sum(glimpse.truth.tally.fates[0, Fate.HEARD] for glimpse in glimpses) == 2 * (last + 1)
+    assert sum(glimpse.truth.tally.fates[0, Fate.RECEIVED] for glimpse in glimpses) == 2 * (last + 1)
     assert sum(glimpse.truth.contact_onsets[0, 0] for glimpse in glimpses) == last + 1
     assert [event.serial for glimpse in glimpses for event in glimpse.truth.events] == [50]
 
@@ -133,17 +133,17 @@ def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monk
         with following(read_live(tmp_path)) as seen:
             until(observer._is_watched)
             for tick in range(20):
-                metrics.see(now := truth(of, tick, tally=tally({Fate.HEARD: 1})))
+                metrics.see(now := truth(of, tick, tally=tally({Fate.RECEIVED: 1})))
                 observer.see(now)
             go.set()
             assert observer.frames + observer.left_out == 20
             assert 1 <= observer.frames <= 2
             got = [next_of(seen) for _ in range(observer.frames)]
             until(observer._frames.empty)
-            metrics.see(now := truth(of, 20, tally=tally({Fate.HEARD: 1})))
+            metrics.see(now := truth(of, 20, tally=tally({Fate.RECEIVED: 1})))
             observer.see(now)
             got.append(next_of(seen))
-            assert sum(glimpse.truth.tally.fates[0, Fate.HEARD] for glimpse in got if glimpse.truth.tally) == 21
+            assert sum(glimpse.truth.tally.fates[0, Fate.RECEIVED] for glimpse in got if glimpse.truth.tally) == 21
     finally:
         go.set()
         observer.end(None)
@@ -203,7 +203,7 @@ def test_a_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
 
 def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
     metrics = Metrics()
-    shown, heard = Published(tmp_path, "r", metrics, WallClock()), {}
+    shown, received = Published(tmp_path, "r", metrics, WallClock()), {}
     socket = tmp_path / "s"
     with ExitStack() as held:
 
@@ -214,7 +214,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
             }
             for side, session in sides.items():
                 held.enter_context(session)
-                heard[side] = session.declare_subscriber("swarmwire/**", zenoh.handlers.RingChannel(500))
+                received[side] = session.declare_subscriber("swarmwire/**", zenoh.handlers.RingChannel(500))
 
         # A subscriber to everything is one to the truth, so the run is published.
         result = run(
@@ -222,7 +222,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
         )
         keys = {
             side: {str(sample.key_expr).split("/")[2] for sample in of if sample}
-            for side, of in {side: [found.try_recv() for _ in range(500)] for side, found in heard.items()}.items()
+            for side, of in {side: [found.try_recv() for _ in range(500)] for side, found in received.items()}.items()
         }
     assert result.ticks == 40
     assert keys == {"runners": {"frame", "answer"}, "observers": {"truth"}}

@@ -36,7 +36,7 @@ class Relay(Agent):
             robot.radio.send(News(number=self.steps))
 
     def hear(self, robot: Robot) -> None:
-        for packet in robot.radio.heard(News):
+        for packet in robot.radio.received(News):
             self.passed += 1
             robot.radio.send(Passed(number=packet.message.number))
 """
@@ -75,7 +75,7 @@ def test_a_run_in_real_time_ends_and_its_fates_add_up():
     assert result.wall_time_s >= 4 / 20
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended
-    assert result.radio.fates["heard"] > 0
+    assert result.radio.fates["received"] > 0
     assert result.realtime is not None
     assert (result.realtime.factor, result.realtime.quantum_s) == (20, None)
     summary = result.summary()["realtime"]
@@ -89,13 +89,13 @@ def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(
     assert (result.mode, result.runners, result.ended, result.ticks) == ("realtime", runners or 0, "duration", 10)
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended
-    assert result.radio.fates["heard"] > 0
+    assert result.radio.fates["received"] > 0
     told = result.realtime
     assert told is not None
     assert told.delivery is not None
     assert told.tick_jitter is not None
     assert (told.quantum_s, told.tick_jitter.count) == (QUANTUM_S, 9)
-    assert told.delivery.count >= result.radio.fates["heard"]
+    assert told.delivery.count >= result.radio.fates["received"]
     assert result.inputs is not None
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, 10)
     assert any(WITHIN in frame["arrays"] for frame in frames_of(folder))

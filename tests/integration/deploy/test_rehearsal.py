@@ -17,7 +17,7 @@ from swarmwire.world.world import World
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "robots" / "flocking-epuck2.toml"
 
 
-def test_in_a_rehearsal_robots_move_packets_are_heard_and_metrics_are_measured(monkeypatch) -> None:
+def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measured(monkeypatch) -> None:
     scenario = load_scenario(FLOCKING)
     world = World(scenario, [1], {"flock": ("radio.range",)})
     fates, see = np.zeros(len(Fate), np.int64), Metrics.see
@@ -30,7 +30,7 @@ def test_in_a_rehearsal_robots_move_packets_are_heard_and_metrics_are_measured(m
     before = world.pose.copy()
     rehearse(world, new_air(scenario, world, None), [Speed()])
     assert np.hypot(*(world.pose - before)[:, :2].T).min() > 0.0
-    assert fates[Fate.HEARD] > 0
+    assert fates[Fate.RECEIVED] > 0
 
 
 def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:

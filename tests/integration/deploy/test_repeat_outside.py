@@ -28,7 +28,7 @@ class Talker(Agent):
     needs = ("compass",)
 
     def step(self, robot: Robot) -> None:
-        words = robot.radio.heard(Word)
+        words = robot.radio.received(Word)
         robot.note(state="turning" if words else "waiting")
         robot.radio.send(Word(heading_rad=robot.compass.heading_rad))
         robot.drive(0.03, 0.1 * len(words) - 0.2)

@@ -28,10 +28,10 @@ class Agreeing(Agent):
     value = None
 
     def step(self, robot):
-        heard = robot.radio.heard(Estimate)
+        received = robot.radio.received(Estimate)
         if self.value is None:
             self.value = robot.compass.heading_rad
-        self.value += 0.05 * sum(packet.message.value - self.value for packet in heard)
+        self.value += 0.05 * sum(packet.message.value - self.value for packet in received)
         robot.note(state="agreeing", value=self.value)
         robot.radio.send(Estimate(value=self.value))
         robot.drive(0.0, 0.0)

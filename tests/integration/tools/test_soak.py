@@ -61,9 +61,9 @@ def test_a_robot_of_two_runners_or_of_none_is_found():
 
 
 def test_fates_that_do_not_add_up_and_crashes_are_found():
-    assert invariants.fates_add_up({"radio": {"intended": 3, "fates": {"heard": 2, "lost": 1}}})
+    assert invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2, "lost": 1}}})
     with pytest.raises(Broken):
-        invariants.fates_add_up({"radio": {"intended": 3, "fates": {"heard": 2}}})
+        invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2}}})
     assert invariants.nobody_crashed({"r0": {"0": 3, "-9": 1}})
     with pytest.raises(Broken):
         invariants.nobody_crashed({"r0": {"0": 3, "-6": 1}})

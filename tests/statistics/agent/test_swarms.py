@@ -70,9 +70,9 @@ def test_who_tumbles_all_the_time_covers_less():
 
 def test_crossing_traffic_meets_without_the_radio_and_not_with_it() -> None:
     seeds, short = [1, 2, 3, 4], ["duration_s=30"]
-    heard = run(SHOWN / "beacon_avoidance.toml", seeds=seeds, overrides=short)
+    received = run(SHOWN / "beacon_avoidance.toml", seeds=seeds, overrides=short)
     unheard = run(SHOWN / "beacon_avoidance.toml", seeds=seeds, overrides=[*short, "radio.loss=1.0"])
-    assert [arena.metrics["collisions"].final for arena in heard.arenas] == [0.0] * 4
+    assert [arena.metrics["collisions"].final for arena in received.arenas] == [0.0] * 4
     assert 0.0 not in [arena.metrics["collisions"].final for arena in unheard.arenas]
 
 

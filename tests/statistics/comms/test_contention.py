@@ -78,9 +78,9 @@ def test_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stated: 
     sent = packets(np.repeat(np.arange(nodes), PER_TICK[radio.frame]), size=100)
     told = run(make_air(radio, nodes), pose, lambda _: sent, TICKS[radio.frame])
     fate = told.on_air("fate")
-    heard, collided = (int(np.count_nonzero(fate == kind)) for kind in (Fate.HEARD, Fate.COLLIDED))
-    frames = (heard + collided) / (nodes - 1)
+    received, collided = (int(np.count_nonzero(fate == kind)) for kind in (Fate.RECEIVED, Fate.COLLIDED))
+    frames = (received + collided) / (nodes - 1)
     window = {"802.11a": 16, "802.11b": 32}[radio.frame]
     assert 1.0 - (1.0 - 2.0 / (window + 1)) ** (nodes - 1) == pytest.approx(stated, abs=5e-5)
     assert frames > 12_000
-    assert collided / (heard + collided) == pytest.approx(stated, abs=0.02)
+    assert collided / (received + collided) == pytest.approx(stated, abs=0.02)

@@ -58,8 +58,8 @@ def test_a_few_swarms_find_the_light_with_the_radio_alone(overrides: list[str], 
 )
 def test_each_kind_of_particle_swarm_finds_the_light_by_what_is_told(name: str):
     scenario = ROOT / "scenarios" / "behaviours" / f"{name}.toml"
-    heard, deaf = (successes(range(1, 4), *loss, scenario=scenario) for loss in ([], [DEAF]))
-    assert heard >= 2
+    received, deaf = (successes(range(1, 4), *loss, scenario=scenario) for loss in ([], [DEAF]))
+    assert received >= 2
     assert deaf == 0
 
 
@@ -68,9 +68,9 @@ def test_each_kind_of_particle_swarm_finds_the_light_by_what_is_told(name: str):
 def test_nine_of_ten_swarms_find_the_light_and_fewer_with_the_radio_cut():
     """Fisher's exact test on 50 seeds each: the shares differ at p < 0.01."""
     seeds = range(1, 51)
-    heard, deaf = successes(seeds), successes(seeds, DEAF)
-    assert heard >= 0.9 * len(seeds)
-    table = [[heard, len(seeds) - heard], [deaf, len(seeds) - deaf]]
+    received, deaf = successes(seeds), successes(seeds, DEAF)
+    assert received >= 0.9 * len(seeds)
+    table = [[received, len(seeds) - received], [deaf, len(seeds) - deaf]]
     p = float(cast(Any, stats.fisher_exact)(table, alternative="greater").pvalue)
     print(f"p = {p:.1e}")
     assert p < 0.01

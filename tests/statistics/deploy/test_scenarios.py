@@ -89,7 +89,7 @@ def test_partition_falls_apart_twice_and_joins_again_each_time():
     result = shipped("partition")
     assert result.radio is not None
     fates = result.radio.fates
-    assert all(fates[name] > 0 for name in ("heard", "partitioned", "blackout", "queue_full", "lost"))
+    assert all(fates[name] > 0 for name in ("received", "partitioned", "blackout", "queue_full", "lost"))
     assert sum(fates.values()) == result.radio.intended
     assert final(result, "fragmentations") == 2
     assert final(result, "rejoin_worst") == pytest.approx(10.0)
@@ -102,8 +102,8 @@ def test_flocking_disrupted_shows_every_disruption_and_its_end():
     result = shipped("flocking-disrupted")
     assert result.radio is not None
     fates = result.radio.fates
-    assert all(fates[name] > 0 for name in ("heard", "lost", "receiver_dead", "blackout", "partitioned"))
-    assert fates["heard"] > sum(fates[name] for name in ("receiver_dead", "blackout", "partitioned"))
+    assert all(fates[name] > 0 for name in ("received", "lost", "receiver_dead", "blackout", "partitioned"))
+    assert fates["received"] > sum(fates[name] for name in ("receiver_dead", "blackout", "partitioned"))
     assert [(event.do, event.ended) for event in result.events] == [
         ("blackout", False),
         ("kill", False),
@@ -166,8 +166,8 @@ def test_infrared_is_blocked_by_obstacles_and_by_robots_and_loses_nothing_else()
     assert whole.radio is not None
     assert no_bodies.radio is not None
     fates = whole.radio.fates
-    assert {name for name, count in fates.items() if count} == {"heard", "out_of_range", "blocked", "in_flight"}
-    assert fates["blocked"] > fates["heard"]
+    assert {name for name, count in fates.items() if count} == {"received", "out_of_range", "blocked", "in_flight"}
+    assert fates["blocked"] > fates["received"]
     assert 0 < no_bodies.radio.fates["blocked"] < 0.1 * fates["blocked"]
     assert final(whole, "largest_component") == 1.0
 

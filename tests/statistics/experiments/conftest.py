@@ -15,7 +15,7 @@ series = false
 [vary]
 "radio.loss" = [0.0, 0.9]
 """
-FIGURE = '''"""How many packets of two robots are heard.
+FIGURE = '''"""How many packets of two robots are received.
 
 More of it.
 """
@@ -29,27 +29,28 @@ COLUMNS = ("radio.pdr",)
 def draw(runs):
     from swarmwire.metrics.report.figures.column_axes import column_axes
 
-    figure, axes = column_axes("heard", "loss")
+    figure, axes = column_axes("received", "loss")
     axes.plot(runs["two-losses"]["radio.loss"], runs["two-losses"]["radio.pdr"], ".")
     return figure
 
 
 def told(runs):
-    heard = runs["two-losses"].group_by("radio.loss", maintain_order=True).agg(pl.col("radio.pdr").mean())
-    rows = "".join(f"| {loss:g} | {pdr:.2f} |\\n" for loss, pdr in heard.select("radio.loss", "radio.pdr").iter_rows())
-    return f"| loss | heard |\\n| --- | --- |\\n{rows}"
+    received = runs["two-losses"].group_by("radio.loss", maintain_order=True).agg(pl.col("radio.pdr").mean())
+    table = received.select("radio.loss", "radio.pdr")
+    rows = "".join(f"| {loss:g} | {pdr:.2f} |\\n" for loss, pdr in table.iter_rows())
+    return f"| loss | received |\\n| --- | --- |\\n{rows}"
 '''
 
 
 @pytest.fixture
 def places(tmp_path: Path) -> Places:
-    """Those of one experiment, `two-heard`, with a page."""
+    """Those of one experiment, `two-received`, with a page."""
     found = Places(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
     for folder in (found.figures, found.campaigns, found.pages):
         folder.mkdir()
     (found.figures / "__init__.py").write_text("")
-    (found.figures / "two_heard.py").write_text(FIGURE)
+    (found.figures / "two_received.py").write_text(FIGURE)
     scenario_in(found.campaigns)
     (found.campaigns / "two-losses.toml").write_text(CAMPAIGN)
-    (found.pages / "two-heard.md").write_text("# Two\n\n<!-- numbers -->\nold\n<!-- /numbers -->\n\nThe end.\n")
+    (found.pages / "two-received.md").write_text("# Two\n\n<!-- numbers -->\nold\n<!-- /numbers -->\n\nThe end.\n")
     return found

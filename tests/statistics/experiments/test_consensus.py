@@ -42,8 +42,8 @@ def drawn(graph, loss: float, steps: int, seed: int) -> FloatArray:
     """Values after so many steps with losses drawn here, (n,)."""
     draws, x = np.random.default_rng(seed), graph.start.copy()
     for _ in range(steps):
-        heard = graph.adjacency * (draws.random(graph.adjacency.shape) >= loss)
-        x = x + graph.gain * (heard @ x - heard.sum(axis=1) * x)
+        received = graph.adjacency * (draws.random(graph.adjacency.shape) >= loss)
+        x = x + graph.gain * (received @ x - received.sum(axis=1) * x)
     return x
 
 

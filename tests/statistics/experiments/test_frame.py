@@ -22,7 +22,7 @@ from tests.support.deploy.campaign.small import InThisProcess
 def ran(places, seeds=None) -> tuple[str, str]:
     """The numbers, and what was said meanwhile."""
     said = io.StringIO()
-    experiment = find_experiment("two-heard", places)
+    experiment = find_experiment("two-received", places)
     return run(experiment, places, seeds, Means(executor=InThisProcess()), Console(file=said)), said.getvalue()
 
 
@@ -30,8 +30,8 @@ def test_a_run_sweeps_digests_draws_and_tells(places):
     told, said = ran(places)
     assert "2 points x 3 seeds = 6 runs" in said
     assert told.splitlines()[2] == "| 0 | 1.00 |"
-    assert (places.pages / "two-heard.svg").read_text().count("<svg") == 1
-    page = (places.pages / "two-heard.md").read_text()
+    assert (places.pages / "two-received.svg").read_text().count("<svg") == 1
+    page = (places.pages / "two-received.md").read_text()
     assert page == f"# Two\n\n<!-- numbers -->\n{told}\n<!-- /numbers -->\n\nThe end.\n"
     kept = pl.read_parquet(places.data / "two-losses.parquet")
     assert kept.columns == ["run", "point", "seed", "radio.loss", "ended", "sim_time_s", "radio.pdr", "timing_wall_s"]
@@ -44,7 +44,7 @@ def test_what_is_finished_is_not_run_again_and_what_is_missing_is(places):
     whole = places.swept / "two-losses" / "summary.parquet"
     pl.read_parquet(whole).head(4).write_parquet(whole)
     with pytest.raises(BadInput, match="2 of 6 runs are missing"):
-        digest(find_experiment("two-heard", places), places)
+        digest(find_experiment("two-received", places), places)
     again, said = ran(places)
     assert again == told
     assert "4 of them are there" in said
@@ -59,29 +59,29 @@ def test_a_finished_campaign_of_another_design_is_not_taken_for_this_one(places)
 
 
 def test_a_trial_with_other_seeds_leaves_what_is_published(places):
-    before = (places.pages / "two-heard.md").read_text()
+    before = (places.pages / "two-received.md").read_text()
     told, said = ran(places, "7,8")
     assert "2 points x 2 seeds" in said
     assert "| 0 | 1.00 |" in told
-    assert (places.pages / "two-heard.md").read_text() == before
+    assert (places.pages / "two-received.md").read_text() == before
     assert not places.data.exists()
-    assert (places.swept / "seeds-7-8" / "two-heard.svg").exists()
+    assert (places.swept / "seeds-7-8" / "two-received.svg").exists()
 
 
 def test_digests_are_made_of_any_folder_and_drawn_without_one(places, tmp_path):
     ran(places)
-    experiment = find_experiment("two-heard", places)
+    experiment = find_experiment("two-received", places)
     elsewhere = (places.swept / "two-losses").rename(tmp_path / "elsewhere")
     (places.data / "two-losses.parquet").unlink()
-    with pytest.raises(BadInput, match="run or digest two-heard first"):
+    with pytest.raises(BadInput, match="run or digest two-received first"):
         draw(experiment, places)
     digest(experiment, places, [elsewhere])
-    assert draw(experiment, places).startswith("| loss | heard |")
+    assert draw(experiment, places).startswith("| loss | received |")
     assert len(digests(experiment, places)["two-losses"]) == 6
 
 
 def test_an_experiment_may_digest_by_itself(places):
-    file = places.figures / "two_heard.py"
+    file = places.figures / "two_received.py"
     own = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.pdr")'
     file.write_text(f"{file.read_text()}\n\n{own}\n")
     told, _ = ran(places)
@@ -97,24 +97,24 @@ def test_an_experiment_may_digest_by_itself(places):
     ],
 )
 def test_what_the_experiments_file_lacks_is_named(places, old, new, said):
-    file = places.figures / "two_heard.py"
+    file = places.figures / "two_received.py"
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(BadInput, match=said):
         ran(places)
 
 
 def test_a_page_needs_one_place_for_the_numbers(places):
-    (places.pages / "two-heard.md").write_text("# Two\n")
+    (places.pages / "two-received.md").write_text("# Two\n")
     with pytest.raises(BadInput, match="expected one line <!-- numbers -->"):
         ran(places)
 
 
 def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
-    assert names(places) == ("two-heard",)
-    with pytest.raises(BadInput, match="did you mean two-heard"):
+    assert names(places) == ("two-received",)
+    with pytest.raises(BadInput, match="did you mean two-received"):
         find_experiment("two-hear", places)
     with pytest.raises(BadInput, match="expected a campaign's folder"):
-        digest(find_experiment("two_heard", places), places, [tmp_path / "two-losses"])
+        digest(find_experiment("two_received", places), places, [tmp_path / "two-losses"])
 
 
 def test_errors_are_one_line(monkeypatch, capsys):

@@ -31,10 +31,10 @@ def test_all_campaigns_come_to_a_figure_and_numbers(tmp_path, name, panels, tabl
 @pytest.mark.parametrize("campaign", ["pso-range", "pso-range-model"])
 def test_those_who_hear_one_another_find_the_light_and_come_nearer(tmp_path, campaign):
     of = miniature("pso", tmp_path, seeds=4, vary={"radio.range_m": [0.1, 12.0]}, overrides=SMALL, campaigns=[campaign])
-    deaf, heard = (of.runs[campaign].filter(pl.col("radio.range_m") == range_m) for range_m in (0.1, 12.0))
+    deaf, received = (of.runs[campaign].filter(pl.col("radio.range_m") == range_m) for range_m in (0.1, 12.0))
     assert deaf["find_time_s"].is_null().sum() >= 3
-    assert heard["find_time_s"].is_null().sum() <= 1
-    first, half = heard.filter(pl.col("find_time_s").is_not_null()).select("first_time_s", "find_time_s")
+    assert received["find_time_s"].is_null().sum() <= 1
+    first, half = received.filter(pl.col("find_time_s").is_not_null()).select("first_time_s", "find_time_s")
     assert (first < half).all()
-    last_m = [mean_distances(runs)[-1] for runs in (deaf, heard)]
+    last_m = [mean_distances(runs)[-1] for runs in (deaf, received)]
     assert last_m[0] > 2.0 * last_m[1]

@@ -1,4 +1,4 @@
-"""What hosts, backends and lockstep are fed with in tests: assignments, senses and heard packets, all made up."""
+"""What hosts, backends and lockstep are fed with in tests: assignments, senses and received packets, all made up."""
 
 from pathlib import Path
 from typing import Any
@@ -10,14 +10,14 @@ from swarmwire.agent.host import Hosted, hosted
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")
 GIVES = ("range_m", "bearing_rad")
 PERIOD_NS = 100_000_000
-SILENCE = Heard.none(GIVES)
+SILENCE = ReceivedPackets.none(GIVES)
 
 
 def spec(name: str) -> str:
@@ -49,19 +49,19 @@ def senses(tick: int, rows: list[int], rays: int = 8) -> GroupSenses:
     return GroupSenses(row, fields)
 
 
-def heard_from(sent: Sent, receivers: list[int]) -> Heard:
-    """What was sent, heard by all of these robots but its sender, in the order that the air keeps."""
+def received_from(sent: SentPackets, receivers: list[int]) -> ReceivedPackets:
+    """What was sent, received by all of these robots but its sender, in the order that the air keeps."""
     sent = by_sender(sent)
     pairs = [(to, p) for to in receivers for p in range(len(sent)) if sent.sender[p] != to]
     receiver, payload = (np.array([pair[i] for pair in pairs], np.int64) for i in (0, 1))
     sender = sent.sender[payload]
     given = {"range_m": 0.1 + 0.3 * np.abs(receiver - sender), "bearing_rad": np.sin(1.0 * receiver - sender)}
-    return Heard(receiver, sender, payload, 10 + payload, given, payload, sent.payloads)
+    return ReceivedPackets(receiver, sender, payload, 10 + payload, given, payload, sent.payloads)
 
 
-def by_sender(sent: Sent) -> Sent:
+def by_sender(sent: SentPackets) -> SentPackets:
     order = np.argsort(sent.sender, kind="stable")
-    return Sent(sent.sender[order], sent.to[order], sent.payloads.rows(order))
+    return SentPackets(sent.sender[order], sent.to[order], sent.payloads.rows(order))
 
 
 def plain(actions: Actions) -> list[Any]:
@@ -84,12 +84,14 @@ def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
     return hosted(group("", rows), kind)
 
 
-def step(host: Hosted, tick: int, rows: list[int], heard: Heard = SILENCE, told: Outcomes = NO_OUTCOMES) -> Actions:
+def step(
+    host: Hosted, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: Outcomes = NO_OUTCOMES
+) -> Actions:
     """One step of the robots in these rows."""
-    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), heard, told)
+    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), received, told)
 
 
-def words(*senders: int) -> Sent:
+def words(*senders: int) -> SentPackets:
     """A broadcast from each of these, which says who sent it."""
     payloads = [Word(number=float(sender)).encode() for sender in senders]
-    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))
+    return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))

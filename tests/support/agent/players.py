@@ -26,9 +26,9 @@ class Chatter(Agent):
         self.total = 0.0
 
     def step(self, robot: Robot) -> None:
-        for packet in robot.radio.heard(Word):
+        for packet in robot.radio.received(Word):
             self.total += packet.message.number * packet.range_m + packet.bearing_rad + packet.sender
-        for packet in robot.radio.heard(dict):
+        for packet in robot.radio.received(dict):
             self.total += float(packet.message["x"])
         if robot.draw.uniform("whether") < 0.7:
             robot.drive(self.gain * self.total, robot.compass.heading_rad + robot.proximity.value.sum())
@@ -45,11 +45,11 @@ class Echo(Agent):
         self.known = 0
 
     def step(self, robot: Robot) -> None:
-        self.known += 100 * len(robot.radio.heard(Word))
+        self.known += 100 * len(robot.radio.received(Word))
         robot.radio.send(Word(number=float(self.known)))
 
-    def hear(self, robot: Robot) -> None:
-        for _ in robot.radio.heard(Word):
+    def on_receive(self, robot: Robot) -> None:
+        for _ in robot.radio.received(Word):
             self.known += 1
             robot.radio.send(Word(number=float(self.known)))
 
@@ -59,16 +59,16 @@ class Known(State):
 
 
 class VectorEcho(VectorAgent[Known]):
-    """The same for n robots, one word for all that are heard at a time."""
+    """The same for n robots, one word for all that are received at a time."""
 
     def step(self, robots: Robots, state: Known) -> None:
-        state.known += 100 * robots.radio.heard(Word).count()
+        state.known += 100 * robots.radio.received(Word).count()
         robots.radio.send(Word, number=state.known)
 
-    def hear(self, robots: Robots, state: Known) -> None:
-        heard = robots.radio.heard(Word).count()
-        state.known += heard
-        robots.radio.send(Word, rows=heard > 0, number=state.known)
+    def on_receive(self, robots: Robots, state: Known) -> None:
+        received = robots.radio.received(Word).count()
+        state.known += received
+        robots.radio.send(Word, rows=received > 0, number=state.known)
 
 
 class Insisting(Agent):
@@ -239,11 +239,11 @@ class Ageing(VectorAgent):
 
 
 class Reply(VectorAgent):
-    """Cheats: sends what its neighbours' rows heard."""
+    """Cheats: sends what its neighbours' rows received."""
 
     def step(self, robots: Robots, state: State) -> None:
-        heard = robots.radio.heard(Word)
-        robots.radio.send(Word, number=float(len(heard)))
+        received = robots.radio.received(Word)
+        robots.radio.send(Word, number=float(len(received)))
 
 
 class Table(State):

@@ -17,7 +17,7 @@ from tests.support.metrics.truths import static, tally, truth
 Array = np.ndarray[Any, Any]
 TICKS, TICK_NS, RANGE_M = 10, 100_000_000, 1.6
 ROWS = "alive", "pose", "velocity", "command", "value"  # columns with a row for each robot
-FATES = Fate.HEARD, Fate.HEARD, Fate.HEARD, Fate.LOST, Fate.COLLIDED
+FATES = Fate.RECEIVED, Fate.RECEIVED, Fate.RECEIVED, Fate.LOST, Fate.COLLIDED
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _packets(rng: Any, alive: Array, tick: int) -> Departed:
     arena, sender = (column.copy() for column in np.argwhere(alive & (rng.random(alive.shape) < 0.4)).T)
     one, on_ns = np.ones_like(arena), tick * TICK_NS - rng.integers(0, TICK_NS, len(arena))
     off_ns = on_ns + rng.integers(1, 2 * TICK_NS, len(arena))
-    return Departed(arena, sender, BROADCAST * one, tick * one, one, 0 * one, Fate.HEARD + 0 * one, on_ns, off_ns)
+    return Departed(arena, sender, BROADCAST * one, tick * one, one, 0 * one, Fate.RECEIVED + 0 * one, on_ns, off_ns)
 
 
 def _edges(of: Static, place_m: Array, alive: Array) -> Array:
@@ -271,7 +271,7 @@ def and_then_nothing(history: History) -> History:
 
 
 def arena_left(history: History, arena: int, tick: int) -> History:
-    """The same, but that this arena has left from a tick on: nobody lives there, and nothing is heard or touched."""
+    """The same, but that this arena has left from a tick on: nobody lives there, and nothing is received or touched."""
     there = np.arange(history.static.arenas) == arena
     rows = np.repeat(there, history.static.robots)
 

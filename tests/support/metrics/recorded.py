@@ -43,7 +43,7 @@ def wandering(of, ticks, **fields):
 
 
 def links(
-    sender, receiver, sequence, on_air_at_ns, fate=Fate.HEARD, arena=0, tag=0x1A2B, receivers=1, rssi_dbm=None, to=-1
+    sender, receiver, sequence, on_air_at_ns, fate=Fate.RECEIVED, arena=0, tag=0x1A2B, receivers=1, rssi_dbm=None, to=-1
 ):
     """Rows of `Finished`: lists or a number for all."""
     columns = np.broadcast_arrays(arena, sender, receiver, receivers, to, sequence, on_air_at_ns, fate, tag)

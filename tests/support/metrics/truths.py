@@ -77,7 +77,7 @@ def tally(*fates: Mapping[Fate, int], sent: int = 1) -> Tally:
 
 
 def finished(
-    sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.HEARD, arena: int = 0
+    sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.RECEIVED, arena: int = 0
 ) -> Finished:
     sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
     zero = np.zeros(len(sent), np.int64)
@@ -112,7 +112,7 @@ def departed(
     sender: Sequence[int],
     intended: int = 3,
     out_of_range: int = 0,
-    fate: Fate = Fate.HEARD,
+    fate: Fate = Fate.RECEIVED,
     on_air_at_ns: int = 0,
     off_air_at_ns: int = 0,
     to: int = BROADCAST,

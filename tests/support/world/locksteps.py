@@ -6,7 +6,7 @@ import msgpack
 import numpy as np
 
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
@@ -68,7 +68,7 @@ def all_senses(tick: int = 0) -> Senses:
 def actions(rows: list[int]) -> Actions:
     row = np.array(rows, np.int64)
     payloads = Payloads.of([bytes([r, r, r]) for r in rows])
-    sent = Sent(row, np.full(len(rows), BROADCAST), payloads)
+    sent = SentPackets(row, np.full(len(rows), BROADCAST), payloads)
     return Actions(row, row % 2 == 0, row * 0.1, row * -0.1, row * 0.2, sent)
 
 

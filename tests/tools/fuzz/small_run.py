@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, Actuations, Notes, Senses, Values
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
@@ -67,7 +67,7 @@ class SmallRun:
     Attributes:
         parts: the robots of each runner.
         layouts: of the memory of each group's robots.
-        senses: of the last tick; `heard` and `outcomes` likewise.
+        senses: of the last tick; `received` and `outcomes` likewise.
         frames: to each runner, tick by tick; `answers`: from it.
         truths: what observers see.
     """
@@ -82,7 +82,7 @@ class SmallRun:
         self.parts: Sequence[Assignment] = split(self.whole, len(RUNNERS))
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}
         self.senses: Senses = {}
-        self.heard = Heard.none()
+        self.received = ReceivedPackets.none()
         self.outcomes: Outcomes = NO_OUTCOMES
         self.frames: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
@@ -96,11 +96,11 @@ class SmallRun:
         self.given = actions
         return self.loop.step()
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         if self.given is not None:
             return self.given
-        self.senses, self.heard, self.outcomes = senses, heard, outcomes
-        for runner, data in self._roster.open_tick(tick, senses, heard, outcomes):
+        self.senses, self.received, self.outcomes = senses, received, outcomes
+        for runner, data in self._roster.open_tick(tick, senses, received, outcomes):
             self.frames[runner].append(data)
             answer = self._answer(runner, data)
             self.answers[runner].append(answer)
@@ -113,8 +113,8 @@ class SmallRun:
 
     def _answer(self, runner: str, data: bytes) -> bytes:
         host, frame = self._hosts[runner], frame_codec.decode(data)
-        senses, heard, outcomes = decode_tick(frame, self.whole.gives or (), senses_of(self.parts, runner))
-        actions = host.act(frame.tick, senses, heard, outcomes)
+        senses, received, outcomes = decode_tick(frame, self.whole.gives or (), senses_of(self.parts, runner))
+        actions = host.act(frame.tick, senses, received, outcomes)
         return encode_actions(frame.tick, with_all(actions), memory=host.memory(senses))
 
 

@@ -13,17 +13,17 @@ class Memory(State):
     """All that the next runner of a robot needs."""
 
     steps: IntColumn = column(0)
-    heard: FloatColumn = column(0.0)
+    received: FloatColumn = column(0.0)
 
 
 class Wanderer(VectorAgent[Memory]):
-    """Drives on a way that follows from every step made, every word heard and every draw."""
+    """Drives on a way that follows from every step made, every word received and every draw."""
 
     def step(self, robots: Robots, state: Memory) -> None:
         """Count, listen, tell, drive."""
         state.steps += 1
-        words = robots.radio.heard(Word)
-        state.heard += words.sum(words.message.number)
+        words = robots.radio.received(Word)
+        state.received += words.sum(words.message.number)
         robots.radio.send(Word, number=state.steps)
         turn = robots.draw.uniform("turn") - 0.5
-        robots.drive(0.02 + 0.0001 * (state.steps % 50), turn + 0.001 * (state.heard % 100))
+        robots.drive(0.02 + 0.0001 * (state.steps % 50), turn + 0.001 * (state.received % 100))

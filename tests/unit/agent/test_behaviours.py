@@ -12,7 +12,7 @@ from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from tests.support.agent.hosts import group
 
@@ -43,10 +43,10 @@ def command(
     payloads = Payloads.of([Heading(heading_rad=float(h)).encode() for h in table[:, 2]])
     zeros = np.zeros(k, np.int64)
     given_columns = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
-    heard = Heard(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
+    received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
     fields = {"proximity.value": value[None, :], "compass.heading_rad": np.array([heading])}
     host = hosted(group("", [0], body="footbot", params=dict(params)), kind)
-    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), fields), heard)
+    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received)
     assert actions.drive.all()
     return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

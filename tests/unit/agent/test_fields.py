@@ -15,7 +15,7 @@ from swarmwire.agent.fields import (
     attraction,
     hysteresis,
     low_pass,
-    mean_heard,
+    mean_received,
     repulsion,
     repulsion_of_ranges,
     repulsion_of_rays,
@@ -25,7 +25,7 @@ from swarmwire.agent.fields import (
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import ProximityReading
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 
 angles = st.floats(-np.pi, np.pi)
 
@@ -58,9 +58,9 @@ def test_alignment_points_where_the_other_heads_seen_from_the_robot(theirs: floa
 
 def test_the_mean_is_over_the_packets_of_each_robot_and_nothing_without_any() -> None:
     zeros = np.zeros(3, np.int64)
-    table = Heard(np.array([0, 0, 2]), np.arange(3), zeros, zeros, {}, np.arange(3), Payloads.of([b""] * 3))
-    heard = Packets[Any](3, table, {}, ())
-    mean = mean_heard(heard, Vectors(np.array([1.0, 2.0, 5.0]), np.array([0.0, 4.0, 6.0])))
+    table = ReceivedPackets(np.array([0, 0, 2]), np.arange(3), zeros, zeros, {}, np.arange(3), Payloads.of([b""] * 3))
+    received = Packets[Any](3, table, {}, ())
+    mean = mean_received(received, Vectors(np.array([1.0, 2.0, 5.0]), np.array([0.0, 4.0, 6.0])))
     assert parts(mean) == [(1.5, 2.0), (0.0, 0.0), (5.0, 6.0)]
 
 

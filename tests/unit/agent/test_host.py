@@ -13,16 +13,16 @@ from swarmwire.agent.host import Host
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
-from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Heard, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import (
     SILENCE,
     assignment,
     group,
-    heard_from,
     host_of,
     one_group,
     plain,
+    received_from,
     senses,
     spec,
     step,
@@ -31,13 +31,13 @@ from tests.support.agent.hosts import (
 from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
 
 
-def once(kind: AgentClass, rows: list[int], heard: Heard = SILENCE, tick: int = 0) -> Actions:
-    return step(host_of(kind, rows), tick, rows, heard)
+def once(kind: AgentClass, rows: list[int], received: ReceivedPackets = SILENCE, tick: int = 0) -> Actions:
+    return step(host_of(kind, rows), tick, rows, received)
 
 
-def failure(kind: AgentClass, heard: Heard = SILENCE) -> AgentFailed:
+def failure(kind: AgentClass, received: ReceivedPackets = SILENCE) -> AgentFailed:
     with pytest.raises(AgentFailed) as caught:
-        once(kind, [2, 5], heard)
+        once(kind, [2, 5], received)
     return caught.value
 
 
@@ -94,41 +94,43 @@ def test_what_the_radio_tells_of_a_packet_must_be_declared(name: str, need: str)
         needs = tuple({"radio.range", "radio.bearing", "radio.rssi"} - {f"radio.{need}"})
 
         def step(self, robot: Robot) -> None:
-            for packet in robot.radio.heard(Word):
+            for packet in robot.radio.received(Word):
                 getattr(packet, name)
 
     class Rows(VectorAgent):
         needs = Reads.needs
 
         def step(self, robots: Robots, state: State) -> None:
-            getattr(robots.radio.heard(Word), name)
+            getattr(robots.radio.received(Word), name)
 
     for kind in (Reads, Rows):
-        assert f"NotDeclared: reads 'radio.{need}' of a packet" in failure(kind, heard_from(words(0), [2, 5])).traceback
+        assert (
+            f"NotDeclared: reads 'radio.{need}' of a packet" in failure(kind, received_from(words(0), [2, 5])).traceback
+        )
 
 
-def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_heard_them() -> None:
+def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_received_them() -> None:
     seen: list[list[tuple[float, ...]]] = []
 
     class Reads(Agent):
         needs = ("radio.range", "radio.bearing")
 
         def step(self, robot: Robot) -> None:
-            packets = robot.radio.heard(Word)
-            seen.append([(p.message.number, p.sender, p.sequence, p.heard_at_ns, p.range_m) for p in packets])
+            packets = robot.radio.received(Word)
+            seen.append([(p.message.number, p.sender, p.sequence, p.received_at_ns, p.range_m) for p in packets])
             assert all(-1.0 <= p.bearing_rad <= 1.0 for p in packets)
 
-    heard = heard_from(words(0, 2, 7), [2, 3, 5])  # robot 3 belongs to another group
-    once(Reads, [2, 5], heard)
-    mine = [np.flatnonzero(heard.receiver == row) for row in (2, 5)]
+    received = received_from(words(0, 2, 7), [2, 3, 5])  # robot 3 belongs to another group
+    once(Reads, [2, 5], received)
+    mine = [np.flatnonzero(received.receiver == row) for row in (2, 5)]
     expected = [
         [
             (
-                float(heard.sender[i]),
-                heard.sender[i],
-                heard.sequence[i],
-                heard.heard_at_ns[i],
-                heard.given["range_m"][i],
+                float(received.sender[i]),
+                received.sender[i],
+                received.sequence[i],
+                received.received_at_ns[i],
+                received.given["range_m"][i],
             )
             for i in at
         ]
@@ -138,17 +140,17 @@ def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_h
     assert [len(packets) for packets in seen] == [2, 3]
 
 
-def test_a_message_of_another_class_or_length_or_none_is_not_heard() -> None:
+def test_a_message_of_another_class_or_length_or_none_is_not_received() -> None:
     found: list[tuple[int, int]] = []
 
     class Listens(Agent):
         def step(self, robot: Robot) -> None:
-            found.append((len(robot.radio.heard(Word)), len(robot.radio.heard(Other))))
+            found.append((len(robot.radio.received(Word)), len(robot.radio.received(Other))))
 
     word = Word(number=1.0).encode()
     payloads = [Other(number=3).encode(), word, word + b"\0", word[:-1], word[:2], b"", b"\x01"]
-    sent = Sent(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.of(payloads))
-    once(Listens, [2], heard_from(sent, [2]))
+    sent = SentPackets(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.of(payloads))
+    once(Listens, [2], received_from(sent, [2]))
     assert found == [(1, 1)]
 
 
@@ -157,26 +159,26 @@ def test_a_dict_is_a_message_too() -> None:
 
     class Prototype(Agent):
         def step(self, robot: Robot) -> None:
-            found.extend(packet.message for packet in robot.radio.heard(dict))
+            found.extend(packet.message for packet in robot.radio.received(dict))
             robot.radio.send({"state": "search", "at": [1, 2.5]})
 
     host = host_of(Prototype, [2, 5])
     sent = step(host, 0, [2, 5]).sent
-    step(host, 1, [2, 5], heard_from(sent, [2, 5]))
+    step(host, 1, [2, 5], received_from(sent, [2, 5]))
     assert found == [{"state": "search", "at": [1, 2.5]}] * 2
 
 
 @pytest.mark.parametrize("junk", [b"", b"\x05", b"\x81", b"\x81\x80\x01", b"\xc1", b"\x91" * 2000])
-def test_bytes_that_hold_no_dict_are_not_heard_as_one(junk: bytes) -> None:
+def test_bytes_that_hold_no_dict_are_not_received_as_one(junk: bytes) -> None:
     found: list[object] = []
 
     class Prototype(Agent):
         def step(self, robot: Robot) -> None:
-            found.extend(packet.message for packet in robot.radio.heard(dict))
+            found.extend(packet.message for packet in robot.radio.received(dict))
 
     dict_tag = bytes(TAG_BYTES)
     payloads = Payloads.of([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
-    once(Prototype, [2], heard_from(Sent(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
+    once(Prototype, [2], received_from(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
     assert found == [{"x": 1}]
 
 
@@ -339,13 +341,13 @@ def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int)
 
 def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
     whole, first, second = (host_of(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
-    sent = Sent.none()
+    sent = SentPackets.none()
     for tick in range(5):
-        heard = heard_from(sent, [0, 1, 2, 3])
-        expected = step(whole, tick, [0, 1, 2, 3], heard)
-        assert plain(Actions.joined([step(second, tick, [1, 2], heard), step(first, tick, [0, 3], heard)])) == plain(
-            expected
-        )
+        received = received_from(sent, [0, 1, 2, 3])
+        expected = step(whole, tick, [0, 1, 2, 3], received)
+        assert plain(
+            Actions.joined([step(second, tick, [1, 2], received), step(first, tick, [0, 3], received)])
+        ) == plain(expected)
         sent = expected.sent
 
 

@@ -10,12 +10,12 @@ from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import hosted
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import Heard, Sent
-from tests.support.agent.hosts import group, heard_from, senses
+from swarmwire.comms.packets import ReceivedPackets, SentPackets
+from tests.support.agent.hosts import group, received_from, senses
 from tests.support.agent.players import Word
 
 TIME = (3, 300_000_000, 100_000_000)
-NOTHING: Heard = heard_from(Sent.none(), [])
+NOTHING: ReceivedPackets = received_from(SentPackets.none(), [])
 
 
 def failure(kind: AgentClass, steps: int = 1) -> str:
@@ -57,8 +57,8 @@ def test_a_failure_is_told_from_the_agents_first_line_on_and_when_it_was() -> No
         (lambda robot: robot.radio.send("hello"), "expected a message or a dict, got 'hello'"),
         (lambda robot: robot.radio.send(Word), "expected a message or a dict, got <class"),
         (lambda robot: robot.radio.send(Word(number=1.0), to=1.5), "expected the index of a robot in the arena"),
-        (lambda robot: robot.radio.heard("Word"), "expected a class of messages, got 'Word'"),
-        (lambda robot: robot.radio.heard(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
+        (lambda robot: robot.radio.received("Word"), "expected a class of messages, got 'Word'"),
+        (lambda robot: robot.radio.received(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
         (lambda robot: robot.note(), "expected a state, a value, or both"),
         (lambda robot: robot.note(value=float("nan")), "note(value=…): expected finite numbers, got nan"),
         (lambda robot: robot.note(value="up"), "could not convert string to float: 'up'"),
@@ -74,7 +74,7 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
     [
         (lambda robots: robots.radio.send(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
         (lambda robots: robots.radio.send({"a": 1}), "expected a class of messages, got {'a': 1}"),
-        (lambda robots: robots.radio.heard(dict), "expected a class of messages, got <class 'dict'>"),
+        (lambda robots: robots.radio.received(dict), "expected a class of messages, got <class 'dict'>"),
         (
             lambda robots: robots.drive(0.1, 0.0, rows=np.array([0, 1])),
             "rows: expected a mask, bool (3,), got int64 (2,)",
@@ -94,7 +94,10 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
             lambda robots: robots.radio.send(Word, np.array([True, False, True]), number=np.zeros(2)),
             "expected one number or an array (3,), also with rows=, got (2,)",
         ),
-        (lambda robots: robots.radio.heard(Word).message.numbers, "the message has no field 'numbers'; it has number"),
+        (
+            lambda robots: robots.radio.received(Word).message.numbers,
+            "the message has no field 'numbers'; it has number",
+        ),
         (lambda robots: robots.radio.send(Word, number=1.0, to=-2), "expected the index of a robot in the arena"),
         (lambda robots: setattr(robots, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],

@@ -10,8 +10,8 @@ from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import DICT_TAG, encode_dict
-from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, Sent
-from tests.support.agent.hosts import heard_from, host_of, step, words
+from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, SentPackets
+from tests.support.agent.hosts import host_of, received_from, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
 said = {}
@@ -22,7 +22,7 @@ class Alone(Agent):
     needs = ("radio.range", "radio.bearing")
 
     def step(self, robot):
-        packets: list[Packet[Word]] = robot.radio.heard(Word)
+        packets: list[Packet[Word]] = robot.radio.received(Word)
         assert all(isinstance(packet, Packet) for packet in packets)
         said["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
 
@@ -31,7 +31,7 @@ class Rows(VectorAgent):
     needs = ("radio.range", "radio.bearing")
 
     def step(self, robots, state):
-        packets: Packets[Word] = robots.radio.heard(Word)
+        packets: Packets[Word] = robots.radio.received(Word)
         assert isinstance(packets.message, Columns)
         columns = (packets.sender, packets.range_m, packets.message.number)
         said["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
@@ -39,22 +39,22 @@ class Rows(VectorAgent):
 
 def test_one_robot_hears_in_packets_what_n_robots_hear_in_columns():
     for kind in (Alone, Rows):
-        step(host_of(kind, [5]), 0, [5], heard_from(words(0, 2), [5]))
+        step(host_of(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
     assert said["alone"] == said["rows"]
     assert [sender for sender, _, _ in said["alone"]] == [0, 2]
 
 
-def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_heard():
+def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_received():
     """A runner of others may send any bytes: they must not end the run in whoever hears them."""
 
     class Hears(Agent):
         def step(self, robot):
-            said["dicts"] = [packet.message for packet in robot.radio.heard(dict)]
+            said["dicts"] = [packet.message for packet in robot.radio.received(dict)]
 
     tag = DICT_TAG.to_bytes(2, "little")
     payloads = Payloads.of([*(tag + data for data in DICTS), encode_dict({"x": 1})])
     sender = np.zeros(len(payloads), np.int64)
-    step(host_of(Hears, [5]), 0, [5], heard_from(Sent(sender, sender + BROADCAST, payloads), [5]))
+    step(host_of(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
     assert said["dicts"] == [{"x": 1}]
 
 

@@ -11,11 +11,11 @@ import zenoh
 from swarmwire.agent import runner
 from swarmwire.agent.runner import PLAIN, Inbox, given_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import GIVES, assignment, group, heard_from, senses
+from tests.support.agent.hosts import GIVES, assignment, group, received_from, senses
 
 
 @dataclass
@@ -39,7 +39,7 @@ def inbox_of(*arrived: Any) -> Inbox:
 
 
 def tick(number: int) -> bytes:
-    return encode_tick(number, {"flock": senses(number, [0])}, Heard.none(GIVES), NO_OUTCOMES)
+    return encode_tick(number, {"flock": senses(number, [0])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
 
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
@@ -51,8 +51,8 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
     ticks = inbox.ticks(ASSIGNMENT)
     assert next(ticks)[0] == 2
     assert inbox.dropped == 2
-    strange = encode_tick(9, {"others": senses(9, [1])}, Heard.none(GIVES), NO_OUTCOMES)
-    of_others = encode_tick(9, {"flock": senses(9, [1])}, Heard.none(GIVES), NO_OUTCOMES)
+    strange = encode_tick(9, {"others": senses(9, [1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
+    of_others = encode_tick(9, {"flock": senses(9, [1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
     for data in (tick(2), tick(1), b"\xc1", strange, of_others, tick(3), tick(5), tick(4)):
         inbox.put_frame(Sample(Bytes(data)))
     assert next(ticks)[0] == 5
@@ -68,15 +68,15 @@ def test_nothing_is_acted_on_once_the_run_is_over() -> None:
 
 
 def packets(number: int, tick_number: int = 0) -> bytes:
-    sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
-    return encode_packets(tick_number, 1_000 * number, number, heard_from(sent, [0]), NO_OUTCOMES)
+    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
+    return encode_packets(tick_number, 1_000 * number, number, received_from(sent, [0]), NO_OUTCOMES)
 
 
 def test_packets_between_ticks_are_kept_at_once_and_told_of_when_nothing_newer_waits() -> None:
     inbox, kept = inbox_of(True, tick(0)), list[int]()
 
-    def receive(heard: Heard, _: Outcomes) -> None:
-        kept.append(heard.payloads.row(0)[2])
+    def receive(received: ReceivedPackets, _: Outcomes) -> None:
+        kept.append(received.payloads.row(0)[2])
 
     told = inbox.ticks(ASSIGNMENT, receive)
     assert next(told)[0] == 0
@@ -152,10 +152,10 @@ def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> N
 
 
 class Deaf:
-    """A session of which all but the `heard`-th subscriber are told nothing of the world's token."""
+    """A session of which all but the `received`-th subscriber are told nothing of the world's token."""
 
-    def __init__(self, heard: int) -> None:
-        self.heard, self.declared, self.undeclared = heard, 0, 0
+    def __init__(self, received: int) -> None:
+        self.received, self.declared, self.undeclared = received, 0, 0
 
     def liveliness(self) -> "Deaf":
         return self
@@ -163,7 +163,7 @@ class Deaf:
     def declare_subscriber(self, _key: str, callback: Any, *, history: bool) -> "Deaf":
         assert history
         self.declared += 1
-        if self.declared == self.heard:
+        if self.declared == self.received:
             callback(Token())
         return self
 
@@ -175,15 +175,15 @@ class Token:
     kind = zenoh.SampleKind.PUT
 
 
-@pytest.mark.parametrize(("heard", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
+@pytest.mark.parametrize(("received", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
 def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
-    heard: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
+    received: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "JOIN_S", 0.04)
     monkeypatch.setattr(runner, "POLL_S", 0.01)
-    session = Deaf(heard)
+    session = Deaf(received)
     watched = runner._watched_world(session, Keys("run1"), Inbox())  # pyright: ignore[reportArgumentType]
-    assert (watched is None) == (heard > 4)
+    assert (watched is None) == (received > 4)
     assert (session.declared, session.undeclared) == (declared, undeclared)
 
 

@@ -18,13 +18,13 @@ from swarmwire.agent import (
     State,
     VectorAgent,
     column,
-    vector_agent,
+    per_robot,
 )
 from swarmwire.agent.host import hosted
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from tests.support.agent.hosts import group, senses
 from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
 
@@ -139,7 +139,7 @@ def test_an_agents_state_is_the_one_that_its_class_names() -> None:
 class Lanes(VectorAgent):
     needs: ClassVar[tuple[str, ...]] = ()
     lane: PerRobot[int]
-    speed_mps: PerRobot[float] = vector_agent(0.02)
+    speed_mps: PerRobot[float] = per_robot(0.02)
     gain: float = 2.0
 
     def step(self, robots: Robots, state: State) -> None:
@@ -149,7 +149,7 @@ class Lanes(VectorAgent):
 
 def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
     host = hosted(group("", rows, params=params), Lanes)
-    actions = host.act((0, 0, 10**8), senses(0, acting), Heard.none(("range_m", "bearing_rad")))
+    actions = host.act((0, 0, 10**8), senses(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
     assert len(actions.linear_mps) == len(acting)
     return actions.angular_radps.tolist()
 

@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.packets import BROADCAST, FATE_NAMES, NO_OUTCOMES, TAG_BYTES, Fate, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import (
+    BROADCAST,
+    FATE_NAMES,
+    NO_OUTCOMES,
+    TAG_BYTES,
+    Fate,
+    Outcomes,
+    Payloads,
+    ReceivedPackets,
+    SentPackets,
+)
 from swarmwire.comms.tick_io import Actions, checked_state
 
 ragged = st.lists(st.binary(max_size=5), max_size=6)
@@ -47,24 +57,24 @@ def test_offsets_are_int64_whatever_the_table() -> None:
 
 
 def test_sent_packets_keep_their_order_when_joined() -> None:
-    first = Sent(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
-    second = Sent(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]))
-    joined = Sent.joined([first, Sent.none(), second])
+    first = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
+    second = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]))
+    joined = SentPackets.joined([first, SentPackets.none(), second])
     assert joined.sender.tolist() == [3, 1, 1]
     assert joined.to.tolist() == [BROADCAST, 0, 2]
     assert listed(joined.payloads) == [b"aa", b"b", b"ccc"]
-    assert len(Sent.joined([])) == 0
+    assert len(SentPackets.joined([])) == 0
 
 
 def test_outcome_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
-    silent = Sent(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
-    asking = Sent(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]), np.array([4, 5]))
-    joined = Sent.joined([silent, Sent.none(), asking])
+    silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
+    asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]), np.array([4, 5]))
+    joined = SentPackets.joined([silent, SentPackets.none(), asking])
     assert joined.outcome_ids.tolist() == [-1, 4, 5]
     picked = joined.select(np.array([2, 0]))
     assert (picked.sender.tolist(), picked.to.tolist(), picked.outcome_ids.tolist()) == ([1, 3], [2, -1], [5, -1])
     assert listed(picked.payloads) == [b"ccc", b"aa"]
-    assert Sent.joined([silent, silent]).outcome_id is None
+    assert SentPackets.joined([silent, silent]).outcome_id is None
 
 
 def test_outcomes_joined_are_sorted_by_robot_and_id() -> None:
@@ -85,7 +95,10 @@ def test_outcomes_joined_are_sorted_by_robot_and_id() -> None:
 def test_actions_joined_carry_the_packets_of_all() -> None:
     parts = [
         Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), np.array([0.3]), sent)
-        for row, sent in ((2, Sent.none()), (0, Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"xy"]))))
+        for row, sent in (
+            (2, SentPackets.none()),
+            (0, SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"xy"]))),
+        )
     ]
     joined = Actions.joined(parts)
     assert joined.rows.tolist() == [2, 0]
@@ -94,26 +107,26 @@ def test_actions_joined_carry_the_packets_of_all() -> None:
     assert (len(none.rows), none.drive.dtype, none.linear_mps.dtype) == (0, np.bool_, np.float64)
 
 
-def test_heard_packets_selected_keep_their_columns_together() -> None:
-    heard = Heard(
+def test_received_packets_selected_keep_their_columns_together() -> None:
+    received = ReceivedPackets(
         receiver=np.array([0, 1, 1]),
         sender=np.array([5, 6, 7]),
         sequence=np.array([0, 1, 2]),
-        heard_at_ns=np.array([10, 20, 30]),
+        received_at_ns=np.array([10, 20, 30]),
         given={"range_m": np.array([0.1, 0.2, 0.3])},
         payload=np.array([1, 0, 1]),
         payloads=Payloads.of([b"aa", b"bb"]),
     )
-    chosen = heard.select(np.array([2, 0]))
+    chosen = received.select(np.array([2, 0]))
     assert len(chosen) == 2
     assert chosen.sender.tolist() == [7, 5]
     assert chosen.given["range_m"].tolist() == [0.3, 0.1]
     assert [chosen.payloads.row(int(i)) for i in chosen.payload] == [b"bb", b"bb"]
 
 
-def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_heard() -> None:
-    assert set(Heard.none(("range_m",)).given) == {"range_m"}
-    assert len(Heard.none()) == 0
+def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_received() -> None:
+    assert set(ReceivedPackets.none(("range_m",)).given) == {"range_m"}
+    assert len(ReceivedPackets.none()) == 0
 
 
 def test_rows_without_bytes_can_be_taken_too():
@@ -123,7 +136,7 @@ def test_rows_without_bytes_can_be_taken_too():
 
 def test_each_fate_has_its_number() -> None:
     assert FATE_NAMES == (
-        "heard",
+        "received",
         "out_of_range",
         "blocked",
         "lost",

@@ -26,7 +26,7 @@ class Writes(VectorAgent):
 
 class Rewrites(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
-        robots.radio.heard(Hello).heard_at_ns[...] = 0
+        robots.radio.received(Hello).received_at_ns[...] = 0
         robots.radio.send(Hello)
 
 class Leaves(VectorAgent):

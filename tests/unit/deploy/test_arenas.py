@@ -80,7 +80,7 @@ def test_the_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
     assert static.floor is not None
 
 
-def test_robots_go_round_a_torus_and_are_heard_across_its_seam(tmp_path: Path, around: Path):
+def test_robots_go_round_a_torus_and_are_received_across_its_seam(tmp_path: Path, around: Path):
     result = run(around, out=tmp_path / "run")
     assert result.radio is not None
     assert (result.radio.pdr or 0.0) > 0.99

@@ -63,7 +63,7 @@ def test_the_summary_tells_what_happened_when_and_to_whom(local, tmp_path):
 def test_fates_add_up_and_each_disruption_has_its_own(local):
     fates = local.radio.fates
     assert sum(fates.values()) == local.radio.intended
-    assert all(fates[name] > 0 for name in ("heard", "receiver_dead", "blackout", "partitioned"))
+    assert all(fates[name] > 0 for name in ("received", "receiver_dead", "blackout", "partitioned"))
 
 
 def test_an_event_after_the_end_changes_nothing():

@@ -46,7 +46,7 @@ class Counting(Agent):
 
     def step(self, robot):
         assert round(robot.time_s / robot.period_s, 6) == self.steps
-        times = [packet.heard_at_ns for packet in robot.radio.heard(Word)]
+        times = [packet.received_at_ns for packet in robot.radio.received(Word)]
         assert times == sorted(times)
         assert all(robot.time_s - robot.period_s - 1e-9 < at / 1e9 <= robot.time_s for at in times)
         self.steps += 1

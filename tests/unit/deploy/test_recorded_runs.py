@@ -86,10 +86,10 @@ def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp
         assert radio is not None
         without_rows = (FATE_NAMES[Fate.OUT_OF_RANGE], FATE_NAMES[Fate.IN_FLIGHT])
         assert dict(counted) == {f: n for f, n in radio.fates.items() if n and f not in without_rows}
-        assert {"heard", "lost", "blackout"} <= dict(counted).keys()
+        assert {"received", "lost", "blackout"} <= dict(counted).keys()
         distance_m = recorded.packets(arena)["distance_m"].drop_nulls().to_numpy()
         assert 0.0 < distance_m.min() < distance_m.max() <= 2.0  # of this scenario's radio
-        assert ticks["heard"].sum() == radio.fates["heard"]
+        assert ticks["received"].sum() == radio.fates["received"]
     happened = [(event.tick, event.do, event.ended, event.robots[0]) for event in result.events]
     assert recorded.events(0).select("tick", "do", "ended", "robots").rows() == happened
     assert len(happened) == 4

@@ -35,10 +35,10 @@ def test_fates_add_up_and_the_loss_is_the_scenarios(tmp_path):
     assert radio is not None
     assert isinstance(radio.latency_air_s, Percentiles)
     assert sum(radio.fates.values()) == radio.intended
-    heard, in_range = radio.fates["heard"], radio.in_range
+    received, in_range = radio.fates["received"], radio.in_range
     # False alarm once in 10,000 seeds; the seed is fixed.
-    assert binomtest(heard, in_range, 0.7).proportion_ci(0.9999).low < 0.7
-    assert binomtest(heard, in_range, 0.7).pvalue > 1e-4
+    assert binomtest(received, in_range, 0.7).proportion_ci(0.9999).low < 0.7
+    assert binomtest(received, in_range, 0.7).pvalue > 1e-4
 
 
 def test_several_arenas_have_lists(tmp_path):
@@ -64,7 +64,7 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
 def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path, monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
     assert code == 0
-    for text in ("tick 20/20", "of these heard it", "order", "swarmwire view", "--gif"):
+    for text in ("tick 20/20", "of these received it", "order", "swarmwire view", "--gif"):
         assert text in out
 
 

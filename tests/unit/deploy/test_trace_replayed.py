@@ -29,10 +29,10 @@ def test_the_shipped_links_are_cut_between_the_halves_for_as_long_as_the_file_sa
             assert finished is not None
             is_across = (finished.sender < 3) != (finished.receiver < 3)
             during = (finished.on_air_at_ns >= 20 * NS_PER_S) & (finished.on_air_at_ns < 40 * NS_PER_S)
-            is_heard = finished.fate == Fate.HEARD
+            is_received = finished.fate == Fate.RECEIVED
             for cut in (False, True):
-                across[cut] += is_heard[is_across & (during == cut)].tolist()
-            beside += is_heard[~is_across].tolist()
+                across[cut] += is_received[is_across & (during == cut)].tolist()
+            beside += is_received[~is_across].tolist()
     assert not any(across[True])
     assert len(across[True]) == 200 * 18
     assert sum(across[False]) / len(across[False]) > 0.6

@@ -106,7 +106,7 @@ def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
     folder, _, _ = recorded
     table = folder.metrics(1)
-    assert table.columns == ["tick", "time_s", *standard(), "sent", "heard", "in_range"]
+    assert table.columns == ["tick", "time_s", *standard(), "sent", "received", "in_range"]
     assert table["order"].to_list() == folder.ticks(1)["order"].to_list()
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.packets import Heard, Outcomes, Payloads
+from swarmwire.comms.packets import Outcomes, Payloads, ReceivedPackets
 from swarmwire.world.loop import Mailbox
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
@@ -17,18 +17,18 @@ def world(flock: int, big: int) -> World:
     return World(scenario_from(mapping, "sample"), [1], {"flock": ("odometry",), "big": ("compass",)})
 
 
-def heard(*packets: tuple[int, int, int, int]) -> Heard:
-    """Receiver, sender, sequence and heard_at_ns of each packet, sorted; its payload says them all."""
+def received(*packets: tuple[int, int, int, int]) -> ReceivedPackets:
+    """Receiver, sender, sequence and received_at_ns of each packet, sorted; its payload says them all."""
     table = np.array(sorted((p[0], p[3], p[1], p[2]) for p in packets), np.int64).reshape(-1, 4)
-    receiver, heard_at_ns, sender, sequence = (np.ascontiguousarray(column) for column in table.T)
+    receiver, received_at_ns, sender, sequence = (np.ascontiguousarray(column) for column in table.T)
     payloads = Payloads.of([bytes([r, s, q, t]) for r, t, s, q in table.tolist()])
     given = {"range_m": sender * 0.5}
-    return Heard(receiver, sender, sequence, heard_at_ns, given, np.arange(len(table)), payloads)
+    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, np.arange(len(table)), payloads)
 
 
-def read(of: Heard) -> list[tuple[int, ...]]:
-    """What `heard` was made from, as the payloads and the columns say it."""
-    columns = list(zip(*(c.tolist() for c in (of.receiver, of.sender, of.sequence, of.heard_at_ns)), strict=True))
+def read(of: ReceivedPackets) -> list[tuple[int, ...]]:
+    """What `received` was made from, as the payloads and the columns say it."""
+    columns = list(zip(*(c.tolist() for c in (of.receiver, of.sender, of.sequence, of.received_at_ns)), strict=True))
     assert [tuple(of.payloads.row(p)) for p in of.payload.tolist()] == columns
     assert of.given["range_m"].tolist() == [0.5 * sender for _, sender, _, _ in columns]
     return columns
@@ -36,22 +36,22 @@ def read(of: Heard) -> list[tuple[int, ...]]:
 
 def test_all_that_waited_comes_at_once_and_in_order():
     box = Mailbox(world(1, 3).static)
-    first = box.hand_over(1, heard((0, 1, 0, 5), (12, 3, 0, 7), (12, 2, 0, 9)), ALIVE)
+    first = box.hand_over(1, received((0, 1, 0, 5), (12, 3, 0, 7), (12, 2, 0, 9)), ALIVE)
     assert read(first) == [(0, 1, 0, 5)]
-    assert read(box.hand_over(2, heard((12, 1, 4, 9), (13, 1, 4, 11)), ALIVE)) == []
-    third = box.hand_over(3, heard((0, 2, 1, 21), (12, 2, 1, 20)), ALIVE)
+    assert read(box.hand_over(2, received((12, 1, 4, 9), (13, 1, 4, 11)), ALIVE)) == []
+    third = box.hand_over(3, received((0, 2, 1, 21), (12, 2, 1, 20)), ALIVE)
     by_time = [(12, 3, 0, 7), (12, 1, 4, 9), (12, 2, 0, 9), (12, 2, 1, 20)]
     assert read(third) == [(0, 2, 1, 21), *by_time, (13, 1, 4, 11)]
-    assert read(box.hand_over(6, heard(), ALIVE)) == []
+    assert read(box.hand_over(6, received(), ALIVE)) == []
 
 
-def test_a_payload_that_several_heard_is_kept_once():
+def test_a_payload_that_several_received_is_kept_once():
     box = Mailbox(world(1, 2).static)
-    shared = heard((12, 1, 0, 5), (13, 1, 0, 5), (14, 1, 0, 5))
+    shared = received((12, 1, 0, 5), (13, 1, 0, 5), (14, 1, 0, 5))
     box.hand_over(1, shared.select(np.array([0, 1, 2])), ALIVE)
     assert len(box._waiting.payloads) == 3
-    one = Heard(
-        *(getattr(shared, n) for n in ("receiver", "sender", "sequence", "heard_at_ns", "given")),
+    one = ReceivedPackets(
+        *(getattr(shared, n) for n in ("receiver", "sender", "sequence", "received_at_ns", "given")),
         np.zeros(3, np.int64),
         shared.payloads,
     )
@@ -62,9 +62,9 @@ def test_a_payload_that_several_heard_is_kept_once():
 
 def test_what_waits_for_a_robot_that_dies_is_lost():
     box = Mailbox(world(1, 3).static)
-    box.hand_over(1, heard((12, 3, 0, 7), (13, 3, 0, 7)), ALIVE)
-    box.hand_over(2, heard(), np.arange(15) != 12)
-    assert read(box.hand_over(3, heard(), ALIVE)) == [(13, 3, 0, 7)]
+    box.hand_over(1, received((12, 3, 0, 7), (13, 3, 0, 7)), ALIVE)
+    box.hand_over(2, received(), np.arange(15) != 12)
+    assert read(box.hand_over(3, received(), ALIVE)) == [(13, 3, 0, 7)]
 
 
 def outcomes(*rows: tuple[int, int, int]) -> Outcomes:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -26,8 +26,8 @@ MS = 1_000_000
 AIRTIME_NS = 96_000  # of a packet's three bytes
 
 
-def packet(sender: int, byte: int = 0) -> Sent:
-    return Sent(np.array([sender]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, byte])]))
+def packet(sender: int, byte: int = 0) -> SentPackets:
+    return SentPackets(np.array([sender]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, byte])]))
 
 
 def static(robots: int, arenas: int = 1) -> Static:
@@ -41,21 +41,24 @@ def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> AirInTime:
     return AirInTime(air, static(robots, arenas), lambda sent: sent)
 
 
-def heard_at(heard: Heard, receiver: int = 1) -> list[tuple[int, int]]:
-    """Sender and time, but for the airtime, of what one robot heard."""
-    mine = heard.receiver == receiver
-    return list(zip(heard.sender[mine].tolist(), (heard.heard_at_ns[mine] - AIRTIME_NS).tolist(), strict=True))
+def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
+    """Sender and time, but for the airtime, of what one robot received."""
+    mine = received.receiver == receiver
+    return list(zip(received.sender[mine].tolist(), (received.received_at_ns[mine] - AIRTIME_NS).tolist(), strict=True))
 
 
-def test_a_packet_put_on_the_air_within_a_tick_is_heard_within_it_once():
+def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
     air = in_time(Radio(99.0, latency_s=0.002))
     air.begin(0)
     air.send(Put(10 * MS, None, packet(0)))
-    assert heard_at(air.advance(12 * MS)[0]) == []
-    assert heard_at(air.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
-    assert heard_at(air.advance(13 * MS)[0]) == []
+    assert received_at(air.advance(12 * MS)[0]) == []
+    assert received_at(air.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
+    assert received_at(air.advance(13 * MS)[0]) == []
     told, rest, _ = air.begin(TICK_NS)
-    assert (heard_at(told.heard), heard_at(rest)) == ([(0, 12 * MS)], [])  # observers learn of it, agents have it
+    assert (received_at(told.received), received_at(rest)) == (
+        [(0, 12 * MS)],
+        [],
+    )  # observers learn of it, agents have it
 
 
 def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
@@ -64,7 +67,7 @@ def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is
     air.send(Put(1 * MS, 0, packet(0)))
     air.send(Put(2 * MS, None, packet(0)))
     air.send(Put(60 * MS, 0, packet(2)))  # too late for its turn: at once
-    assert heard_at(air.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
+    assert received_at(air.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
 
 
 def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
@@ -73,8 +76,8 @@ def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_fligh
     air.send(Put(1 * MS, 0, packet(0)))
     air.send(Put(2 * MS, 0, packet(1)))
     for tick in (1, 2):
-        assert not len(air.begin(tick * TICK_NS)[0].heard)
-    assert heard_at(air.begin(3 * TICK_NS)[0].heard) == [(0, 250 * MS)]
+        assert not len(air.begin(tick * TICK_NS)[0].received)
+    assert received_at(air.begin(3 * TICK_NS)[0].received) == [(0, 250 * MS)]
     air.send(Put(301 * MS, 3, packet(3)))
     air.end()
     assert air._air.end().intended.sum() == 3
@@ -92,11 +95,11 @@ def test_fates_add_up_and_quanta_change_nothing(radio: Radio, seed: int, quanta_
 def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
     rng = np.random.default_rng(seed)
     air, robots = in_time(radio, 5, 2), 5
-    heard, tallies = list[Any](), list[Tally]()
+    received, tallies = list[Any](), list[Tally]()
 
-    def keep(told: Heard) -> None:
-        columns = told.receiver, told.sender, told.sequence, told.heard_at_ns
-        heard.extend(zip(*(column.tolist() for column in columns), strict=True))
+    def keep(told: ReceivedPackets) -> None:
+        columns = told.receiver, told.sender, told.sequence, told.received_at_ns
+        received.extend(zip(*(column.tolist() for column in columns), strict=True))
 
     for tick in range(5):
         start_ns = tick_start_ns(tick, RATE_HZ)
@@ -121,7 +124,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
     air.end()
     tallies.append(air._air.end())
     total = sum(tallies[1:], tallies[0])
-    return (sorted(heard), total.fates.tolist(), total.in_range.tolist()), total.fates.sum(), total.intended.sum()
+    return (sorted(received), total.fates.tolist(), total.in_range.tolist()), total.fates.sum(), total.intended.sum()
 
 
 @dataclass
@@ -133,16 +136,18 @@ class Sender:
     def start(self) -> None:
         """Ready."""
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         raise AssertionError("a backend that takes its time is asked in time")
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
-        self.told += heard_at(heard)
+        self.told += received_at(received)
         air.send(Put(start_ns + 5 * MS, None, packet(0)))
         wrong = packet(0)
-        air.send(Put(start_ns + 6 * MS, None, Sent(wrong.sender, np.array([99]), wrong.payloads)))
-        self.told += heard_at(air.advance(start_ns + 50 * MS)[0])
+        air.send(Put(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
+        self.told += received_at(air.advance(start_ns + 50 * MS)[0])
         return Actions.joined([])
 
     def counts(self) -> dict[str, int]:
@@ -171,7 +176,7 @@ class Tallies:
         return {}
 
 
-def test_the_loop_shows_observers_what_was_heard_within_a_tick_and_counts_what_was_sent_to_nobody():
+def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1], {}), Sender(), Tallies()
     loop = Loop(world, new_air(scenario, world, None), backend, [seen], timed=backend)
@@ -199,7 +204,9 @@ class OverAfter:
 class FromBoth(Sender):
     """Robot 0 of each arena sends late in each tick, also where the arena is over."""
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):
             air.send(Put(start_ns + 5 * MS, None, packet(sender)))
@@ -208,7 +215,7 @@ class FromBoth(Sender):
         return Actions.joined([])
 
 
-def test_of_an_arena_that_leaves_what_was_heard_within_its_last_tick_counts_and_the_rest_is_in_flight():
+def test_of_an_arena_that_leaves_what_was_received_within_its_last_tick_counts_and_the_rest_is_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
     loop = Loop(world, new_air(scenario, world, None), backend, [seen], judge=OverAfter(3), timed=backend)

@@ -1,4 +1,4 @@
-"""The trajectory hash is that of what each arena moved and heard, tick by tick, however it is gathered."""
+"""The trajectory hash is that of what each arena moved and received, tick by tick, however it is gathered."""
 
 import hashlib
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.world import trajectory_hash
 from swarmwire.world.trajectory_hash import TrajectoryHash
 
@@ -18,14 +18,19 @@ def moved(tick: int) -> list[np.ndarray]:
     return [np.arange(ROWS * 3.0).reshape(ROWS, 3) + 100.0 * tick + kind for kind in (0.1, 0.2, 0.3)]
 
 
-def heard(tick: int, open_arenas: list[int]) -> Heard:
+def received(tick: int, open_arenas: list[int]) -> ReceivedPackets:
     """In every third tick a robot of each open arena hears one packet."""
     if tick % 3:
-        return Heard.none()
+        return ReceivedPackets.none()
     receiver = np.array([arena * ROBOTS + 1 for arena in open_arenas], np.int64)
     zeros = np.zeros(len(receiver), np.int64)
     return replace(
-        Heard.none(), receiver=receiver, sender=zeros, sequence=zeros + tick, heard_at_ns=zeros + 7, payload=zeros
+        ReceivedPackets.none(),
+        receiver=receiver,
+        sender=zeros,
+        sequence=zeros + tick,
+        received_at_ns=zeros + 7,
+        payload=zeros,
     )
 
 
@@ -48,7 +53,7 @@ def test_it_does_not_depend_on_how_many_ticks_are_hashed_at_once(waiting_bytes, 
     monkeypatch.setattr(trajectory_hash, "WAITING_BYTES", waiting_bytes)
     of, running = TrajectoryHash(ARENAS, ROBOTS), list(range(ARENAS))
     for tick in range(TICKS):
-        of.add(*moved(tick), heard(tick, running))
+        of.add(*moved(tick), received(tick, running))
         over = [arena for arena in running if closed_after.get(arena, TICKS) == tick]
         if over:
             of.close(np.isin(np.arange(ARENAS), over))
@@ -60,6 +65,6 @@ def test_asking_for_it_changes_nothing():
     asked, left = TrajectoryHash(ARENAS, ROBOTS), TrajectoryHash(ARENAS, ROBOTS)
     for tick in range(TICKS):
         for of in (asked, left):
-            of.add(*moved(tick), heard(tick, list(range(ARENAS))))
+            of.add(*moved(tick), received(tick, list(range(ARENAS))))
         asked.hexdigests()
     assert asked.hexdigests() == left.hexdigests() == expected({})

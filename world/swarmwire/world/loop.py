@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
-from swarmwire.comms.packets import NO_OUTCOMES, NOWHERE, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, NOWHERE, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.tick_io import Actions, Senses
@@ -22,7 +22,7 @@ from swarmwire.world.world import World
 
 
 class Mailbox:
-    """What robots heard, and learned of their packets, since they last acted.
+    """What robots received, and learned of their packets, since they last acted.
 
     Where all act in every tick it passes everything on at no cost.
     """
@@ -30,17 +30,17 @@ class Mailbox:
     def __init__(self, static: Static) -> None:
         self._every: IntArray = np.tile(static.act_every_ticks, static.arenas)  # (rows,)
         self._always = bool((self._every == 1).all())
-        self._waiting = Heard.none()
+        self._waiting = ReceivedPackets.none()
         self._outcomes = NO_OUTCOMES
 
-    def hand_over(self, tick: int, heard: Heard, alive: BoolArray) -> Heard:
-        """All that waits for the robots that act in this tick, with what they `heard` since the last tick.
+    def hand_over(self, tick: int, received: ReceivedPackets, alive: BoolArray) -> ReceivedPackets:
+        """All that waits for the robots that act in this tick, with what they `received` since the last tick.
 
         What waits for a robot that is not `alive` (rows,) is lost with it.
         """
         if self._always:
-            return heard
-        here = heard.merged(self._waiting) if len(self._waiting) else heard
+            return received
+        here = received.merged(self._waiting) if len(self._waiting) else received
         acts = (tick % self._every == 0)[here.receiver]
         self._waiting = here.select(np.flatnonzero(~acts & alive[here.receiver])).compacted()
         return here.select(np.flatnonzero(acts))
@@ -83,8 +83,8 @@ class Loop:
     ) -> None:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
 
-        `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it is
-        to put packets on the air and hand them over while a tick goes on.
+        `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it
+        is to put packets on the air and hand them over while a tick goes on.
         """
         self.world, self.air, self.backend, self.observers = world, air, backend, observers
         self.ticks_done = 0
@@ -123,11 +123,11 @@ class Loop:
         news, packets, outcomes = self._receive(start_ns)
         senses = world.sense(tick)
         actions = self._act(start_ns, senses, packets, outcomes)
-        heard = news.heard if news else Heard.none()
+        received = news.received if news else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
         onsets = world.move(actions)
         command = world.command
-        self._hash.add(pose, velocity, command, heard)
+        self._hash.add(pose, velocity, command, received)
         edges = self.air.edges(pose, alive) if self.air else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
@@ -199,7 +199,7 @@ class Loop:
         packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
-    def _receive(self, start_ns: int) -> tuple[News | None, Heard, Outcomes]:
+    def _receive(self, start_ns: int) -> tuple[News | None, ReceivedPackets, Outcomes]:
         """What came of the radio up to a tick's start; of that, what the backend is to be told."""
         if self._in_time:
             news, packets, outcomes = self._in_time.begin(start_ns)
@@ -208,11 +208,11 @@ class Loop:
         tick, alive = self.ticks_done, self.world.alive
         news = self.air.advance(start_ns) if self.air else None
         self._open = news.tally if news else None
-        packets = self._mailbox.hand_over(tick, news.heard if news else Heard.none(), alive)
+        packets = self._mailbox.hand_over(tick, news.received if news else ReceivedPackets.none(), alive)
         outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, alive)
         return news, packets, outcomes
 
-    def _act(self, start_ns: int, senses: Senses, packets: Heard, outcomes: Outcomes) -> Actions:
+    def _act(self, start_ns: int, senses: Senses, packets: ReceivedPackets, outcomes: Outcomes) -> Actions:
         """What the robots do in a tick; what they send is the air's."""
         world, tick = self.world, self.ticks_done
         if self.air:
@@ -250,7 +250,7 @@ class Loop:
             stranded = self.air.leave(over)
             self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
-    def _addressable(self, sent: Sent) -> Sent:
+    def _addressable(self, sent: SentPackets) -> SentPackets:
         """Packets for a robot that is not there, or for the sender itself, are counted and go NOWHERE."""
         robots = self.world.static.robots
         nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)

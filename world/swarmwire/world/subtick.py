@@ -1,8 +1,8 @@
-"""The air of a loop whose backend takes its time: packets are put on it, and heard, also in the middle of a tick.
+"""The air of a loop whose backend takes its time: packets are put on it, and received, also in the middle of a tick.
 
     a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
     it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once
-                     `advance`    what is heard is handed over when it is due
+                     `advance`    what is received is handed over when it is due
 
 When which part of a packet's way is asked for changes nothing of it; so a run is repeated from what came in, and when.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import AirTime, Put
-from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Static
@@ -27,22 +27,22 @@ NEVER_NS = 2**63 - 1
 class AirInTime:
     """An air between `begin` of one tick and that of the next."""
 
-    def __init__(self, air: Air, static: Static, addressable: Callable[[Sent], Sent]) -> None:
+    def __init__(self, air: Air, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
         """`addressable` makes packets fit for the air, and counts what was wrong with them."""
         self._air, self._static, self._addressable = air, static, addressable
         self._rows = static.arenas * static.robots
-        self._waiting = Sent.none()  # (k,) that were put on the air, each until its robot's turn comes
+        self._waiting = SentPackets.none()  # (k,) that were put on the air, each until its robot's turn comes
         self._turn_ns = np.empty(0, np.int64)  # (k,) NEVER_NS: it came
         self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
 
-    def begin(self, start_ns: int) -> tuple[News, Heard, Outcomes]:
+    def begin(self, start_ns: int) -> tuple[News, ReceivedPackets, Outcomes]:
         """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
         self._release(start_ns)
         self._now_ns = start_ns
-        # What has been heard by now was heard, also by who dies now: as if it had been handed over in the tick.
-        heard, outcomes = self._air.advance_within(start_ns)
-        return self._air.advance(start_ns), heard, outcomes
+        # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
+        received, outcomes = self._air.advance_within(start_ns)
+        return self._air.advance(start_ns), received, outcomes
 
     def send(self, put: Put) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -57,13 +57,13 @@ class AirInTime:
         start_ns = tick_start_ns(put.tick, self._static.rate_hz)
         turn_ns = np.maximum(at_ns, self._air.turns(start_ns, put.tick)[sent.sender])
         waits = np.flatnonzero(self._turn_ns < NEVER_NS)
-        self._waiting = Sent.joined([self._waiting.select(waits), sent]) if len(waits) else sent
+        self._waiting = SentPackets.joined([self._waiting.select(waits), sent]) if len(waits) else sent
         self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
         self._next_ns = int(self._turn_ns.min())
         self._release(at_ns)
 
-    def advance(self, until_ns: int) -> tuple[Heard, Outcomes]:
-        """Let time pass; what robots heard, and learned of their packets, that nobody was handed before."""
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+        """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         self._release(until_ns)
         self._now_ns = until_ns
         return self._air.advance_within(until_ns)
@@ -98,8 +98,8 @@ class AirInTime:
 # --- A tick in quanta: the loop wakes many times in it, to take in what came and hand over what is due.
 #
 # In every quantum `take_in` gives what agents sent since, with the time at which it came; these packets go on the air,
-# it advances to now, and `hand_over` takes what was heard. So once more at the tick's end, where commands are taken as
-# ever.
+# it advances to now, and `hand_over` takes what was received. So once more at the tick's end, where commands are taken
+# as ever.
 
 
 MEAN_OF = 16  # sleeps, about: that were late
@@ -113,7 +113,7 @@ class Exchange(Protocol):
         """Packets that agents sent since the last call, `at_ns` in wall time."""
         ...
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Hand this to those that it is for, now, at `at_ns` of simulated time."""
         ...
 
@@ -161,7 +161,7 @@ class Quanta:
             from_ns = min(max(from_ns, pace.simulated_ns(put.at_ns)), now_ns)
             air.send(put._replace(at_ns=from_ns))
         self._last_ns = now_ns
-        heard, outcomes = air.advance(now_ns)
-        if len(heard) or len(outcomes):
-            exchange.hand_over(tick, now_ns, heard, outcomes)
-            pace.handed_over(heard.heard_at_ns)
+        received, outcomes = air.advance(now_ns)
+        if len(received) or len(outcomes):
+            exchange.hand_over(tick, now_ns, received, outcomes)
+            pace.handed_over(received.received_at_ns)

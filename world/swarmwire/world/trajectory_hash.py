@@ -1,4 +1,4 @@
-"""The trajectory hash: equal exactly where two runs of an arena moved and heard the same, bit for bit."""
+"""The trajectory hash: equal exactly where two runs of an arena moved and received the same, bit for bit."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -8,38 +8,42 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 
 WAITING_BYTES = 2**20  # hashed together at most, over all arenas
 
 
 class TrajectoryHash:
-    """SHA-256 per arena over, tick by tick, unrounded: poses, velocities, applied commands, and all that was heard."""
+    """SHA-256 per arena over, tick by tick, unrounded: poses, velocities, applied commands, packets received."""
 
     def __init__(self, arenas: int, robots: int) -> None:
         self._robots = robots
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
         self._open = list(range(arenas))
         self._first_row = [arena * robots for arena in range(arenas + 1)]
-        self._waiting: list[AnyArray] = []  # of the ticks since anything was heard, a row per robot of the open arenas
+        self._waiting: list[
+            AnyArray
+        ] = []  # of the ticks since anything was received, a row per robot of the open arenas
 
-    def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, heard: Heard) -> None:
-        """One tick; tables are (rows, 3), a row per robot of all arenas, `heard` is sorted by receiver."""
+    def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, received: ReceivedPackets) -> None:
+        """One tick; tables are (rows, 3), a row per robot of all arenas, `received` is sorted by receiver."""
         if not self._open:
             return
         moved = np.concatenate((pose, velocity, command), axis=1)
         if len(self._open) < len(self._hashes):
             moved = moved.reshape(len(self._hashes), -1)[self._open]
         self._waiting.append(moved)
-        if len(heard) or len(self._waiting) * moved.nbytes >= WAITING_BYTES:
+        if len(received) or len(self._waiting) * moved.nbytes >= WAITING_BYTES:
             self._hash_waiting()
-        if len(heard):
-            first = np.searchsorted(heard.receiver, self._first_row)
-            packets = _packets(heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, first, self._robots)
+        if len(received):
+            first = np.searchsorted(received.receiver, self._first_row)
+            packets = _packets(
+                received.receiver, received.sender, received.sequence, received.received_at_ns, first, self._robots
+            )
             self._add(packets, [*first[self._open].tolist(), len(packets)])
 
     def close(self, arenas: BoolArray) -> None:
-        """Nothing more goes into the hashes of these arenas (arenas,): nothing is heard there from now on."""
+        """Nothing more goes into the hashes of these arenas (arenas,): nothing is received there from now on."""
         self._hash_waiting()
         self._open = [arena for arena in self._open if not arenas[arena]]
 
@@ -64,11 +68,11 @@ class TrajectoryHash:
 
 
 @njit(cache=True)
-def _packets(receiver, sender, sequence, heard_at_ns, first, robots):
-    """What was heard, (k, 4), receivers as indices in their arenas, which begin at the rows `first`."""
+def _packets(receiver, sender, sequence, received_at_ns, first, robots):
+    """What was received, (k, 4), receivers as indices in their arenas, which begin at the rows `first`."""
     table = np.empty((len(receiver), 4), np.int64)
     for arena in range(len(first) - 1):
         for k in range(first[arena], first[arena + 1]):
             table[k, 0], table[k, 1] = receiver[k] - arena * robots, sender[k]
-            table[k, 2], table[k, 3] = sequence[k], heard_at_ns[k]
+            table[k, 2], table[k, 3] = sequence[k], received_at_ns[k]
     return table

@@ -39,25 +39,25 @@ class Aggregation(VectorAgent[Gathering]):
 
     The three states and two probabilities of Soysal and Sahin (2005), beside avoidance by rays:
 
-        approach   a neighbour is heard within near_m                               -> wait
+        approach   a neighbour is received within near_m                               -> wait
         wait       with probability leave_per_s / (1 + neighbours near)^crowding    -> repel    (per second)
         repel      with probability return_per_s                                    -> approach (per second)
 
-    Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours heard in the last
-    step, repelled against it; who hears nobody walks at random. The source's robots hear an aggregate's sound where
-    ours hear beacons by radio, and they leave whatever the number near: that is `crowding = 0`. We had only its
+    Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours received in the
+    last step, repelled against it; who hears nobody walks at random. The source's robots hear an aggregate's sound
+    where ours hear beacons by radio, and they leave whatever the number near: that is `crowding = 0`. We had only its
     abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
     cockroaches depends (Jeanson et al. 2005).
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
     speed_mps: float = 0.1  # straight ahead
-    near_m: float = 0.15  # a neighbour heard from so near, centre to centre, is company to wait with
+    near_m: float = 0.15  # a neighbour received from so near, centre to centre, is company to wait with
     leave_per_s: float = 0.1  # rate at which a waiting robot that hears nobody near leaves
     crowding: float = 2.0  # how much those near hold it: 0 not at all
     return_per_s: float = 1.0  # rate at which a robot that leaves turns back
     approach_m: float = 0.1  # length of a spell towards or away from neighbours
-    spell_m: float = 1.0  # mean length of a spell where nobody is heard, exponential
+    spell_m: float = 1.0  # mean length of a spell where nobody is received, exponential
     turn_radps: float = 2.0  # turn rate, on the spot
     faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
 
@@ -68,14 +68,14 @@ class Aggregation(VectorAgent[Gathering]):
         check_not_negative(params, "leave_per_s", "return_per_s")
 
     def step(self, robots: Robots, state: Gathering) -> None:
-        """Change what it is at, walk unless waiting, and be heard."""
-        heard = robots.radio.heard(Beacon)
-        near = heard.sum((heard.range_m <= self.near_m).astype(np.float64))
+        """Change what it is at, walk unless waiting, and be received."""
+        received = robots.radio.received(Beacon)
+        near = received.sum((received.range_m <= self.near_m).astype(np.float64))
         self._change(robots, state, near)
 
-        x, y = heard.sum(np.cos(heard.bearing_rad)), heard.sum(np.sin(heard.bearing_rad))
+        x, y = received.sum(np.cos(received.bearing_rad)), received.sum(np.sin(received.bearing_rad))
         towards = np.arctan2(y, x) + np.where(state.at == REPEL, np.pi, 0.0)
-        self._walk(robots, state, heard.count() > 0, towards)
+        self._walk(robots, state, received.count() > 0, towards)
         robots.radio.send(Beacon)
 
     def _change(self, robots: Robots, state: Gathering, near: FloatArray) -> None:
@@ -92,10 +92,10 @@ class Aggregation(VectorAgent[Gathering]):
         for at, name in NAMES.items():
             robots.note(name, (state.at == at) & (state.at != before))
 
-    def _walk(self, robots: Robots, state: Gathering, hears: BoolArray, towards: FloatArray) -> None:
-        """A spell along `towards` where somebody is heard, at random elsewhere; not for who waits."""
-        turn = np.where(hears, towards, turns_at_random(robots, 0.0))
-        length = np.where(hears, self.approach_m, spell_lengths(robots, self.spell_m))
+    def _walk(self, robots: Robots, state: Gathering, receives: BoolArray, towards: FloatArray) -> None:
+        """A spell along `towards` where somebody is received, at random elsewhere; not for who waits."""
+        turn = np.where(receives, towards, turns_at_random(robots, 0.0))
+        length = np.where(receives, self.approach_m, spell_lengths(robots, self.spell_m))
         walks = state.at != WAIT
         begin_spells(state, walks & ended(state), turn, length)
         blocked, away = turns_away(robots, self.faint)

@@ -38,7 +38,7 @@ class BeaconAvoidance(VectorAgent[Traffic]):
     """Straight on, and around whoever would be met, by the radio alone.
 
     Each robot broadcasts its heading and speed in every step, and remembers for `memory_s` the 8 nearest neighbours
-    that it heard. Where one was when its packet went on air follows from range and bearing; where it is now from
+    that it received. Where one was when its packet went on air follows from range and bearing; where it is now from
     the time since, its beacon's velocity and the own motion.
 
     The robot wants to go on in the direction in which it stood first, at `speed_mps`. If it did, a neighbour at p,
@@ -67,7 +67,7 @@ class BeaconAvoidance(VectorAgent[Traffic]):
     relaxed: float = 0.05  # sum of pushes at which it takes up its course again
     smooth_s: float = 0.2  # time constant of the pushes' low-pass
     memory_s: float = 2.0  # a neighbour whose newest packet went on air longer ago is forgotten
-    latency_s: float = 0.0  # known delay of packets between going on air and being heard
+    latency_s: float = 0.0  # known delay of packets between going on air and being received
     turn_gain_per_s: float = 2.5  # turn rate per angle to the wanted direction
 
     @classmethod
@@ -97,13 +97,13 @@ class BeaconAvoidance(VectorAgent[Traffic]):
 
     def _listen(self, robots: Robots, state: Traffic, heading: FloatArray, own_mps: Vectors) -> None:
         """Take in the beacons, each moved on by its age."""
-        heard = robots.radio.heard(Beacon)
-        row = heard.row
-        age_s = robots.time_s - 1e-9 * heard.heard_at_ns.astype(np.float64) + self.latency_s
-        mps = heard.message.speed_mps * along(heard.message.heading_rad)
-        place = heard.range_m * along(heading[row] + heard.bearing_rad)
+        received = robots.radio.received(Beacon)
+        row = received.row
+        age_s = robots.time_s - 1e-9 * received.received_at_ns.astype(np.float64) + self.latency_s
+        mps = received.message.speed_mps * along(received.message.heading_rad)
+        place = received.range_m * along(heading[row] + received.bearing_rad)
         place += age_s * (mps - Vectors(own_mps.x[row], own_mps.y[row]))
-        remember(state, row, heard.sender, heard.sequence, place, mps, age_s)
+        remember(state, row, received.sender, received.sequence, place, mps, age_s)
 
     def _push(self, state: Traffic, course_mps: Vectors) -> Vectors:
         """The sum of pushes, along the axes of the compass."""

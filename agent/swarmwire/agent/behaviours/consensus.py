@@ -24,7 +24,7 @@ class Estimate(State):
 class Consensus(VectorAgent[Estimate]):
     """Average consensus: each robot moves its number towards those that it hears, until all have the same.
 
-        x_i <- x_i + gain x sum over packets heard since the last step of (x_j - x_i)
+        x_i <- x_i + gain x sum over packets received since the last step of (x_j - x_i)
 
     Every step ends with a broadcast of x_i, and tells it by a note, so that `consensus_error` and `consensus_bias` can
     be measured. Robots stay where they are. With all links there and none delayed, all tend to the average of the
@@ -32,7 +32,7 @@ class Consensus(VectorAgent[Estimate]):
     is enough. Losses slow it, and since what one robot gives the other then does not take, the average moves.
 
     Source: R. Olfati-Saber, R. M. Murray, IEEE Transactions on Automatic Control 49 (9), 2004, in discrete time. Of
-    losses it says nothing: here who is not heard does not count, and a number that comes late counts as it is.
+    losses it says nothing: here who is not received does not count, and a number that comes late counts as it is.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
@@ -41,11 +41,11 @@ class Consensus(VectorAgent[Estimate]):
     start_width: float = 0.0  # x_i at first is uniform within half of this to either side of start
 
     def step(self, robots: Robots, state: Estimate) -> None:
-        """Move towards what was heard, and tell the others."""
+        """Move towards what was received, and tell the others."""
         half = 0.5 * self.start_width
         first = self.start + robots.draw.uniform("first value", -half, half)
         own = np.where(np.isnan(state.value), first, state.value)
-        heard = robots.radio.heard(Value)
-        state.value[:] = own + self.gain * heard.sum(heard.message.value - own[heard.row])
+        received = robots.radio.received(Value)
+        state.value[:] = own + self.gain * received.sum(received.message.value - own[received.row])
         robots.note(value=state.value)
         robots.radio.send(Value, value=state.value)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from swarmwire.agent.behaviours._common import check_above_zero
-from swarmwire.agent.fields import ahead, alignment, mean_heard, repulsion_of_rays, spacing, steered
+from swarmwire.agent.fields import ahead, alignment, mean_received, repulsion_of_rays, spacing, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
 from swarmwire.comms.messages import Message, f4
@@ -19,9 +19,9 @@ class Heading(Message):
 class Flocking(VectorAgent):
     """Attraction, repulsion and alignment (Reynolds 1987) from neighbours' beacons, avoidance by proximity.
 
-    Each neighbour heard since the last step pulls along its bearing if it is farther than `separation_m` and pushes if
-    it is nearer, in proportion to the relative difference, at most 1 either way; its heading against the own compass
-    adds a unit vector. Both are averaged over the neighbours heard. The rays push away from what is near. The robot
+    Each neighbour received since the last step pulls along its bearing if it is farther than `separation_m` and pushes
+    if it is nearer, in proportion to the relative difference, at most 1 either way; its heading against the own compass
+    adds a unit vector. Both are averaged over the neighbours received. The rays push away from what is near. The robot
     turns towards the sum, and drives the slower the more it has to turn.
     """
 
@@ -42,10 +42,10 @@ class Flocking(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robots.compass.heading_rad
-        heard = robots.radio.heard(Heading)
-        pull = self.cohesion * spacing(heard.range_m, heard.bearing_rad, self.separation_m)
-        turn = self.alignment * alignment(heard.message.heading_rad, heading[heard.row])
+        received = robots.radio.received(Heading)
+        pull = self.cohesion * spacing(received.range_m, received.bearing_rad, self.separation_m)
+        turn = self.alignment * alignment(received.message.heading_rad, heading[received.row])
         near = self.avoidance * repulsion_of_rays(robots.proximity)
-        wanted = self.forward * ahead(robots.n) + mean_heard(heard, pull + turn) + near
+        wanted = self.forward * ahead(robots.n) + mean_received(received, pull + turn) + near
         robots.drive(*steered(wanted, self.speed_mps, self.turn_gain_per_s))
         robots.radio.send(Heading, heading_rad=heading)

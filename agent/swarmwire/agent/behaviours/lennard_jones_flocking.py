@@ -27,7 +27,8 @@ class Wheels(State):
 class LennardJonesFlocking(VectorAgent[Wheels]):
     """The flocking example of ARGoS (argos3-examples, footbot_flocking), with neighbours by the radio.
 
-    Each beacon heard since the last step, from less than `reach` x t away, adds a vector along its bearing, of length
+    Each beacon received since the last step, from less than `reach` x t away, adds a vector along its bearing, of
+    length
 
         f(d) = -(gain / d) ((t / d)^(2 e) - (t / d)^e)   in m/s,
 
@@ -63,12 +64,12 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
 
     def step(self, robots: Robots, state: Wheels) -> None:
         """Roll along the sum of all pulls, and say where one is."""
-        heard = robots.radio.heard(Here)
-        counts = heard.range_m < self.reach * self.target_m
-        force = np.where(counts, self.force(heard.range_m), 0.0)
-        counted = np.maximum(heard.sum(counts.astype(np.float64)), 1.0)
-        x = heard.sum(force * np.cos(heard.bearing_rad)) / counted
-        y = heard.sum(force * np.sin(heard.bearing_rad)) / counted
+        received = robots.radio.received(Here)
+        counts = received.range_m < self.reach * self.target_m
+        force = np.where(counts, self.force(received.range_m), 0.0)
+        counted = np.maximum(received.sum(counts.astype(np.float64)), 1.0)
+        x = received.sum(force * np.cos(received.bearing_rad)) / counted
+        y = received.sum(force * np.sin(received.bearing_rad)) / counted
         x, y = _cut(x, y, self.speed_mps)
         light_x, light_y = self._to_light(robots)
         self._roll(robots, state, x + light_x, y + light_y)

@@ -55,7 +55,7 @@ def remember(
     velocity_mps: Vectors,
     age_s: FloatArray,
 ) -> None:
-    """Take in what the packets said that the robots `row` heard, (k,) each, vectors along the axes of the compass.
+    """Take in what the packets said that the robots `row` received, (k,) each, vectors along the axes of the compass.
 
     Of each sender the newest packet counts, by its sequence, as one may overtake another; of all senders the SLOTS
     nearest are kept.

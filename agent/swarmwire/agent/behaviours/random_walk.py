@@ -136,7 +136,7 @@ class Diffusion(VectorAgent):
         robots.drive(linear_mps=linear, angular_radps=angular)
 
 
-# --- Coverage: a random walk that leads away from the neighbours heard.
+# --- Coverage: a random walk that leads away from the neighbours received.
 
 
 class Present(Message):
@@ -144,13 +144,13 @@ class Present(Message):
 
 
 class Coverage(VectorAgent[Walk]):
-    """Robots spread, and sweep what is between them: a random walk that neighbours heard push away.
+    """Robots spread, and sweep what is between them: a random walk that neighbours received push away.
 
     Neighbours push as in the potential field of Howard, Mataric and Sukhatme (2002), which spreads a network of sensors
     over a building and then rests. To go on sweeping, ours turns the directions of a random walk by that push: at the
     end of a spell, the next heading is that of
 
-        u - repulsion_m2 sum of r / |r|^3,    u a unit vector at random, r from the robot to each neighbour heard
+        u - repulsion_m2 sum of r / |r|^3,    u a unit vector at random, r from the robot to each neighbour received
 
     over the packets of the last step alone: there is no memory of who was where. Who hears nobody walks as `RandomWalk`
     does. Walls push by rays instead of by a field: the next heading is uniform over the half circle away from them.
@@ -171,12 +171,12 @@ class Coverage(VectorAgent[Walk]):
         check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "faint")
 
     def step(self, robots: Robots, state: Walk) -> None:
-        """On with the spell, or with the turn to the next; and be heard."""
-        heard = robots.radio.heard(Present)
-        push = self.repulsion_m2 / np.maximum(heard.range_m, self.nearest_m) ** 2
+        """On with the spell, or with the turn to the next; and be received."""
+        received = robots.radio.received(Present)
+        push = self.repulsion_m2 / np.maximum(received.range_m, self.nearest_m) ** 2
         chance = turns_at_random(robots, 0.0)
-        x = np.cos(chance) - heard.sum(push * np.cos(heard.bearing_rad))
-        y = np.sin(chance) - heard.sum(push * np.sin(heard.bearing_rad))
+        x = np.cos(chance) - received.sum(push * np.cos(received.bearing_rad))
+        y = np.sin(chance) - received.sum(push * np.sin(received.bearing_rad))
 
         length = spell_lengths(robots, self.spell_m)
         begin_spells(state, ended(state), np.arctan2(y, x), length)

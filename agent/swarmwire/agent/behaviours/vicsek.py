@@ -20,17 +20,17 @@ class Direction(Message):
 class Vicsek(VectorAgent):
     """Vicsek's model: each goes the mean way of its neighbours, itself included, with noise, all equally fast.
 
-        theta(t + 1) = angle of the mean of (cos theta, sin theta) over oneself and who is heard + U(-eta/2, eta/2)
+        theta(t + 1) = angle of the mean of (cos theta, sin theta) over oneself and who is received + U(-eta/2, eta/2)
         x(t + 1) = x(t) + v (cos theta(t), sin theta(t)) dt
 
     dt is the time between two steps, and neighbours are those in range of the radio when they sent. A step is one of
-    the model where a packet is heard one step after it was sent (`send_offset = "tick"`, no latency), nothing is lost,
-    and the body can turn by pi within a step (a holonomic drive, as of `point` at up to 2 Hz). The body comes to look
-    where it goes: its heading at the end of a step is the direction of that step.
+    the model where a packet is received one step after it was sent (`send_offset = "tick"`, no latency), nothing is
+    lost, and the body can turn by pi within a step (a holonomic drive, as of `point` at up to 2 Hz). The body comes to
+    look where it goes: its heading at the end of a step is the direction of that step.
 
     Source: T. Vicsek et al., Novel type of phase transition in a system of self-driven particles, PRL 75 (1995), with
-    v dt = 0.03 of the range. Of packets late or lost it says nothing: here each is taken as heard, who is not heard in
-    a step does not count in it, and one's own direction is the one that the compass shows.
+    v dt = 0.03 of the range. Of packets late or lost it says nothing: here each is taken as received, who is not
+    received in a step does not count in it, and one's own direction is the one that the compass shows.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
@@ -40,9 +40,9 @@ class Vicsek(VectorAgent):
     def step(self, robots: Robots, state: State) -> None:
         """Take the mean direction, say so, and go there."""
         own = robots.compass.heading_rad
-        heard = robots.radio.heard(Direction)
-        x = np.cos(own) + heard.sum(np.cos(heard.message.heading_rad))
-        y = np.sin(own) + heard.sum(np.sin(heard.message.heading_rad))
+        received = robots.radio.received(Direction)
+        x = np.cos(own) + received.sum(np.cos(received.message.heading_rad))
+        y = np.sin(own) + received.sum(np.sin(received.message.heading_rad))
         half = 0.5 * self.noise_rad
         wanted = np.arctan2(y, x) + robots.draw.uniform("noise of the direction", -half, half)
         self._go(robots, wrapped(wanted - own))

@@ -45,7 +45,7 @@ class NetworkParts:
 
     radio: RobotRadio = field(default_factory=NoRadio)
     own_pose: Callable[[], Pose | None] = nowhere
-    look: Callable[[], None] = lambda: None  # once a second: tell whether others are heard, and poses come
+    look: Callable[[], None] = lambda: None  # once a second: tell whether others are received, and poses come
     counts: Callable[[], dict[str, int]] = dict  # what came to tracker and control and was of no use
     listen: Callable[[Control], None] = lambda _: None  # let the robot be controlled from now on
 
@@ -130,7 +130,7 @@ def _made_radio(
 
 
 def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Callable[[], list[str]]]:
-    """Whom the robot is to hear, and what tells whom it has heard so far: known of the robots' own network alone."""
+    """Whom the robot is to hear, and what tells whom it has received so far: known of the robots' own network alone."""
     from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 
     if not isinstance(radio, ZenohRadio):

@@ -15,7 +15,7 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses
 from swarmwire.comms.wire.radio_bridge import Pose
 
@@ -75,7 +75,7 @@ class Decision:
 
     command: Command  # within the limits, with the LEDs that were switched in this step
     drive: bool  # whether the agent gave a command in this step; else the last one holds
-    sent: Sent
+    sent: SentPackets
 
 
 class Mind:
@@ -103,10 +103,10 @@ class Mind:
         self.leds: dict[int, int] = {}
         self.clipped = self.nan = self.actuations = 0
 
-    def step(self, tick: int, fields: dict[str, FloatArray], heard: Heard, outcomes: Outcomes) -> Decision:
+    def step(self, tick: int, fields: dict[str, FloatArray], received: ReceivedPackets, outcomes: Outcomes) -> Decision:
         """One step of the agent; AgentFailed with its traceback if it raises."""
         senses = {self._group.name: GroupSenses(self._group.rows, fields)}
-        actions = self._host.act(tick, senses, heard, outcomes)
+        actions = self._host.act(tick, senses, received, outcomes)
         drive = bool(actions.drive[0])
         if drive:
             self._follow(actions)

@@ -36,7 +36,7 @@ def become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[str
 
 
 def silent_s(watchdog_s: float, pace: float) -> float:
-    """How long nothing may be heard of the agent, by the wall clock, whose seconds a slow robot's are longer than.
+    """How long nothing may be received of the agent, by the wall clock, whose seconds a slow robot's are longer than.
 
     >>> silent_s(0.5, 1.0), silent_s(0.5, 0.1), silent_s(0.01, 1.0)
     (1.0, 10.0, 0.2)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.agent.radios.radio import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
@@ -79,8 +79,8 @@ class RowFile:
 
 # --- The log of a robot: a new folder for each start of its agent, which `swarmwire parity` and `radio fit` read.
 #
-# `robot.json` says what runs; `ticks.csv`, `heard.csv` and `sent.csv` grow once a second; `summary.json` is written at
-# the end, so a log without one is that of a process that was killed. What a full disk loses is counted, and stops
+# `robot.json` says what runs; `ticks.csv`, `received.csv` and `sent.csv` grow once a second; `summary.json` is written
+# at the end, so a log without one is that of a process that was killed. What a full disk loses is counted, and stops
 # nobody.
 
 
@@ -88,7 +88,7 @@ TICKS = (
     "tick", "t_s", "late", "x_m", "y_m", "heading_rad", "drive", "linear_mps", "angular_radps", "state", "value",
     "charge",
 )  # fmt: skip
-HEARD = ("t_s", "tx", "rx", "seq", "to", "size_bytes", "tag", "latency_s", "distance_m", "given")
+RECEIVED = ("t_s", "tx", "rx", "seq", "to", "size_bytes", "tag", "latency_s", "distance_m", "given")
 SENT = ("t_s", "tx", "seq", "to", "size_bytes", "tag", "fate")
 
 
@@ -115,12 +115,12 @@ class RobotLog:
         self._robots, self._own = robots, own
         self._lost_files = 0
         self._ticks = RowFile(folder / "ticks.csv", TICKS)
-        self._heard = RowFile(folder / "heard.csv", HEARD)
+        self._received = RowFile(folder / "received.csv", RECEIVED)
         self._sent = RowFile(folder / "sent.csv", SENT)
 
     @property
     def _tables(self) -> tuple[RowFile, ...]:
-        return self._ticks, self._heard, self._sent
+        return self._ticks, self._received, self._sent
 
     def begin(self, facts: Mapping[str, Any]) -> None:
         """Write `robot.json`."""
@@ -133,12 +133,12 @@ class RobotLog:
         told = row.state, row.value, row.charge
         self._ticks.write((row.tick, seconds(row.utc_ns), int(row.late), *where, int(row.drive), *speeds, *told))
 
-    def heard(self, packet: HeardPacket) -> None:
-        """As `RadioLog.heard`."""
+    def received(self, packet: ReceivedPacket) -> None:
+        """As `RadioLog.received`."""
         link = self._robots[packet.sender], self._own
         what = packet.sequence, self._to(packet.to), packet.size_bytes, packet.tag
         latency_s = None if packet.latency_ns is None else seconds(packet.latency_ns)
-        self._heard.write((seconds(packet.utc_ns), *link, *what, latency_s, packet.distance_m, int(packet.given)))
+        self._received.write((seconds(packet.utc_ns), *link, *what, latency_s, packet.distance_m, int(packet.given)))
 
     def sent(self, packet: SentPacket) -> None:
         """As `RadioLog.sent`."""

@@ -12,7 +12,7 @@ from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, End, Motors, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import SentPackets
 
 
 class Pacer:
@@ -102,7 +102,7 @@ def _paused(pause_ns: int, clock: Clock, end: End, meanwhile: Callable[[], None]
 RUNNING, LOST = "running", "driver lost"
 DURATION = "duration"  # why it ended
 BLIND_S = 3.0  # an agent begins after so long, even if one of its senses has never been read
-NOTHING = Decision(STOP, drive=False, sent=Sent.none())
+NOTHING = Decision(STOP, drive=False, sent=SentPackets.none())
 
 
 @dataclass(frozen=True)
@@ -207,13 +207,13 @@ class RobotLoop:
     def _step(self, tick: int, late: bool) -> TickRow:
         parts = self._parts
         fields = parts.senses.read()
-        heard, outcomes = parts.radio.heard(self._pacer.since_start_ns())
+        received, outcomes = parts.radio.received(self._pacer.since_start_ns())
         self._tick = tick
         decision = NOTHING
         if parts.motors.control.stopped:
             parts.motors.stop()
         elif self._begins(tick):
-            decision = parts.mind.step(tick, fields, heard, outcomes)
+            decision = parts.mind.step(tick, fields, received, outcomes)
             self._do(decision)
         utc_ns, told = parts.clock.utc_ns(), (parts.mind.state, parts.mind.value, parts.senses.charge)
         return TickRow(tick, utc_ns, late, parts.senses.pose, decision.drive, decision.command, *told)
@@ -246,6 +246,6 @@ class RobotLoop:
 
     def _wait(self) -> None:
         """Packets for an agent that stands still are of no use once it goes on."""
-        heard, _ = self._parts.radio.heard(self._pacer.since_start_ns())
-        self.counts["packets_without_driver"] += len(heard)
+        received, _ = self._parts.radio.received(self._pacer.since_start_ns())
+        self.counts["packets_without_driver"] += len(received)
         self._onlooker.wait()

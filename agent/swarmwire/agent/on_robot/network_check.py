@@ -22,12 +22,15 @@ class Presence:
         clock: Clock,
         say: Callable[[str], None],
         others: Sequence[str] = (),
-        heard: Callable[[], Collection[str]] = tuple,
+        received: Callable[[], Collection[str]] = tuple,
         pose: Callable[[], Pose | None] | None = None,
         pace: float = 1.0,
     ) -> None:
-        """`others` are to be heard, and `heard` tells which ever were; `pose` is the robot's newest, with a tracker."""
-        self._clock, self._say, self._heard, self._pose = clock, say, heard, pose
+        """`others` are to be received, and `received` tells which ever were.
+
+        `pose` is the robot's newest, with a tracker.
+        """
+        self._clock, self._say, self._received, self._pose = clock, say, received, pose
         self._patience_ns = to_ns(TIMEOUT_S * pace)
         self._silent, self._others = list(others), others
         self._began_ns = self._looked_ns = self._seen_ns = clock.now_ns()
@@ -49,14 +52,14 @@ class Presence:
     def _listen(self, now_ns: int) -> None:
         if not self._silent:
             return
-        heard = set(self._heard())
-        came = [robot for robot in self._silent if robot in heard]
-        self._silent = [robot for robot in self._silent if robot not in heard]
+        received = set(self._received())
+        came = [robot for robot in self._silent if robot in received]
+        self._silent = [robot for robot in self._silent if robot not in received]
         if self._told_silent and came:
             self._say(f"radio: now hears {', '.join(came)}")
         if self._silent and not self._told_silent and now_ns - self._began_ns >= self._patience_ns:
             self._told_silent = True
-            how = "hears none of" if len(self._silent) == len(self._others) else "has never heard"
+            how = "hears none of" if len(self._silent) == len(self._others) else "has never received"
             self._say(f"radio: {how} {', '.join(self._silent)}")
 
     def _watch(self, now_ns: int, seen: bool) -> None:

@@ -145,7 +145,7 @@ NOT_YET: Mapping[str, Any] = {
 CLOCK_SET = "the clock was set by {:+.3f} s: times in the log before and after do not compare"
 SET_NS = to_ns(0.05)  # a clock that is only kept in step is moved by less in a second
 EMERGENCY = "emergency stop at step {}: motors off for good; end the agent, and start it anew, to go on"
-SILENT = "watchdog: nothing was heard of the agent for {:.2f} s; motors off until it goes on"
+SILENT = "watchdog: nothing was received of the agent for {:.2f} s; motors off until it goes on"
 LOG_FULL = "the log cannot be written, and goes on without what is lost: {}"
 
 
@@ -209,7 +209,7 @@ class Onlookers:
         self._terminal.say(line)
 
     def silent(self, silent_s: float) -> None:
-        """The watchdog has stopped the motors, since nothing was heard of the loop for so long."""
+        """The watchdog has stopped the motors, since nothing was received of the loop for so long."""
         self._call(SILENT.format(silent_s))
 
     def _stopped(self) -> None:

@@ -74,7 +74,7 @@ class Watchdog:
         beat: Callable[[], None] = lambda: None,
         tell: Callable[[float], None] = lambda _: None,
     ) -> None:
-        """`tell` is told for how many seconds nothing was heard of the loop, once the motors were stopped for it."""
+        """`tell` is told for how many seconds nothing was received of the loop, once the motors were stopped for it."""
         self._after_ns, self._stop, self._clock = to_ns(after_s), stop, clock
         self._look_s = max(after_s / LOOKS / pace, MIN_LOOK_S)  # of wall time
         self._beat, self._tell = beat, tell
@@ -98,7 +98,7 @@ class Watchdog:
         self._fed_ns = None
 
     def look(self) -> None:
-        """Stop the motors if the loop has not been heard of for too long."""
+        """Stop the motors if the loop has not been received of for too long."""
         fed_ns = self._fed_ns
         if fed_ns is None or fed_ns == self._lapsed_ns or (silent_ns := self._clock.now_ns() - fed_ns) < self._after_ns:
             return

@@ -2,15 +2,15 @@
 
 from typing import NamedTuple, Protocol
 
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 
 
 class RobotRadio(Protocol):
-    """The radio of one robot: `heard` and `send` are called from one thread, once per tick each.
+    """The radio of one robot: `received` and `send` are called from one thread, once per tick each.
 
     Attributes:
         needs: what of an agent's `needs` it meets: "radio.range", "radio.bearing", "radio.outcomes", …
-        gives: the columns of `Heard.given`, in their order.
+        gives: the columns of `ReceivedPackets.given`, in their order.
     """
 
     needs: frozenset[str]
@@ -20,14 +20,15 @@ class RobotRadio(Protocol):
         """Take part in the network."""
         ...
 
-    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
-        """What reached the robot since the last call, in the order that `Heard` promises.
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+        """What reached the robot since the last call, in the order that `ReceivedPackets` promises.
 
-        `receiver` and `Outcomes.row` are the robot's row. `now_ns` and `heard_at_ns` are times since the agent's start.
+        `receiver` and `Outcomes.row` are the robot's row. `now_ns` and `received_at_ns` are times since the agent's
+        start.
         """
         ...
 
-    def send(self, sent: Sent) -> None:
+    def send(self, sent: SentPackets) -> None:
         """Hand packets to the network, at once; nothing is raised for one that is lost or too large: it is counted."""
         ...
 
@@ -44,7 +45,7 @@ class RobotRadio(Protocol):
 
 
 class NoRadio:
-    """Nothing is heard; what the agent sends is counted, and goes nowhere."""
+    """Nothing is received; what the agent sends is counted, and goes nowhere."""
 
     needs: frozenset[str] = frozenset()
     gives: tuple[str, ...] = ()
@@ -55,11 +56,11 @@ class NoRadio:
     def open(self) -> None:
         """There is nothing to take part in."""
 
-    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         """Nothing."""
-        return Heard.none(), NO_OUTCOMES
+        return ReceivedPackets.none(), NO_OUTCOMES
 
-    def send(self, sent: Sent) -> None:
+    def send(self, sent: SentPackets) -> None:
         """Count the packets."""
         self._unsent += len(sent)
 
@@ -77,7 +78,7 @@ class NoRadio:
 SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
 
 
-class HeardPacket(NamedTuple):
+class ReceivedPacket(NamedTuple):
     """A packet that arrived; robots are places in the swarm's list."""
 
     utc_ns: int  # when it arrived
@@ -105,7 +106,7 @@ class SentPacket(NamedTuple):
 class RadioLog(Protocol):
     """Whoever keeps them; told from the thread that calls the radio."""
 
-    def heard(self, packet: HeardPacket) -> None:
+    def received(self, packet: ReceivedPacket) -> None:
         """A packet arrived."""
         ...
 
@@ -117,7 +118,7 @@ class RadioLog(Protocol):
 class NoRadioLog:
     """Nobody keeps them."""
 
-    def heard(self, packet: HeardPacket) -> None:
+    def received(self, packet: ReceivedPacket) -> None:
         """Nothing is kept."""
 
     def sent(self, packet: SentPacket) -> None:

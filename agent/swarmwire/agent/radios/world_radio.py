@@ -14,11 +14,11 @@ import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.radios.radio import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
+from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, ReceivedPacket, SentPacket
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, decode_air
 from swarmwire.comms.wire.robot_network import SwarmKeys
@@ -78,12 +78,12 @@ class AirRadio:
             raise BadInput("robots", "", f"expected the robots of the world, in its order: {given}")
         self.terms, self.gives, self.needs = terms, terms.gives, frozenset(terms.needs)
         self._subscriber = self._session.declare_subscriber(
-            self._keys.air_heard(self._own), Callback(self._arrive, indirect=False)
+            self._keys.air_received(self._own), Callback(self._arrive, indirect=False)
         )
 
-    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         """What the world's air brought since the last call."""
-        terms, heard, outcomes = self._joined(), Heard.none(self.gives), NO_OUTCOMES
+        terms, received, outcomes = self._joined(), ReceivedPackets.none(self.gives), NO_OUTCOMES
         started_ns = self._clock.now_ns() - now_ns
         for arrival in self._inbox.take():
             try:
@@ -95,11 +95,11 @@ class AirRadio:
             ahead_ns = arrival.at_ns - started_ns - tick_start_ns(tick, terms.rate_hz)
             mine = self._own_rows(its, ahead_ns)
             self._note(mine, arrival.utc_ns - arrival.at_ns + started_ns)
-            heard = heard.merged(mine)
+            received = received.merged(mine)
             outcomes = Outcomes.joined([outcomes, Outcomes(self._rows(told.row), told.id, told.result)])
-        return heard, outcomes
+        return received, outcomes
 
-    def send(self, sent: Sent) -> None:
+    def send(self, sent: SentPackets) -> None:
         """Hand the packets to the world's air, also those that are too large for it: it counts them."""
         if not len(sent):
             return
@@ -112,7 +112,7 @@ class AirRadio:
             self._log.sent(SentPacket(utc_ns, self._sequence, to, size_bytes, tag, SENT if fits else TOO_LARGE))
             self._sequence += 1
         row = np.array([terms.row])
-        packets = Sent(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.outcome_id)
+        packets = SentPackets(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.outcome_id)
         still = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
         self._frames += 1
         try:
@@ -125,7 +125,7 @@ class AirRadio:
             self._counted["packets_refused"] += len(sent)
 
     def counts(self) -> dict[str, int]:
-        """What was sent, heard and lost on the way to the world, by name, where there is any."""
+        """What was sent, received and lost on the way to the world, by name, where there is any."""
         counted = Counter(self._counted)
         counted["frames_oversized"] += self._far_too_large
         counted["frames_dropped"] += self._inbox.dropped
@@ -165,29 +165,31 @@ class AirRadio:
             return
         self._inbox.put(_Arrival(sample.payload.to_bytes(), self._clock.now_ns(), self._clock.utc_ns()))
 
-    def _own_rows(self, heard: Heard, ahead_ns: int) -> Heard:
+    def _own_rows(self, received: ReceivedPackets, ahead_ns: int) -> ReceivedPackets:
         """The same as this robot counts: itself by its place in the swarm, times from its agent's start."""
-        at_ns = heard.heard_at_ns + ahead_ns
-        rows = self._rows(heard.receiver)
-        return Heard(rows, heard.sender, heard.sequence, at_ns, heard.given, heard.payload, heard.payloads)
+        at_ns = received.received_at_ns + ahead_ns
+        rows = self._rows(received.receiver)
+        return ReceivedPackets(
+            rows, received.sender, received.sequence, at_ns, received.given, received.payload, received.payloads
+        )
 
     def _rows(self, rows: IntArray) -> IntArray:
         return np.full(len(rows), self._row)
 
-    def _note(self, heard: Heard, dated_ns: int) -> None:
+    def _note(self, received: ReceivedPackets, dated_ns: int) -> None:
         """Tell the log; `dated_ns` is the date at the agent's start."""
-        sizes, tags = heard.payloads.sizes, heard.payloads.tags()
-        for at, payload in enumerate(heard.payload.tolist()):
-            packet = HeardPacket(
-                utc_ns=int(heard.heard_at_ns[at]) + dated_ns,
-                sender=int(heard.sender[at]),
-                sequence=int(heard.sequence[at]),
+        sizes, tags = received.payloads.sizes, received.payloads.tags()
+        for at, payload in enumerate(received.payload.tolist()):
+            packet = ReceivedPacket(
+                utc_ns=int(received.received_at_ns[at]) + dated_ns,
+                sender=int(received.sender[at]),
+                sequence=int(received.sequence[at]),
                 to=BROADCAST,  # whom it was addressed to the air does not tell
                 size_bytes=int(sizes[payload]),
                 tag=int(tags[payload]),
                 latency_ns=None,
-                distance_m=float(heard.given["range_m"][at]) if "range_m" in heard.given else None,
+                distance_m=float(received.given["range_m"][at]) if "range_m" in received.given else None,
                 given=True,
             )
-            self._log.heard(packet)
-        self._counted["packets_heard"] += len(heard)
+            self._log.received(packet)
+        self._counted["packets_received"] += len(received)

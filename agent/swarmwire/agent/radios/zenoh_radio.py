@@ -19,11 +19,11 @@ import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.radios.radio import SENT, TOO_LARGE, HeardPacket, NoRadioLog, RadioLog, SentPacket
+from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, TAG_BYTES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, TAG_BYTES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 
@@ -105,22 +105,22 @@ class Link:
     """From one sender to this robot.
 
     Attributes:
-        heard: packets that arrived.
+        received: packets that arrived.
         missed: numbers that were left out before one that arrived.
-        heard_at_ns: when the last one arrived, by the robot's monotonic clock.
+        received_at_ns: when the last one arrived, by the robot's monotonic clock.
     """
 
-    heard: int = 0
+    received: int = 0
     missed: int = 0
-    heard_at_ns: int = 0
+    received_at_ns: int = 0
     newest: int = -1  # highest number that the sender had used
     newest_utc_ns: int = 0  # when it sent that, by its own clock
 
-    def add(self, sequence: int, sent_utc_ns: int, heard_at_ns: int) -> None:
+    def add(self, sequence: int, sent_utc_ns: int, received_at_ns: int) -> None:
         """A packet arrived. One that was overtaken fills its gap; a sender that began anew counts from 0 again."""
-        first = self.heard == 0
-        self.heard += 1
-        self.heard_at_ns = heard_at_ns
+        first = self.received == 0
+        self.received += 1
+        self.received_at_ns = received_at_ns
         if sequence > self.newest:
             self.missed += 0 if first else sequence - self.newest - 1
         elif sent_utc_ns <= self.newest_utc_ns:
@@ -131,7 +131,7 @@ class Link:
     @property
     def delivery(self) -> float:
         """Share of packets that arrived, 0 to 1, since the first one did; NaN before it."""
-        return self.heard / (self.heard + self.missed) if self.heard else float("nan")
+        return self.received / (self.received + self.missed) if self.received else float("nan")
 
 
 # --- How far a sender is, and in which direction, from two poses that a tracker saw.
@@ -164,7 +164,7 @@ class ZenohRadio:
     """The radio of the robot `own` of the swarm `robots`.
 
     Attributes:
-        links: from each sender that was heard, by its index; for whoever asks how the network is.
+        links: from each sender that was received, by its index; for whoever asks how the network is.
     """
 
     def __init__(
@@ -206,28 +206,28 @@ class ZenohRadio:
             self._keys.any_radio, Callback(self._arrive, indirect=False), allowed_origin=zenoh.Locality.REMOTE
         )
 
-    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         """What arrived for the robot since the last call, each with its time and, with a tracker, range and bearing."""
         packets = [packet for arrival in self._inbox.take() if (packet := self._checked(arrival)) is not None]
         if not packets:
-            return Heard.none(self.gives), NO_OUTCOMES
+            return ReceivedPackets.none(self.gives), NO_OUTCOMES
         packets.sort(key=_promised_order)
         given = [(packet, where) for packet in packets if (where := self._given(packet)) is not None]
         started_ns = self._clock.now_ns() - now_ns
         index = np.arange(len(given))
         columns = np.array([where for _, where in given], np.float64).reshape(len(given), 2).T
-        heard = Heard(
+        received = ReceivedPackets(
             receiver=np.full(len(given), self._row),
             sender=np.array([packet.sender for packet, _ in given], np.int64),
             sequence=np.array([packet.header.sequence for packet, _ in given], np.int64),
-            heard_at_ns=np.array([packet.at_ns - started_ns for packet, _ in given], np.int64),
+            received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in given], np.int64),
             given={name: np.ascontiguousarray(column) for name, column in zip(self.gives, columns, strict=False)},
             payload=index,
             payloads=Payloads.of([packet.message for packet, _ in given]),
         )
-        return heard, NO_OUTCOMES
+        return received, NO_OUTCOMES
 
-    def send(self, sent: Sent) -> None:
+    def send(self, sent: SentPackets) -> None:
         """Put each packet into the network; too large ones and those for nobody are numbered, as in emulation."""
         for at, (to, tag, size_bytes) in enumerate(
             zip(sent.to.tolist(), sent.payloads.tags().tolist(), sent.payloads.sizes.tolist(), strict=True)
@@ -244,7 +244,7 @@ class ZenohRadio:
                 self._log.sent(SentPacket(utc_ns, sequence, to, size_bytes, tag, SENT))
 
     def counts(self) -> dict[str, int]:
-        """What was sent, heard and lost on the way, by name, where there is any."""
+        """What was sent, received and lost on the way, by name, where there is any."""
         counted = Counter(self._counted)
         counted["packets_oversized"] += self._far_too_large
         counted["packets_dropped"] += self._inbox.dropped
@@ -288,8 +288,8 @@ class ZenohRadio:
         if not given:
             self._counted["packets_without_pose" if mine else "packets_overheard"] += 1
         else:
-            self._counted["packets_heard"] += 1
-        heard = HeardPacket(
+            self._counted["packets_received"] += 1
+        received = ReceivedPacket(
             utc_ns=packet.utc_ns,
             sender=packet.sender,
             sequence=packet.header.sequence,
@@ -300,7 +300,7 @@ class ZenohRadio:
             distance_m=where[0] if where else None,
             given=given,
         )
-        self._log.heard(heard)
+        self._log.received(received)
         return (where or (NOWHERE, NOWHERE)) if given else None
 
     def _where(self, sender: int) -> tuple[float, float] | None:

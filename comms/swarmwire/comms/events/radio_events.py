@@ -51,7 +51,7 @@ class Blackout(LastingEvent):
 class Gain(LastingEvent):
     """The antennas of robots gain or lose, for what they send and what they hear each for itself; gains add up.
 
-    A robot whose `receive_db` alone has fallen is heard as before, but hears less: links differ by their direction.
+    A robot whose `receive_db` alone has fallen is received as before, but hears less: links differ by their direction.
     """
 
     do: str = parameter("gain", help="antennas send or hear better or worse", choices=("gain",))

@@ -12,14 +12,14 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.transmissions import Transmissions
 
 THE_REST = -1
-HEARD, OUT_OF_RANGE = int(Fate.HEARD), int(Fate.OUT_OF_RANGE)
+RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
 
 class Links(NamedTuple):
     """A row per packet and receiver that it might reach, and one row per packet for the rest of its intended receivers.
 
     That last row (receiver THE_REST) only counts: out of range by subtraction, or the fate that the sender's radio gave
-    to all. Stages never see it. Fate HEARD means, until the chain has ended, "nothing has stopped it so far".
+    to all. Stages never see it. Fate RECEIVED means, until the chain has ended, "nothing has stopped it so far".
     """
 
     packet: IntArray  # (k,) row in the table of transmissions
@@ -45,7 +45,7 @@ class Links(NamedTuple):
     ) -> "Links":
         """Links that nothing has stopped so far, as the first stage gets them."""
         k = len(packet)
-        one, zero = np.ones(k, np.int64), np.full(k, HEARD, np.int64)
+        one, zero = np.ones(k, np.int64), np.full(k, RECEIVED, np.int64)
         given, rssi_dbm = np.zeros((k, columns)), np.full(k, np.nan)
         return cls(packet, sender, receiver, sequence, one, one.copy(), zero, final_at_ns, rssi_dbm, given)
 
@@ -96,10 +96,10 @@ def _with_the_rest(packet, receiver, sender, sequence, off_air_at_ns, intended, 
         p = packet[row]
         others[p] -= 1
         table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], receiver[row], sequence[p]
-        table[4, row], table[5, row], table[6, row], table[7, row] = 1, 1, HEARD, off_air_at_ns[p]
+        table[4, row], table[5, row], table[6, row], table[7, row] = 1, 1, RECEIVED, off_air_at_ns[p]
     for p in range(packets):
         row = links + p
         table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], THE_REST, sequence[p]
         table[4, row], table[5, row], table[7, row] = others[p], in_range[p], off_air_at_ns[p]
-        table[6, row] = OUT_OF_RANGE if fate[p] == HEARD else fate[p]
+        table[6, row] = OUT_OF_RANGE if fate[p] == RECEIVED else fate[p]
     return table

@@ -1,4 +1,4 @@
-"""Kept order: packets of a link are heard in the order in which they went on air, whatever their delays.
+"""Kept order: packets of a link are received in the order in which they went on air, whatever their delays.
 
 What counts of the past are receptions that are still to come: they are all among the links that the air keeps, so
 that there is no state beside these. A reception that an event has ended holds up nothing.
@@ -11,13 +11,13 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, Fate, Heard, Outcomes, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, Fate, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.counters import Accounts, Lives
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import HEARD, THE_REST, Links
+from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.model import Way
 from swarmwire.comms.radio.phy.model import SignalWay
 from swarmwire.comms.radio.send_times import SendTimes
@@ -33,10 +33,10 @@ def wait_for_earlier(links: Links, first: int, rows: int) -> None:
 
     `rows` are the robots of all arenas. Those before `first` have waited already, and are not changed.
     """
-    heard = np.flatnonzero((links.fate == HEARD) & (links.receiver != THE_REST))
-    link = links.sender[heard] * rows + links.receiver[heard]
+    received = np.flatnonzero((links.fate == RECEIVED) & (links.receiver != THE_REST))
+    link = links.sender[received] * rows + links.receiver[received]
     # A sender's packets have their numbers in the order in which they go on air.
-    order = heard[np.lexsort((links.sequence[heard], link))]
+    order = received[np.lexsort((links.sequence[received], link))]
     _wait(links.sender, links.receiver, links.final_at_ns, order, first)
 
 
@@ -48,7 +48,8 @@ def _wait(sender, receiver, final_at_ns, order, first):
             final_at_ns[now] = max(final_at_ns[now], final_at_ns[before])
 
 
-# --- The air as a state machine: packets and poses go in, time passes, and what was heard comes out. No I/O, no clock.
+# --- The air as a state machine: packets and poses go in, time passes, and what was received comes out. No I/O, no
+# clock.
 
 
 PARTS = 8  # of what is told within a tick that are kept before they are put together
@@ -60,10 +61,10 @@ class Air:
     `radio` is what it goes by at the moment.
 
     A packet waits in its sender's queue, goes on air, and ends at each intended receiver in one fate. Tick k starts
-    with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick is heard
-    in the next at the earliest, and geometry is that of the tick in which the packet goes on air.
+    with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick is
+    received in the next at the earliest, and geometry is that of the tick in which the packet goes on air.
 
-    A fate is final when the reception ends: HEARD at `on_air_at + airtime + latency + jitter`, every other fate of a
+    A fate is final when the reception ends: RECEIVED at `on_air_at + airtime + latency + jitter`, every other fate of a
     packet on air at `on_air_at + airtime`, a fate at the sender's radio at `sent_at`.
 
     Events change who is alive and what is off or apart at the start of a tick (`disrupt`, before `advance`). What went
@@ -118,7 +119,10 @@ class Air:
         self._within: list[results.Final] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
         self._links = self._no_links = Links.none(len(radio.gives.columns))
-        nothing = Heard.none(radio.gives.columns), *results.nothing_final(self._links, self._on_air, radio.is_signal)
+        nothing = (
+            ReceivedPackets.none(radio.gives.columns),
+            *results.nothing_final(self._links, self._on_air, radio.is_signal),
+        )
         self._nothing = results.Final(*nothing, NO_OUTCOMES)
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
@@ -148,7 +152,7 @@ class Air:
         """
         self._coming_radio = radio
 
-    def send(self, at_ns: int, tick: int, sent: Sent) -> None:
+    def send(self, at_ns: int, tick: int, sent: SentPackets) -> None:
         """Queue the packets that agents sent in the tick that started at `at_ns`; `hold` has told the tick's poses.
 
         A broadcast intends every other robot of the arena that is alive now; an addressed packet its one receiver, and
@@ -164,7 +168,7 @@ class Air:
         """When each robot hands over what it sends in a tick that starts at `start_ns`, in ns, (rows,)."""
         return self._send_times.at(start_ns, tick)
 
-    def send_at(self, sent_at_ns: IntArray, sent: Sent) -> None:
+    def send_at(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         """Queue packets within a tick; `sent_at_ns` (rows,) is when each robot hands its own over.
 
         The rest is as for `send`.
@@ -184,9 +188,9 @@ class Air:
             self._cut_off(until_ns)
         told = results.joined([*self._within, self._final(until_ns)])
         self._within = []
-        return results.News(told.heard, told.finished, told.departed, self._accounts.close(), told.outcomes)
+        return results.News(told.received, told.finished, told.departed, self._accounts.close(), told.outcomes)
 
-    def advance_within(self, until_ns: int) -> tuple[Heard, Outcomes]:
+    def advance_within(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing.
 
         What became final is told again with all of the tick by the next `advance`.
@@ -197,7 +201,7 @@ class Air:
             self._within.append(told)
             if len(self._within) == PARTS:  # now, and not in the one moment in which the next tick waits for them
                 self._within = [results.joined(self._within)]
-        return told.heard, told.outcomes
+        return told.received, told.outcomes
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
@@ -226,7 +230,7 @@ class Air:
         """
         return self._way.edges(pose, alive)
 
-    def _accept(self, sent_at_ns: IntArray, sent: Sent) -> None:
+    def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         packets = self._way.accept(sent_at_ns, sent, self._others_alive, self._lives.epoch)
         self._accounts.take_up(packets)
 
@@ -245,7 +249,7 @@ class Air:
             return self._nothing._replace(outcomes=self._way.outcomes(self._coming.alive & ~self._gone))
         self._accounts.settle(links, until_ns)
         told = results.Final(
-            results.heard(rows.heard, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
+            results.received(rows.received, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
             results.finished(rows.finished, links, packets, robots, self.radio.is_signal),
             results.departed(rows.departed, links, packets, robots),
             self._way.outcomes(self._coming.alive & ~self._gone),
@@ -253,7 +257,7 @@ class Air:
         self._keep(rows.open)
         return told
 
-    def _refuse(self, at_ns: int, sent: Sent) -> None:
+    def _refuse(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
         addressed = (sent.to != BROADCAST) & (sent.to != NOWHERE)
@@ -264,7 +268,7 @@ class Air:
     def _cut_off(self, now_ns: int) -> None:
         """End receptions of robots that are dead now, and those still going on at radios that are off now."""
         links, now = self._links, self._coming
-        open_ = (links.fate == HEARD) & (links.receiver != THE_REST)
+        open_ = (links.fate == RECEIVED) & (links.receiver != THE_REST)
         links.fate[open_ & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[open_ & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
 

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
 from swarmwire.comms.radio.disruption import Disruption
@@ -34,7 +34,7 @@ class Way(ABC):
         """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
 
     @abstractmethod
-    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets that robots hand over at `sent_at_ns` (rows,); they as the radios take them up.
 
         `others_alive` (rows,) are whom a broadcast intends.

@@ -1,4 +1,4 @@
-"""The order in which robots get what they heard.
+"""The order in which robots get what they received.
 
 Rows are indexed by unsigned numbers throughout: of signed ones compiled code asks each time whether they count from
 the end, which takes three times as long.
@@ -13,24 +13,24 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.packets import Heard, Outcomes
-from swarmwire.comms.radio.links import HEARD, OUT_OF_RANGE, THE_REST, Links
+from swarmwire.comms.packets import Outcomes, ReceivedPackets
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import Departed, Finished, Tally
 
 
 @njit(cache=True)
-def by_receiver(index: IntArray, receiver: IntArray, heard_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
-    """The rows of `index` (k,), at least one, by (receiver, heard_at, sender), ties as they stand, (k,)."""
+def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
+    """The rows of `index` (k,), at least one, by (receiver, received_at, sender), ties as they stand, (k,)."""
     order = index.view(np.uint64)
     for k in range(1, len(order)):
         if sender[order[k]] < sender[order[k - 1]]:  # seldom: packets of a tick stand by sender
             order = _counting_sort(order, sender, rows)
             break
     # Roughly by time, then by receiver: next to nothing is left to move.
-    order = _counting_sort(order, *_parts_of_time(order, heard_at_ns))
+    order = _counting_sort(order, *_parts_of_time(order, received_at_ns))
     order = _counting_sort(order, receiver, rows)
-    _insertion_sort(order, receiver, heard_at_ns)
+    _insertion_sort(order, receiver, received_at_ns)
     return order.view(np.int64)
 
 
@@ -77,14 +77,14 @@ def _insertion_sort(order, receiver, at_ns):
         order[place] = moved
 
 
-# --- What the air tells after time has passed: packets heard, and links whose fate became final.
+# --- What the air tells after time has passed: packets received, and links whose fate became final.
 
 
 @dataclass(frozen=True, slots=True)
 class News:
     """What became final while time passed."""
 
-    heard: Heard
+    received: ReceivedPackets
     finished: Finished
     departed: Departed
     tally: Tally
@@ -94,7 +94,7 @@ class News:
 class Final(NamedTuple):
     """What became final in a part of a tick."""
 
-    heard: Heard
+    received: ReceivedPackets
     finished: Finished
     departed: Departed
     outcomes: Outcomes
@@ -106,23 +106,28 @@ class Final(NamedTuple):
 
     def of(self, arenas: BoolArray, robots: int) -> "Final":
         """What concerns these arenas (arenas,) of so many robots each."""
-        heard = self.heard.select(np.flatnonzero(arenas[self.heard.receiver // robots])).compacted()
+        received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         outcomes = self.outcomes.select(np.flatnonzero(arenas[self.outcomes.row // robots]))
-        return Final(heard, self.finished.of(arenas), self.departed.of(arenas), outcomes)
+        return Final(received, self.finished.of(arenas), self.departed.of(arenas), outcomes)
 
 
 def joined(parts: list[Final]) -> Final:
     """What became final in all parts, one or more."""
     if len(parts) == 1:
         return parts[0]
-    heard, finished, departed, outcomes = (list(of) for of in zip(*parts, strict=True))
-    return Final(Heard.joined(heard), Finished.joined(finished), Departed.joined(departed), Outcomes.joined(outcomes))
+    received, finished, departed, outcomes = (list(of) for of in zip(*parts, strict=True))
+    return Final(
+        ReceivedPackets.joined(received),
+        Finished.joined(finished),
+        Departed.joined(departed),
+        Outcomes.joined(outcomes),
+    )
 
 
 class Parted(NamedTuple):
     """Rows of links by what is to be told of them, rising; one may be in several."""
 
-    heard: IntArray
+    received: IntArray
     finished: IntArray  # final, but for receivers out of range
     departed: IntArray  # final, of packets that left their sender's radio: each has one row for the rest
     open: IntArray  # not final yet
@@ -132,33 +137,33 @@ class Parted(NamedTuple):
 def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int) -> Parted:
     """The rows of links of which something is final by `until_ns`, and the others."""
     k = len(fate)
-    heard, finished = np.empty(k, np.int64), np.empty(k, np.int64)
+    received, finished = np.empty(k, np.int64), np.empty(k, np.int64)
     departed, still_open = np.empty(k, np.int64), np.empty(k, np.int64)
     h, f, d, o = 0, 0, 0, 0
     for row in range(k):
         # Written first and kept if it counts, so that there is no branch to guess.
-        heard[h], finished[f], departed[d], still_open[o] = row, row, row, row
+        received[h], finished[f], departed[d], still_open[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
-        h += final & (fate[row] == HEARD)
+        h += final & (fate[row] == RECEIVED)
         f += final & (fate[row] != OUT_OF_RANGE)
         d += final & (receiver[row] == THE_REST)
         o += not final
-    return Parted(heard[:h], finished[:f], departed[:d], still_open[:o])
+    return Parted(received[:h], finished[:f], departed[:d], still_open[:o])
 
 
-def heard(
+def received(
     index: IntArray, links: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int
-) -> Heard:
-    """The links `index` were heard; sorted by (receiver, heard_at, sender, sequence)."""
+) -> ReceivedPackets:
+    """The links `index` were received; sorted by (receiver, received_at, sender, sequence)."""
     if not len(index):
-        return Heard.none(gives)
+        return ReceivedPackets.none(gives)
     index = by_receiver(index, links.receiver, links.final_at_ns, links.sender, rows)
     kept, payload = compacted(links.packet.take(index), len(packets.sender))
-    return Heard(
+    return ReceivedPackets(
         receiver=links.receiver.take(index),
         sender=in_arena(links.sender.take(index), robots),
         sequence=links.sequence.take(index),
-        heard_at_ns=links.final_at_ns.take(index),
+        received_at_ns=links.final_at_ns.take(index),
         given={name: links.given[:, column].take(index) for column, name in enumerate(gives)},
         payload=payload,
         payloads=packets.payloads.rows(kept),

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, Payloads, SentPackets
 
 
 class Transmissions(NamedTuple):
@@ -26,7 +26,7 @@ class Transmissions(NamedTuple):
     sent_at_ns: IntArray  # (k,) handed to the sender's radio
     on_air_at_ns: IntArray  # (k,) the first bit
     off_air_at_ns: IntArray  # (k,) the end of the last bit
-    fate: IntArray  # (k,) HEARD: accepted, to be decided for each receiver; else the fate for all of them
+    fate: IntArray  # (k,) RECEIVED: accepted, to be decided for each receiver; else the fate for all of them
     outcome_id: IntArray  # (k,) under which the sender is told what became of it, or UNTOLD
     payloads: Payloads  # (k,)
 
@@ -80,7 +80,7 @@ class Intake:
     def __init__(self, rows: int) -> None:
         self._sent_before = np.zeros(rows, np.int64)
 
-    def take(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def take(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets, sorted by sender, as if each were on air at once, for no time; those to NOWHERE only count.
 
         `sent_at_ns` (rows,) is when each robot sends, `others_alive` (rows,) whom a robot's broadcast intends: those of
@@ -103,7 +103,7 @@ class Intake:
             sent_at_ns=sent_at_ns[sender],
             on_air_at_ns=sent_at_ns[sender],
             off_air_at_ns=sent_at_ns[sender],
-            fate=np.full(len(sender), int(Fate.HEARD)),
+            fate=np.full(len(sender), int(Fate.RECEIVED)),
             outcome_id=sent.outcome_ids.copy(),
             payloads=sent.payloads,
         )

@@ -8,8 +8,8 @@ A rule holds only if its keys include the whole key of a message: a subscription
 these, not for one of them. And whoever may not subscribe at a peer never learns that, nor is sent anything by it.
 
     robot R     puts radio/R/*, air/R/sent; is alive/R; answers control/R; asks air/R/join;
-                hears radio, poses and air/R/heard
-    tracker     puts pose/*, air/*/heard; answers air/*/join; hears radio and air/*/sent
+                hears radio, poses and air/R/received
+    tracker     puts pose/*, air/*/received; answers air/*/join; hears radio and air/*/sent
     operator    asks control/*; hears radio and poses
     a name that is revoked, another name, no certificate: nothing
 
@@ -76,14 +76,14 @@ def _of_robot(keys: SwarmKeys, robot: str) -> list[Right]:
         (["liveliness_token"], [keys.alive(robot)]),
         (["declare_queryable", "reply"], [keys.control(robot)]),
         (["query"], [keys.air_join(robot)]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.air_heard(robot)]),
+        (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.air_received(robot)]),
         _sees_who_lives(keys),
     ]
 
 
 def _of_tracker(keys: SwarmKeys) -> list[Right]:
     return [
-        (["put"], [keys.any_pose, keys.air_heard("*")]),
+        (["put"], [keys.any_pose, keys.air_received("*")]),
         (["declare_queryable", "reply"], [keys.any_air_join]),
         (["declare_subscriber"], [keys.any_radio, keys.any_air_sent]),
         _sees_who_lives(keys),

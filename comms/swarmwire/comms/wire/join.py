@@ -28,12 +28,13 @@ class Limits:
         waiting: answers and requests of one runner that wait for the world. In lockstep one is there at a time, in
             real time a few; a runner that sends more is ahead of anything that it was asked.
         waiting_bytes: of these together; one is taken, however large.
-        flood: that may be dropped of one runner; then it is lost, and heard no more in this run. Even to drop a message
+        flood: that may be dropped of one runner; then it is lost, and received no more in this run. Even to drop a
+        message
             costs the world some 5 us, so that one that never stops would take a core.
         requests: to be told of the run, or to join it, that one runner may make in one run. A runner that comes back
             each minute for a day stays below.
         names: of runners that ask for something or send too much, in one run, each of which is remembered; beyond them
-            nobody new is heard. A runner that comes back under a new name each minute stays below for a month.
+            nobody new is received. A runner that comes back under a new name each minute stays below for a month.
         join_s: from the assignment of robots to the word that their agents are built.
     """
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import Heard, Outcomes
+from swarmwire.comms.packets import Outcomes, ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import MAX_BYTES, VERSION
@@ -28,7 +28,7 @@ class AirTerms:
     robots: tuple[str, ...]  # all robots of its arena, by index
     rate_hz: int  # ticks of the world per second
     max_payload_bytes: int
-    gives: tuple[str, ...]  # columns of `Heard.given`
+    gives: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # what of an agent's needs it meets
 
     def encode(self) -> bytes:
@@ -61,22 +61,22 @@ MAX_RADIO_FRAME_BYTES = 2**20  # of a frame, either way
 LAST_NS = 2**62  # no run comes so far; later times do not fit those that are told with packets
 
 
-def encode_air(tick: int, row: int, heard: Heard, outcomes: Outcomes) -> bytes:
-    """The frame to the robot of this row: what it heard, and what became of its packets."""
-    return encode_tick(tick, {GROUP: GroupSenses(np.array([row]), {})}, heard, outcomes)
+def encode_air(tick: int, row: int, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+    """The frame to the robot of this row: what it received, and what became of its packets."""
+    return encode_tick(tick, {GROUP: GroupSenses(np.array([row]), {})}, received, outcomes)
 
 
-def decode_air(data: bytes, terms: AirTerms) -> tuple[int, Heard, Outcomes]:
+def decode_air(data: bytes, terms: AirTerms) -> tuple[int, ReceivedPackets, Outcomes]:
     """The tick and what `encode_air` was given; BadFrame if the frame is none, contradicts itself or is for another."""
     frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
     if frame.kind != "tick" or not 0 <= tick_start_ns(frame.tick, terms.rate_hz) < LAST_NS:
         raise BadFrame("malformed", f"{frame.kind} {frame.tick}, expected a tick")
-    _, heard, outcomes = decode_tick(frame, terms.gives, {GROUP})
-    if ((heard.sender < 0) | (heard.sender >= len(terms.robots)) | (heard.receiver != terms.row)).any():
-        raise BadFrame("malformed", "heard/numbers: expected packets of the robot's arena to itself")
+    _, received, outcomes = decode_tick(frame, terms.gives, {GROUP})
+    if ((received.sender < 0) | (received.sender >= len(terms.robots)) | (received.receiver != terms.row)).any():
+        raise BadFrame("malformed", "received/numbers: expected packets of the robot's arena to itself")
     if (outcomes.row != terms.row).any():
         raise BadFrame("malformed", "outcomes: expected the robot's own")
-    return frame.tick, heard, outcomes
+    return frame.tick, received, outcomes
 
 
 # --- An inbox between the network's thread and a loop: it holds so much, and counts what it had no room for.

@@ -54,9 +54,9 @@ class SwarmKeys:
         """From a robot with `--radio air` to the world's air: `actions` frames, of which the packets count."""
         return f"{self.root}/air/{robot}/sent"
 
-    def air_heard(self, robot: str) -> str:
-        """From the world's air to that robot, a `tick` frame for each tick in which it heard something."""
-        return f"{self.root}/air/{robot}/heard"
+    def air_received(self, robot: str) -> str:
+        """From the world's air to that robot, a `tick` frame for each tick in which it received something."""
+        return f"{self.root}/air/{robot}/received"
 
 
 # --- zenoh sessions of the robots' network: peers that link with all that they list, or find by multicast.

@@ -1,4 +1,4 @@
-"""What a tick carries across the wire: senses and heard packets to a runner, actions back; checked on arrival."""
+"""What a tick carries across the wire: senses and received packets to a runner, actions back; checked on arrival."""
 
 from collections.abc import Mapping, Set
 from types import MappingProxyType
@@ -9,7 +9,16 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_OUTCOMES,
+    UNTOLD,
+    Outcomes,
+    Payloads,
+    ReceivedPackets,
+    SendResult,
+    SentPackets,
+)
 from swarmwire.comms.tick_io import (
     MAX_STATES,
     NO_ACTUATIONS,
@@ -31,35 +40,35 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
 
-def encode_tick(tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> bytes:
-    """A `tick` frame: what a runner's robots sense and heard, and what became of packets that they sent."""
+def encode_tick(tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+    """A `tick` frame: what a runner's robots sense and received, and what became of packets that they sent."""
     arrays: dict[str, AnyArray] = {}
     for name, group in senses.items():
         arrays[f"sense/{name}/rows"] = group.rows
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
-    return frames.encode("tick", tick, arrays | told_arrays(heard, outcomes))
+    return frames.encode("tick", tick, arrays | told_arrays(received, outcomes))
 
 
-def told_arrays(heard: Heard, outcomes: Outcomes) -> dict[str, AnyArray]:
-    """What was heard, and what became of packets, as the arrays of a frame."""
+def told_arrays(received: ReceivedPackets, outcomes: Outcomes) -> dict[str, AnyArray]:
+    """What was received, and what became of packets, as the arrays of a frame."""
     arrays: dict[str, AnyArray] = {}
-    if len(heard):
+    if len(received):
         # A row per column, so that each is contiguous again on the other side.
-        numbers = (heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, heard.payload)
-        arrays["heard/numbers"] = np.array(numbers)
-        arrays["heard/given"] = np.array(list(heard.given.values())).reshape(len(heard.given), len(heard))
-        arrays["heard/data"] = heard.payloads.data
-        arrays["heard/offset"] = heard.payloads.offset
+        numbers = (received.receiver, received.sender, received.sequence, received.received_at_ns, received.payload)
+        arrays["received/numbers"] = np.array(numbers)
+        arrays["received/given"] = np.array(list(received.given.values())).reshape(len(received.given), len(received))
+        arrays["received/data"] = received.payloads.data
+        arrays["received/offset"] = received.payloads.offset
     if len(outcomes):
         arrays["outcomes"] = np.array((outcomes.row, outcomes.id, outcomes.result))
     return arrays
 
 
-def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, Heard, Outcomes]:
+def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, ReceivedPackets, Outcomes]:
     """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known.
 
-    Whose senses they are, and who heard, `check_rows` tells.
+    Whose senses they are, and who received, `check_rows` tells.
     """
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
@@ -75,8 +84,8 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
-def check_rows(senses: Senses, heard: Heard, rows: Mapping[str, IntArray]) -> None:
-    """BadFrame unless senses are numbers of robots among the `rows` of their group, and who heard may be one of all."""
+def check_rows(senses: Senses, received: ReceivedPackets, rows: Mapping[str, IntArray]) -> None:
+    """BadFrame unless senses are numbers of robots among the `rows` of their group, and receivers are robots of any."""
     for name, group in senses.items():
         own, n = group.rows, len(group.rows)
         if own.ndim != 1 or own.dtype != np.int64 or np.count_nonzero(own[1:] <= own[:-1]) or not _own(own, rows[name]):
@@ -84,29 +93,29 @@ def check_rows(senses: Senses, heard: Heard, rows: Mapping[str, IntArray]) -> No
         for sense, column in group.fields.items():
             if column.dtype != np.float64 or len(column) != n:
                 raise BadFrame("malformed", f"sense/{name}/{sense}: expected numbers of {n} robots")
-    if len(heard):
+    if len(received):
         last = max(int(of[-1]) for of in rows.values() if len(of))
-        if heard.receiver[0] < 0 or heard.receiver[-1] > last:
-            raise BadFrame("malformed", "heard/numbers: expected packets of robots of this runner")
+        if received.receiver[0] < 0 or received.receiver[-1] > last:
+            raise BadFrame("malformed", "received/numbers: expected packets of robots of this runner")
 
 
-def told_of(frame: Frame, gives: tuple[str, ...]) -> tuple[Heard, Outcomes]:
+def told_of(frame: Frame, gives: tuple[str, ...]) -> tuple[ReceivedPackets, Outcomes]:
     """What `told_arrays` was given; KeyError, ValueError or BadFrame if the frame does not hold it."""
-    return _heard(frame, gives), _outcomes(frame)
+    return _received(frame, gives), _outcomes(frame)
 
 
-def _heard(frame: Frame, gives: tuple[str, ...]) -> Heard:
-    if "heard/numbers" not in frame.arrays:
-        return Heard.none(gives)
-    numbers = checked_array(frame, "heard/numbers", "<i8", (5, None))
-    receiver, sender, sequence, heard_at_ns, payload = numbers
-    given = dict(zip(gives, checked_array(frame, "heard/given", "<f8", (len(gives), numbers.shape[1])), strict=True))
-    data, offset = checked_array(frame, "heard/data", "|u1", (None,)), frame.arrays["heard/offset"]
+def _received(frame: Frame, gives: tuple[str, ...]) -> ReceivedPackets:
+    if "received/numbers" not in frame.arrays:
+        return ReceivedPackets.none(gives)
+    numbers = checked_array(frame, "received/numbers", "<i8", (5, None))
+    receiver, sender, sequence, received_at_ns, payload = numbers
+    given = dict(zip(gives, checked_array(frame, "received/given", "<f8", (len(gives), numbers.shape[1])), strict=True))
+    data, offset = checked_array(frame, "received/data", "|u1", (None,)), frame.arrays["received/offset"]
     if not _rises_to(offset, len(data)):
-        raise BadFrame("malformed", "heard/offset: expected rising offsets into heard/data")
+        raise BadFrame("malformed", "received/offset: expected rising offsets into received/data")
     if np.count_nonzero((payload < 0) | (payload >= len(offset) - 1)) or np.count_nonzero(receiver[1:] < receiver[:-1]):
-        raise BadFrame("malformed", "heard/numbers: expected payloads that are there, by rising receivers")
-    return Heard(receiver, sender, sequence, heard_at_ns, given, payload, Payloads(data, offset))
+        raise BadFrame("malformed", "received/numbers: expected payloads that are there, by rising receivers")
+    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, Payloads(data, offset))
 
 
 def _rises_to(offset: AnyArray, end: int) -> bool:
@@ -160,7 +169,7 @@ def encode_actions(
     return frames.encode("actions", tick, arrays, values)
 
 
-def sent_arrays(sent: Sent) -> dict[str, AnyArray]:
+def sent_arrays(sent: SentPackets) -> dict[str, AnyArray]:
     """Packets as the arrays of a frame."""
     arrays: dict[str, AnyArray] = {
         "sent": np.array((sent.sender, sent.to)),
@@ -176,7 +185,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     if checked_array(frame, "rows", "<i8", (n,)).tobytes() != rows.tobytes():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
-    sent = sent_of(frame, rows) if "sent" in frame.arrays else Sent.none()
+    sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
     own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
@@ -184,7 +193,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
 
 
-def sent_of(frame: Frame, rows: IntArray) -> Sent:
+def sent_of(frame: Frame, rows: IntArray) -> SentPackets:
     """What `sent_arrays` was given; BadFrame unless it is of robots `rows` and does not contradict itself."""
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
@@ -193,7 +202,7 @@ def sent_of(frame: Frame, rows: IntArray) -> Sent:
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     if not _own(sender, rows) or np.count_nonzero(to < BROADCAST):
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
-    return Sent(sender, to, Payloads(data, offset), _outcome_id(frame, to))
+    return SentPackets(sender, to, Payloads(data, offset), _outcome_id(frame, to))
 
 
 def _outcome_id(frame: Frame, to: IntArray) -> IntArray | None:
@@ -257,15 +266,15 @@ def _own(some: IntArray, rows: IntArray) -> bool:
 # --- What crosses the wire in the middle of a tick, in real time with a quantum: packets to a runner, packets back.
 
 
-def encode_packets(tick: int, at_ns: int, number: int, heard: Heard, outcomes: Outcomes) -> bytes:
-    """A `packets` frame: what a runner's robots heard since the last, and learned of their own packets.
+def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+    """A `packets` frame: what a runner's robots received since the last, and learned of their own packets.
 
     It is handed over at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
     """
-    return frames.encode("packets", tick, told_arrays(heard, outcomes), {"at_ns": at_ns, "number": number})
+    return frames.encode("packets", tick, told_arrays(received, outcomes), {"at_ns": at_ns, "number": number})
 
 
-def decode_packets(frame: Frame, gives: tuple[str, ...]) -> tuple[int, int, Heard, Outcomes]:
+def decode_packets(frame: Frame, gives: tuple[str, ...]) -> tuple[int, int, ReceivedPackets, Outcomes]:
     """Time, number and what else `encode_packets` was given; BadFrame if the frame does not hold it."""
     at_ns, number = frame.values.get("at_ns"), frame.values.get("number")
     if type(at_ns) is not int or type(number) is not int:
@@ -276,12 +285,12 @@ def decode_packets(frame: Frame, gives: tuple[str, ...]) -> tuple[int, int, Hear
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
-def encode_sent(tick: int, sent: Sent, missed: int = 0) -> bytes:
+def encode_sent(tick: int, sent: SentPackets, missed: int = 0) -> bytes:
     """A `sent` frame: what robots sent between ticks; `missed` counts `packets` frames that never came."""
     return frames.encode("sent", tick, sent_arrays(sent), {"missed": missed} if missed else {})
 
 
-def decode_sent(frame: Frame, rows: IntArray) -> Sent:
+def decode_sent(frame: Frame, rows: IntArray) -> SentPackets:
     """Packets of the robots `rows`; BadFrame if there are none, or some of others."""
     if "sent" not in frame.arrays:
         raise BadFrame("malformed", "expected packets")

@@ -24,7 +24,7 @@ class LocalExecutor:
     def __init__(self, workers: int | None = None) -> None:
         """So many, by default one for each core that this process may use; each starts with its first task."""
         self.slots = workers or usable_cores()
-        self._heard = SimpleQueue[tuple[WorkerProcess, Message | None]]()
+        self._received = SimpleQueue[tuple[WorkerProcess, Message | None]]()
         self._workers: list[WorkerProcess] = []
         self._started = self._false_starts = 0
 
@@ -65,7 +65,7 @@ class LocalExecutor:
         self._workers.clear()
 
     def _start(self) -> WorkerProcess:
-        worker = WorkerProcess(f"local-{self._started}", lambda of, message: self._heard.put((of, message)))
+        worker = WorkerProcess(f"local-{self._started}", lambda of, message: self._received.put((of, message)))
         self._started += 1
         self._workers.append(worker)
         return worker
@@ -91,9 +91,9 @@ class LocalExecutor:
     def _news(self, timeout_s: float) -> Iterator[tuple[WorkerProcess, Message | None]]:
         """All that is there, after waiting for the first."""
         try:
-            yield self._heard.get(timeout=timeout_s)
+            yield self._received.get(timeout=timeout_s)
             while True:
-                yield self._heard.get_nowait()
+                yield self._received.get_nowait()
         except Empty:
             return
 

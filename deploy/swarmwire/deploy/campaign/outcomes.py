@@ -16,7 +16,7 @@ OF_RADIO = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
     "in_range": ("", "of these, receivers in range"),
-    "pdr": ("", "heard / in range"),
+    "pdr": ("", "received / in range"),
 }
 PERCENTILES = ("p50", "p90", "p99")
 LATENCY_HELP = {

@@ -11,11 +11,13 @@ from swarmwire.comms.truth import Static, Tally, Truth
 
 SAY_S = 5.0  # between two words of a worker whose ticks go on
 MAX_S = 300.0  # without one; no tick takes so long, nor does what comes before the first and after the last
-STEP_S = 1.0  # that a look adds at most: who was frozen itself, with its machine or by Ctrl-Z, has heard nothing, too
+STEP_S = (
+    1.0  # that a look adds at most: who was frozen itself, with its machine or by Ctrl-Z, has received nothing, too
+)
 
 
 class Silence:
-    """Adds up the time in which nothing was heard.
+    """Adds up the time in which nothing was received.
 
     Attributes:
         most_s: after which it has lasted too long.
@@ -26,7 +28,7 @@ class Silence:
         self._silent_ns, self._looked_ns = 0, self._clock.now_ns()
 
     def broken(self) -> None:
-        """Something was heard."""
+        """Something was received."""
         self._silent_ns, self._looked_ns = 0, self._clock.now_ns()
 
     def too_long(self) -> bool:

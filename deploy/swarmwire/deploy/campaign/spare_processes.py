@@ -28,8 +28,8 @@ class SpareProcess:
     """A worker process and what it says."""
 
     def __init__(self, name: str) -> None:
-        self._heard = SimpleQueue[Message | None]()
-        self._process = WorkerProcess(name, lambda _, message: self._heard.put(message))
+        self._received = SimpleQueue[Message | None]()
+        self._process = WorkerProcess(name, lambda _, message: self._received.put(message))
         self.end = self._process.end
 
     def done(self, task: Task, wanted: Callable[[], bool]) -> Message:
@@ -40,7 +40,7 @@ class SpareProcess:
         self._process.give(task)
         while wanted():
             try:
-                message = self._heard.get(timeout=POLL_S)
+                message = self._received.get(timeout=POLL_S)
             except Empty:
                 if self._process.silence.too_long():
                     return {"lost": str(self._process.silence)}

@@ -40,7 +40,7 @@ Png = Annotated[
 Gif = Annotated[bool, typer.Option("--gif", help="A film as GIF.")]
 Mp4 = Annotated[bool, typer.Option("--mp4", help="A film as MP4 (H.264).")]
 Pdr = Annotated[
-    bool, typer.Option("--pdr", help="A picture of the radio: the share of receivers that heard, over distance.")
+    bool, typer.Option("--pdr", help="A picture of the radio: the share of receivers that received, over distance.")
 ]
 To = Annotated[
     Path | None,

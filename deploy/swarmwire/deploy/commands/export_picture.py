@@ -25,7 +25,7 @@ def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metri
 
 
 def export_distances(run: Path, to: Path, arena: int, size_px: int) -> None:
-    """Draw the share of receivers that heard, over distance."""
+    """Draw the share of receivers that received, over distance."""
     from swarmwire.metrics.drawing.distance_sheet import draw_distances
     from swarmwire.metrics.run_folder import RunFolder
 

@@ -21,7 +21,7 @@ class Seen:
 
     def __init__(self, static: Static) -> None:
         self._rate_hz = static.rate_hz
-        self._second: deque[tuple[int, int, int]] = deque()  # tick, heard, in range
+        self._second: deque[tuple[int, int, int]] = deque()  # tick, received, in range
         self._every = -(-static.robots // MAX_PLACES)
         self._static = static
         self._who: dict[str, str] = {}
@@ -51,15 +51,15 @@ class Seen:
         return self._who
 
     def _pdr(self, glimpse: Glimpse) -> float | None:
-        """Heard over in range in the last simulated second; None if none was in range."""
+        """Received over in range in the last simulated second; None if none was in range."""
         truth = glimpse.truth
         if truth.tally is not None:
-            heard, in_range = int(truth.tally.fates[:, Fate.HEARD].sum()), int(truth.tally.in_range.sum())
-            self._second.append((truth.tick, heard, in_range))
+            received, in_range = int(truth.tally.fates[:, Fate.RECEIVED].sum()), int(truth.tally.in_range.sum())
+            self._second.append((truth.tick, received, in_range))
         while self._second and self._second[0][0] <= truth.tick - self._rate_hz:
             self._second.popleft()
         reached = sum(in_range for _, _, in_range in self._second)
-        return sum(heard for _, heard, _ in self._second) / reached if reached else None
+        return sum(received for _, received, _ in self._second) / reached if reached else None
 
 
 def whom(event: Happened, static: Static) -> str:

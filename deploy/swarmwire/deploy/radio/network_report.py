@@ -12,10 +12,10 @@ MAX_LINKS = 30  # that are told one by one: the worst
 
 def print_network_fit(fit: NetworkFit, title: str, console: Console) -> None:
     """Parameters with their standard errors, models of loss, links, neighbours, and what may be biased."""
-    received, links = int((~fit.log.lost).sum()), len(fit.links)
+    delivered, links = int((~fit.log.lost).sum()), len(fit.links)
     packets = len(fit.log.lost)
     counts = f"{packets} packet{'s' if packets != 1 else ''} on {links} link{'s' if links != 1 else ''}"
-    console.print(f"{title}: {counts}, {received} received", soft_wrap=True)
+    console.print(f"{title}: {counts}, {delivered} received", soft_wrap=True)
     print_parameters(list(network_rows(fit)), console)
     if isinstance(fit.losses, LossFit):
         print_models(fit.losses, console)
@@ -30,8 +30,8 @@ def _print_links(fit: NetworkFit, console: Console) -> None:
     shown = sorted(fit.links, key=lambda link: link.pdr)[:MAX_LINKS]
     some = f", the worst {len(shown)} of {len(fit.links)}" if len(shown) < len(fit.links) else ""
     table = titled_table(f"delivery by link{some}", header=True)
-    for name in ("from", "to", "packets", "heard", "delivery"):
+    for name in ("from", "to", "packets", "received", "delivery"):
         table.add_column(name, justify="left" if name in {"from", "to"} else "right")
     for link in shown:
-        table.add_row(link.sender, link.receiver, str(link.packets), str(link.heard), f"{link.pdr:.1%}")
+        table.add_row(link.sender, link.receiver, str(link.packets), str(link.received), f"{link.pdr:.1%}")
     console.print(table)

@@ -20,7 +20,7 @@ from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.interfaces import AgentBackend, AirTime, Put, TimedBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
@@ -53,17 +53,19 @@ class RecordedBackend:
         self._ticks = self._missed = 0
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
-        actions = self._backend.act(tick, senses, heard, outcomes)
+        actions = self._backend.act(tick, senses, received, outcomes)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, {})
         return actions
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """The same of a backend that puts packets on the air itself."""
         noted = _Noted(air)
-        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, heard, outcomes, noted)
+        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, received, outcomes, noted)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, _puts_arrays(noted.puts))
         return actions
@@ -184,13 +186,15 @@ class ReplayedBackend:
         self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick, or did."""
         if tick < self._inputs.first_tick:
-            return self._agents.act(tick, senses, heard, outcomes)
+            return self._agents.act(tick, senses, received, outcomes)
         return self._inputs.actions(tick, self._robots)
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):
             air.send(put)
@@ -218,7 +222,7 @@ def _puts_arrays(puts: Sequence[Put]) -> dict[str, AnyArray]:
     if not puts:
         return {}
     rows = [(put.at_ns, AT_ONCE if put.tick is None else put.tick, len(put.sent)) for put in puts]
-    packets = sent_arrays(Sent.joined([put.sent for put in puts]))
+    packets = sent_arrays(SentPackets.joined([put.sent for put in puts]))
     return {WITHIN: np.array(rows).T.copy(), **{f"{WITHIN}{name}": array for name, array in packets.items()}}
 
 

@@ -28,7 +28,7 @@ class Companion(Agent):
         """Called once a tick: listen, look, drive, and tell the others."""
         heading_rad = robot.compass.heading_rad
         x, y = 0.5, 0.0  # the wanted direction, seen from the robot: x is ahead, y to the left
-        for packet in robot.radio.heard(Hello):  # what got through since the last step, and no more
+        for packet in robot.radio.received(Hello):  # what got through since the last step, and no more
             turn_rad = packet.message.heading_rad - heading_rad
             x += math.cos(turn_rad)
             y += math.sin(turn_rad)

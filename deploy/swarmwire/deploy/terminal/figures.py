@@ -41,7 +41,7 @@ class Figures:
         self.fates: IntArray = np.zeros(len(FATE_NAMES), np.int64)
         self.events: deque[str] = deque(maxlen=EVENTS)
         self._in_range = 0
-        self._second: deque[tuple[int, int]] = deque(maxlen=static.rate_hz)  # per tick: heard, in range
+        self._second: deque[tuple[int, int]] = deque(maxlen=static.rate_hz)  # per tick: received, in range
         self._history: deque[list[float]] = deque(maxlen=HISTORY_S)
         self._seconds = 0  # values that the history ever held
         self.forget_speed()
@@ -56,7 +56,7 @@ class Figures:
             total, reached = (fates[0], in_range[0]) if len(fates) == 1 else (fates.sum(axis=0), in_range.sum())
             self.fates += total
             self._in_range += int(reached)
-            self._second.append((int(total[Fate.HEARD]), int(reached)))
+            self._second.append((int(total[Fate.RECEIVED]), int(reached)))
         if truth.tick % self.static.rate_hz == 0:
             self._history.append([self.level(name) for name in self.levels])
             self._seconds += 1
@@ -83,13 +83,13 @@ class Figures:
 
     @property
     def pdr(self) -> float:
-        """Heard over in range, of all packets so far; NaN if none was in range."""
-        return _share(int(self.fates[Fate.HEARD]), self._in_range)
+        """Received over in range, of all packets so far; NaN if none was in range."""
+        return _share(int(self.fates[Fate.RECEIVED]), self._in_range)
 
     @property
     def pdr_of_second(self) -> float:
         """The same over the last simulated second."""
-        return _share(sum(heard for heard, _ in self._second), sum(in_range for _, in_range in self._second))
+        return _share(sum(received for received, _ in self._second), sum(in_range for _, in_range in self._second))
 
     def level(self, name: str) -> float:
         """A metric in the last tick; NaN where it has no value."""

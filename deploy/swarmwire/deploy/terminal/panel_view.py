@@ -18,7 +18,7 @@ LABEL, VALUE = 19, 7  # columns
 WIDE = 96  # columns from which a minute gets a character a second
 LEGEND_LINES = 2
 COLORS = {
-    "heard": "green",
+    "received": "green",
     "out_of_range": "bright_black",
     "blocked": "yellow",
     "lost": "red",

@@ -123,7 +123,7 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
         return
     # Who has an obstacle in between is not in range, or a rock in the way would look like a bad radio.
     where = "in range and sight" if radio.fates[BLOCKED] else "in range"
-    share = "" if radio.pdr is None else f"; {radio.pdr:.1%} of these heard it"
+    share = "" if radio.pdr is None else f"; {radio.pdr:.1%} of these received it"
     reached = f"{radio.intended} intended receivers, {radio.in_range} {where}{share}"
     table.add_row("radio", f"{radio.sent} packets, {reached}")
     table.add_row("fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count))

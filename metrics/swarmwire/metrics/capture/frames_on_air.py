@@ -46,7 +46,7 @@ def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
 
 
 def _fates(row: dict[str, Any], names: Sequence[str]) -> list[str]:
-    """A comment per fate: `heard: flock-1 -61.5 dBm, flock-2 -70.1 dBm`."""
+    """A comment per fate: `received: flock-1 -61.5 dBm, flock-2 -70.1 dBm`."""
     of_fate: dict[str, list[str]] = {}
     for receiver, fate, rssi_dbm in zip(row["receiver"], row["fate"], row["rssi_dbm"], strict=True):
         strength = "" if rssi_dbm is None else f" {rssi_dbm:.1f} dBm"

@@ -11,15 +11,15 @@ from swarmwire.metrics.statistics.binomial import binomial_interval
 if TYPE_CHECKING:
     import polars as pl
 
-_BEYOND = 1.5  # of the distance at which the last packet was heard: how far the picture goes
+_BEYOND = 1.5  # of the distance at which the last packet was received: how far the picture goes
 
 
-def heard_bins(table: "pl.DataFrame") -> "pl.DataFrame":
-    """The bins of `radio_distances` up to somewhat beyond the last in which anybody heard."""
+def received_bins(table: "pl.DataFrame") -> "pl.DataFrame":
+    """The bins of `radio_distances` up to somewhat beyond the last in which anybody received."""
     import polars as pl
 
-    heard = table.filter(pl.col("heard") > 0)["to_m"]
-    return table.filter(pl.col("from_m") < _BEYOND * float(heard[-1])) if len(heard) else table
+    received = table.filter(pl.col("received") > 0)["to_m"]
+    return table.filter(pl.col("from_m") < _BEYOND * float(received[-1])) if len(received) else table
 
 
 def draw_ratio(axes: Any, table: "pl.DataFrame", range_m: float | None) -> None:
@@ -29,7 +29,7 @@ def draw_ratio(axes: Any, table: "pl.DataFrame", range_m: float | None) -> None:
     middle_m = 0.5 * (edges_m[:-1] + edges_m[1:])
     axes.plot(middle_m, pdr, color=CURVE, lw=1.4, marker="o", ms=3)
     known = np.isfinite(pdr)
-    low, high = binomial_interval(table["heard"].to_numpy()[known], table["intended"].to_numpy()[known])
+    low, high = binomial_interval(table["received"].to_numpy()[known], table["intended"].to_numpy()[known])
     axes.vlines(middle_m[known], low, high, color=CURVE, lw=2.6, alpha=0.35)
     axes.set_xlim(0.0, float(edges_m[-1]))
     axes.set_ylim(-0.03, 1.05)

@@ -108,15 +108,15 @@ def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
 
 
 def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
-    """The columns that hold one number a tick, and `delivery`: receivers that heard, of those in range."""
+    """The columns that hold one number a tick, and `delivery`: receivers that received, of those in range."""
     import polars as pl
 
     names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
     found: dict[str, FloatArray] = {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
-    if DELIVERY not in found and {"heard", "in_range"} <= set(frame.columns):
-        heard, in_range = (
+    if DELIVERY not in found and {"received", "in_range"} <= set(frame.columns):
+        received, in_range = (
             frame[name].cast(pl.Float64).rolling_sum(rate_hz, min_samples=1).fill_null(np.nan).to_numpy()
-            for name in ("heard", "in_range")
+            for name in ("received", "in_range")
         )
-        found[DELIVERY] = np.divide(heard, in_range, out=np.full(len(heard), np.nan), where=in_range > 0)
+        found[DELIVERY] = np.divide(received, in_range, out=np.full(len(received), np.nan), where=in_range > 0)
     return found

@@ -23,7 +23,7 @@ def draw_network_fit(fit: NetworkFit, title: str, to: Path, size_px: int) -> Non
     """Write the picture. BadInput for a path or a size that cannot be."""
     figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
     figure.text(0.025, 0.955, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
-    _draw_delivery(plain_axes(figure, (0.08, 0.54, 0.895, 0.34), "% of packets heard over distance in m"), fit)
+    _draw_delivery(plain_axes(figure, (0.08, 0.54, 0.895, 0.34), "% of packets received over distance in m"), fit)
     _draw_latency(plain_axes(figure, (0.08, 0.08, 0.4, 0.34), "packets by latency in ms"), fit)
     draw_bursts(plain_axes(figure, (0.575, 0.08, 0.4, 0.34), RUNS_TITLE), fit.sequences, fit.losses)
     save(figure, to)

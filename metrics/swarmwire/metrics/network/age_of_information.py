@@ -16,17 +16,17 @@ from swarmwire.metrics.moment import Moment
 
 MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1
-HEARD = int(Fate.HEARD)
+RECEIVED = int(Fate.RECEIVED)
 
 
 @dataclass(frozen=True)
 class AgeOfInformation(Metric):
-    """Mean over pairs (receiver, sender) of t - u: t the tick's start, u when the newest packet heard was sent, in s.
+    """Mean over pairs (receiver, sender) of t - u: t the tick's start, u when the newest one received was sent, in s.
 
-    The pairs are those of robots alive of which the receiver has ever heard the sender, in range now or not; who never
-    heard of a robot knows nothing of it that could be old, and is left out. NaN while there is no such pair. A packet
-    that a newer one overtook changes nothing. 8 bytes are kept for each pair of an arena; of more than 512 robots only
-    every n-th counts as a receiver, n = ceil(robots^2 / 2^18), so that these are 2 MB at most.
+    The pairs are those of robots alive of which the receiver has ever received the sender, in range now or not; who
+    never received of a robot knows nothing of it that could be old, and is left out. NaN while there is no such pair. A
+    packet that a newer one overtook changes nothing. 8 bytes are kept for each pair of an arena; of more than 512
+    robots only every n-th counts as a receiver, n = ceil(robots^2 / 2^18), so that these are 2 MB at most.
 
     Source: S. Kaul, R. Yates, M. Gruteser, Real-time status: how often should one update?, IEEE INFOCOM 2012, section
     II.
@@ -34,7 +34,7 @@ class AgeOfInformation(Metric):
 
     name = "age_of_information"
     help = (
-        "age of the newest packet that a robot has heard from another, mean over pairs that ever heard, in s; pairs "
+        "age of the newest packet that a robot received from another, mean over pairs that ever received, in s; pairs "
         "that are out of reach now age on"
     )
     unit = "s"
@@ -70,7 +70,7 @@ class Newest:
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
 
     def see(self, ended: Finished, alive: BoolArray) -> None:
-        """Take in what was heard; `alive` (arenas, robots) are the robots that count from now on."""
+        """Take in what was received; `alive` (arenas, robots) are the robots that count from now on."""
         gained_ns = np.zeros(len(self._pairs), np.int64)
         links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns
         _take(*links, self._place, alive, self._sent_at_ns, self._pairs, gained_ns)
@@ -98,9 +98,9 @@ class Newest:
 
 @njit(cache=True)
 def _take(fate, arena, receiver, sender, sent_at_ns, place, alive, newest_ns, pairs, gained_ns):
-    """Put in what was heard; add to the pairs alive that ever heard, (arenas,), and to the sum of their times."""
+    """Put in what was received; add to the pairs alive that ever received, (arenas,), and to the sum of their times."""
     for i in range(len(fate)):
-        if fate[i] != HEARD or place[receiver[i]] == NOT_COUNTED:
+        if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:
             continue
         a, r, s = arena[i], receiver[i], sender[i]
         before_ns = newest_ns[a, s, place[r]]

@@ -1,4 +1,4 @@
-"""The delivery ratio over distance: receivers that packets were meant for, and those that heard them, by distance."""
+"""The delivery ratio over distance: receivers that packets were meant for, and that received them."""
 
 import math
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ SPREAD_SEQUENCE, SPREAD_SENDER = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2
 
 
 class DistanceCounts:
-    """PDR(d) = receivers that heard / receivers intended, over packets that went on air, by the distance between both.
+    """PDR(d) = receivers that received / receivers intended, of packets that went on air, by their distance.
 
     Intended are all robots alive in the arena when a broadcast goes on air, however far, and the one receiver of an
-    addressed packet; who was out of range, in the way of a wall, dead before it heard or not reached when the run ended
-    has not heard. The distance is that at the tick in which the packet went on air, centre to centre.
+    addressed packet; who was out of range, in the way of a wall, dead before it received or not reached when the run
+    ended has not received. The distance is that at the tick in which the packet went on air, centre to centre.
 
     Counted is one of every `every` packets, which bounds the pairs to look at: all of them up to 70 robots.
 
@@ -31,8 +31,9 @@ class DistanceCounts:
         width_m: of a bin; bin b holds b x width to (b + 1) x width.
         every: one of so many packets is counted.
         intended: (arenas, bins) receivers.
-        heard: (arenas, bins) of these, receivers that heard.
-        unknown: receivers that heard but are missing in `heard`, since their packet was on its way for too long: where
+        received: (arenas, bins) of these, receivers that received.
+        unknown: receivers that received but are missing in `received`, since their packet was on its way for too long:
+        where
             there are any, the ratio is not known.
     """
 
@@ -46,7 +47,7 @@ class DistanceCounts:
         self._bits = max(0, math.ceil(math.log2(static.robots**2 / PAIRS_PER_TICK)))
         self.every = 2**self._bits
         self.intended: IntArray = np.zeros((static.arenas, self._bins), np.int64)
-        self.heard: IntArray = np.zeros((static.arenas, self._bins), np.int64)
+        self.received: IntArray = np.zeros((static.arenas, self._bins), np.int64)
         self.unknown = 0
         self._places: dict[int, Places] = {}  # by tick
 
@@ -60,10 +61,10 @@ class DistanceCounts:
         self._places.pop(truth.tick - int(POSES_KEPT_S * self._static.rate_hz) - 1, None)
         if truth.departed is not None and truth.finished is not None:
             self._add_intended(truth.departed)
-            self._add_heard(truth.finished)
+            self._add_received(truth.finished)
 
     def _add_intended(self, departed: Departed) -> None:
-        rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == Fate.HEARD))
+        rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == Fate.RECEIVED))
         ticks = geometry_tick(departed.on_air_at_ns[rows], self._static.rate_hz)
         everyone = np.arange(self._static.robots)
         for tick in np.unique(ticks).tolist():
@@ -74,8 +75,8 @@ class DistanceCounts:
             meant = np.where(to == BROADCAST, at.alive[arena[:, 0]], everyone == to) & (everyone != sender)
             self._count(self.intended, arena, at.apart_m(arena, sender, everyone), meant)
 
-    def _add_heard(self, finished: Finished) -> None:
-        rows = np.flatnonzero(self._taken(finished.sender, finished.sequence) & (finished.fate == Fate.HEARD))
+    def _add_received(self, finished: Finished) -> None:
+        rows = np.flatnonzero(self._taken(finished.sender, finished.sequence) & (finished.fate == Fate.RECEIVED))
         ticks = geometry_tick(finished.on_air_at_ns[rows], self._static.rate_hz)
         for tick in np.unique(ticks).tolist():
             of = rows[ticks == tick]
@@ -84,7 +85,7 @@ class DistanceCounts:
                 continue
             arena, sender, receiver = finished.arena[of], finished.sender[of], finished.receiver[of]
             apart_m = self._places[tick].apart_m(arena, sender, receiver)
-            self._count(self.heard, arena, apart_m, np.ones(len(of), np.bool_))
+            self._count(self.received, arena, apart_m, np.ones(len(of), np.bool_))
 
     def _taken(self, sender: IntArray, sequence: IntArray) -> BoolArray:
         """Which packets are counted, (k,): evenly spread over each robot's packets, and over robots in each tick."""

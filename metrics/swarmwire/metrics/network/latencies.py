@@ -1,4 +1,4 @@
-"""Latencies of packets: until they were heard, and until the agents that they were for could act on them."""
+"""Latencies of packets: until they were received, and until the agents that they were for could act on them."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,35 +10,35 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Finished, Static
 
-HEARD = int(Fate.HEARD)
+RECEIVED = int(Fate.RECEIVED)
 
 
 class Latencies:
-    """Tells the two latencies of each packet heard.
+    """Tells the two latencies of each packet received.
 
     On air: from sending to hearing. To the agent: from sending to the start of the first tick, of those that begin
-    when it was known to be heard or later, at which the receiver acts.
+    when it was known to be received or later, at which the receiver acts.
     """
 
     def __init__(self, static: Static) -> None:
         self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
 
     def of(self, finished: Finished, tick: int) -> tuple[IntArray, IntArray, IntArray]:
-        """Of the links heard that a tick told of: the arena, the latency on air and to the agent in ns, each (k,)."""
+        """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
         acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
         ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns
-        heard, air_ns, agent_ns = _latencies_ns(*ended, acts_at_ns)
-        return finished.arena.take(heard), air_ns, agent_ns
+        received, air_ns, agent_ns = _latencies_ns(*ended, acts_at_ns)
+        return finished.arena.take(received), air_ns, agent_ns
 
 
 @njit(cache=True)
 def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
-    """Of the links that were heard, their rows, and how long until they were, and until their receivers act, (k,)."""
-    heard, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
+    """Of the links received: their rows, how long until they were, and until their receivers act, (k,)."""
+    received, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
     found = 0
     for row in range(len(fate)):
-        if fate[row] == HEARD:
-            heard[found], air_ns[found] = row, final_at_ns[row] - sent_at_ns[row]
+        if fate[row] == RECEIVED:
+            received[found], air_ns[found] = row, final_at_ns[row] - sent_at_ns[row]
             agent_ns[found] = acts_at_ns[receiver[row]] - sent_at_ns[row]
             found += 1
-    return heard[:found], air_ns[:found], agent_ns[:found]
+    return received[:found], air_ns[:found], agent_ns[:found]

@@ -18,10 +18,10 @@ from swarmwire.metrics.network.windowed import OfWindow, Window
 
 
 class _Latency(OfWindow):
-    """A mean in s over the packets heard that became known in the last `window_s`, a broadcast once per receiver.
+    """A mean in s over the packets received that became known in the last `window_s`, a broadcast once per receiver.
 
     What a latency is, `metrics/network/latencies.py` says; percentiles over the run stand in the summary's `radio`. 0
-    or more; NaN without a radio, or if nothing was heard in the window.
+    or more; NaN without a radio, or if nothing was received in the window.
     """
 
     unit = "s"
@@ -40,8 +40,8 @@ class _Latency(OfWindow):
             if finished is None:
                 return np.nan
             arena, air_ns, agent_ns = latencies.of(finished, moment.truth.tick)
-            total_ns, heard = window.add(_sums(arena, self.pick(air_ns, agent_ns), static.arenas))
-            return total_ns / np.where(heard > 0, heard * NS_PER_S, np.nan)
+            total_ns, received = window.add(_sums(arena, self.pick(air_ns, agent_ns), static.arenas))
+            return total_ns / np.where(received > 0, received * NS_PER_S, np.nan)
 
         return measure
 
@@ -58,13 +58,13 @@ def _sums(arena, latency_ns, arenas):
 
 @dataclass(frozen=True)
 class LatencyOnAir(_Latency):
-    """Mean latency on air: heard_at - sent_at."""
+    """Mean latency on air: received_at - sent_at."""
 
     name = "latency_air"
-    help = "time from sending to hearing, mean over the packets heard in the last window_s, in s"
+    help = "time from sending to hearing, mean over packets received in the last window_s, in s"
 
     def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:
-        """Until it was heard."""
+        """Until it was received."""
         return air_ns
 
 
@@ -73,9 +73,7 @@ class LatencyToAgent(_Latency):
     """Mean latency to the agent: start of the first tick at which the receiver acts and has it - sent_at."""
 
     name = "latency_agent"
-    help = (
-        "time from sending to the receiver's next tick to act, mean over the packets heard in the last window_s, in s"
-    )
+    help = "time from sending to the receiver's next tick to act, mean over packets received in the last window_s, in s"
 
     def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:
         """Until its receiver acts."""

@@ -1,4 +1,4 @@
-"""Packet delivery ratio: which share of the packets that could be heard were, of late."""
+"""Packet delivery ratio: which share of the packets that could be received were, of late."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from swarmwire.metrics.network.windowed import OfWindow, Window
 
 @dataclass(frozen=True)
 class PacketDeliveryRatio(OfWindow):
-    """Receivers that heard / receivers in range, of the fates that became final in the last `window_s`.
+    """Receivers that received / receivers in range, of the fates that became final in the last `window_s`.
 
     In range after path loss and walls, as `Tally.in_range` says: dead and blacked-out receivers are, too. With
     independent losses of probability p it is 1 - p, with K tries 1 - p^K. A loss is final sooner than a reception, by
@@ -24,7 +24,7 @@ class PacketDeliveryRatio(OfWindow):
     """
 
     name = "pdr"
-    help = "packet delivery ratio: heard / in range, of the fates that became final in the last window_s"
+    help = "packet delivery ratio: received / in range, of the fates that became final in the last window_s"
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
@@ -35,7 +35,7 @@ class PacketDeliveryRatio(OfWindow):
             tally = moment.truth.tally
             if tally is None:
                 return np.nan
-            heard, in_range = window.add((tally.fates[:, Fate.HEARD], tally.in_range))
-            return heard / np.where(in_range > 0, in_range, np.nan)
+            received, in_range = window.add((tally.fates[:, Fate.RECEIVED], tally.in_range))
+            return received / np.where(in_range > 0, in_range, np.nan)
 
         return measure

@@ -17,10 +17,10 @@ PERCENTS = (50.0, 90.0, 99.0)
 class RadioTally:
     """Observer that adds up the radio's tallies. Summary part: `radio`, per arena; nothing without a radio.
 
-    sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = heard / in_range (null if none was
-    in range), and of the packets heard the p50, p90 and p99 of two latencies in s, within 0.5 % (null if none was
-    heard): latency_air_s from sending to hearing, latency_agent_s from sending to the first tick at which the receiver
-    acts.
+    sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = received / in_range (null if none
+    was in range), and of the packets received the p50, p90 and p99 of two latencies in s, within 0.5 % (null if none
+    was received): latency_air_s from sending to hearing, latency_agent_s from sending to the first tick at which the
+    receiver acts.
     """
 
     def begin(self, static: Static) -> None:
@@ -68,7 +68,7 @@ class RadioTally:
             "intended": int(self._intended[arena]),
             "in_range": in_range,
             "fates": dict(zip(FATE_NAMES, fates, strict=True)),
-            "pdr": fates[Fate.HEARD] / in_range if in_range else None,
+            "pdr": fates[Fate.RECEIVED] / in_range if in_range else None,
             "latency_air_s": _percentiles_s(self._air, arena),
             "latency_agent_s": _percentiles_s(self._agent, arena),
         }

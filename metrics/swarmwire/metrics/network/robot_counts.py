@@ -19,13 +19,13 @@ class RobotCounts:
         intended: (rows,) receivers that its packets were meant for.
         as_sender: (rows, fates) these receivers by what became of the packet for them, as far as it is final.
         as_receiver: (rows, fates) packets that might have reached it, by what became of them for it.
-        heard_bytes: (rows,) payload that it heard, with tags.
+        received_bytes: (rows,) payload that it received, with tags.
     """
 
     def __init__(self, static: Static) -> None:
         self._robots, self._rows = static.robots, static.arenas * static.robots
         self.packets, self.packets_on_air, self.on_air_ns = self._zeros(), self._zeros(), self._zeros()
-        self.intended, self.heard_bytes = self._zeros(), self._zeros()
+        self.intended, self.received_bytes = self._zeros(), self._zeros()
         self.as_sender: IntArray = np.zeros((self._rows, FATES), np.int64)
         self.as_receiver: IntArray = np.zeros((self._rows, FATES), np.int64)
 
@@ -43,7 +43,7 @@ class RobotCounts:
         if not linked.all():
             receiver, fate, size_bytes = receiver[linked], fate[linked], size_bytes[linked]
         _add(self.as_receiver, receiver * FATES + fate)
-        _add(self.heard_bytes, receiver, np.where(fate == Fate.HEARD, size_bytes, 0))
+        _add(self.received_bytes, receiver, np.where(fate == Fate.RECEIVED, size_bytes, 0))
 
     @property
     def in_flight(self) -> IntArray:
@@ -53,7 +53,7 @@ class RobotCounts:
     def _add_departed(self, departed: Departed) -> None:
         sender = departed.arena * self._robots + departed.sender
         _add(self.packets, sender)
-        _add(self.packets_on_air, sender[departed.fate == Fate.HEARD])
+        _add(self.packets_on_air, sender[departed.fate == Fate.RECEIVED])
         _add(self.on_air_ns, sender, departed.off_air_at_ns - departed.on_air_at_ns)
         _add(self.intended, sender, departed.intended)
         _add(self.as_sender, sender * FATES + Fate.OUT_OF_RANGE, departed.out_of_range)

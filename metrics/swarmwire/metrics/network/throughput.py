@@ -14,19 +14,19 @@ from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 
 BITS_PER_BYTE = 8
-HEARD = int(Fate.HEARD)
+RECEIVED = int(Fate.RECEIVED)
 
 
 @dataclass(frozen=True)
 class Throughput(Metric):
-    """Payload heard, over all receivers of the arena: sum of 8 x bytes heard since the last tick x tick rate, in bit/s.
+    """Payload received, over all receivers of the arena: sum of 8 x bytes since the last tick x tick rate, in bit/s.
 
     A broadcast counts once for each robot that hears it; the message's tag counts, what the radio adds to it does not.
     The mean over the ticks divided by the robots is that of a receiver. NaN without a radio.
     """
 
     name = "throughput"
-    help = "payload heard by all robots together, a broadcast once for each, in bit/s"
+    help = "payload received by all robots together, a broadcast once for each, in bit/s"
     unit = "bit/s"
     standard = True
     bounds = (0.0, None)
@@ -40,13 +40,13 @@ def _throughput_bps(moment: Moment) -> FloatArray | float:
     static, ended = moment.static, moment.truth.finished
     if ended is None:
         return np.nan
-    return _heard_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
+    return _received_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
 
 
 @njit(cache=True)
-def _heard_bytes(fate, arena, size_bytes, arenas):
+def _received_bytes(fate, arena, size_bytes, arenas):
     total = np.zeros(arenas)
     for i in range(len(fate)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             total[arena[i]] += size_bytes[i]
     return total

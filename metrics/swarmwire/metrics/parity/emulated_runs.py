@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 Radio = Mapping[str, Any]  # as in a summary: sent, intended, fates, latency_air_s, latency_agent_s
-COUNTS = ("sent", "heard", "in_range")  # the radio's, since the tick before, which run folders keep
+COUNTS = ("sent", "received", "in_range")  # the radio's, since the tick before, which run folders keep
 
 
 @dataclass(frozen=True)

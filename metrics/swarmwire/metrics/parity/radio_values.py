@@ -81,7 +81,7 @@ def _within(run: EmulatedRun, emulated: EmulatedRuns, duration_s: float) -> _Who
     told: dict[str, Any] = {"sent": sums["sent"]} if "sent" in sums else {}
     final = radio["intended"] - radio["fates"].get("in_flight", 0)
     if sums and final == radio.get("in_range"):  # all that packets were meant for were within range
-        told |= {"intended": sums["in_range"], "fates": {"heard": sums["heard"]}}
+        told |= {"intended": sums["in_range"], "fates": {"received": sums["received"]}}
     return _Whole(told, ticks / emulated.rate_hz, emulated.robots)
 
 
@@ -95,7 +95,7 @@ def _delivery(of: _Whole) -> float | None:
     if "intended" not in of.radio:
         return None
     final = of.radio["intended"] - of.radio["fates"].get("in_flight", 0)
-    return of.radio["fates"]["heard"] / final if final else None
+    return of.radio["fates"]["received"] / final if final else None
 
 
 def _latency(kind: str, percent: str) -> Callable[[_Whole], float | None]:
@@ -108,7 +108,7 @@ def _latencies(name: str, kind: str, text: str) -> tuple[_Number, ...]:
 
 _TRAFFIC: tuple[_Number, ...] = (
     ("packets sent", "1/s", "by each robot", _sent),
-    ("delivery", "", "heard / meant for, in range or not", _delivery),
+    ("delivery", "", "received / meant for, in range or not", _delivery),
 )
 _ON_AIR = _latencies("latency", "latency_air_s", "from sending to hearing")
 _TO_AGENT = _latencies("latency to agent", "latency_agent_s", "from sending to the agent's next step")

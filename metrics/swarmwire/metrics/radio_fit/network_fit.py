@@ -21,12 +21,12 @@ class LinkDelivery:
     sender: str
     receiver: str
     packets: int
-    heard: int
+    received: int
 
     @property
     def pdr(self) -> float:
         """The share that arrived."""
-        return self.heard / self.packets
+        return self.received / self.packets
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class NetworkFit:
     def neighbours(self) -> dict[str, tuple[str, ...]]:
         """By robot: with whom it exchanged packets, a tenth of them each way at least.
 
-        Of robots whose logs are not there nothing tells what they heard: the way that is known counts alone.
+        Of robots whose logs are not there nothing tells what they received: the way that is known counts alone.
         """
         pdr = {(link.sender, link.receiver): link.pdr for link in self.links}
 
@@ -78,9 +78,9 @@ def deliveries(log: NetworkLog) -> tuple[LinkDelivery, ...]:
     """How many packets arrived on each link that had any, by sender and then receiver."""
     of, robots = log.packets, len(log.names)
     link: IntArray = of.sender * robots + of.receiver
-    count, heard = np.bincount(link), np.bincount(link, ~log.lost)
+    count, received = np.bincount(link), np.bincount(link, ~log.lost)
     return tuple(
-        LinkDelivery(log.names[n // robots], log.names[n % robots], int(count[n]), int(heard[n]))
+        LinkDelivery(log.names[n // robots], log.names[n % robots], int(count[n]), int(received[n]))
         for n in np.flatnonzero(count).tolist()
     )
 
@@ -88,7 +88,9 @@ def deliveries(log: NetworkLog) -> tuple[LinkDelivery, ...]:
 def _notes(found: RangeFit | str, latency: LatencyFit | str, losses: LossFit | str, packets: int) -> list[str]:
     notes: list[str] = []
     if isinstance(found, RangeFit) and not found.reached:
-        notes.append(f"packets were heard from as far as robots went: the range is {found.range_m.value:.3g} m or more")
+        notes.append(
+            f"packets were received from as far as robots went: the range is {found.range_m.value:.3g} m or more"
+        )
     if isinstance(found, RangeFit) and found.reached:
         notes.append(f"{found.beyond} packets from beyond the range count as out of range, not as lost")
     if isinstance(latency, LatencyFit) and latency.negative > 0.0:
@@ -116,5 +118,5 @@ def delivery_over_distance(log: NetworkLog, edges_m: FloatArray) -> tuple[FloatA
     """The share of packets that arrived and how many were sent, by bins of distance, (bins,) each; NaN of none."""
     known = np.isfinite(log.distance_m)
     sent = np.histogram(log.distance_m[known], edges_m)[0]
-    heard = np.histogram(log.distance_m[known & ~log.lost], edges_m)[0]
-    return heard / np.where(sent > 0, sent, np.nan), sent
+    received = np.histogram(log.distance_m[known & ~log.lost], edges_m)[0]
+    return received / np.where(sent > 0, sent, np.nan), sent

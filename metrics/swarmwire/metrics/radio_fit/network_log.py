@@ -13,7 +13,7 @@ from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_pack
 from swarmwire.metrics.real_log.log_table import LogTable
 from swarmwire.metrics.real_log.poses import posed_span_s, poses_at
 from swarmwire.metrics.real_log.real_logs import RealLogs
-from swarmwire.metrics.real_log.robot_log import RobotLog, heard_packets
+from swarmwire.metrics.real_log.robot_log import RobotLog, received_packets
 
 NEEDED = ("t_s", "tx", "rx", "seq")
 
@@ -30,7 +30,7 @@ class NetworkLog:
     @property
     def lost(self) -> BoolArray:
         """Which packets were lost, (n,)."""
-        return np.isnan(self.packets.heard_s)
+        return np.isnan(self.packets.received_s)
 
     @property
     def has_distances(self) -> bool:
@@ -54,7 +54,7 @@ class NetworkLog:
 
 
 def is_network_table(path: Path) -> bool:
-    """Whether a file is a CSV of what was heard that tells no strengths; files that cannot be read are none."""
+    """Whether a file is a CSV of what was received that tells no strengths; files that cannot be read are none."""
     if path.suffix.lower() != ".csv":
         return False
     try:
@@ -66,26 +66,26 @@ def is_network_table(path: Path) -> bool:
 
 
 def network_log_of_table(path: Path) -> NetworkLog:
-    """A table of what robots heard; packets before a link's first and after its last leave no trace.
+    """A table of what robots received; packets before a link's first and after its last leave no trace.
 
     Columns: t_s, tx, rx, seq; if they are there to, latency_s, distance_m. BadInput for what cannot be.
     """
     table = LogTable(path, NEEDED)
     notes = ("half a line at the end was dropped",) if table.half_line else ()
-    heard, receivers = heard_packets(table), np.array(table.texts("rx"), np.str_)
-    table.refuse_where(heard.sender == receivers, "rx", "expected another robot than tx")
-    names = sorted({*heard.sender.tolist(), *receivers.tolist()})
-    nodes = [Node(name, None, heard.picked(np.flatnonzero(receivers == name)), None) for name in names]
+    received, receivers = received_packets(table), np.array(table.texts("rx"), np.str_)
+    table.refuse_where(received.sender == receivers, "rx", "expected another robot than tx")
+    names = sorted({*received.sender.tolist(), *receivers.tolist()})
+    nodes = [Node(name, None, received.picked(np.flatnonzero(receivers == name)), None) for name in names]
     return _network_log(nodes, [None] * len(nodes), str(path), notes)
 
 
 def network_log_of_robots(logs: RealLogs) -> NetworkLog:
-    """All robots' heard.csv and sent.csv, by one clock; also links from robots whose own log is not there."""
+    """All robots' received.csv and sent.csv, by one clock; also links from robots whose own log is not there."""
     logs = in_step(logs)
     by_name: dict[str, RobotLog] = dict(zip(logs.names, logs.robots, strict=True))
     robots = [by_name.get(name) for name in logs.robots[0].about.robots]
     nodes = [
-        Node(name, None, None, None) if robot is None else Node(name, robot.sent, robot.heard, _span_s(robot))
+        Node(name, None, None, None) if robot is None else Node(name, robot.sent, robot.received, _span_s(robot))
         for name, robot in zip(logs.robots[0].about.robots, robots, strict=True)
     ]
     return _network_log(nodes, robots, logs.where, logs.notes)
@@ -101,8 +101,8 @@ def _network_log(
 ) -> NetworkLog:
     packets = link_packets(nodes, own_packets(nodes, where))
     ends_s = np.array([node.span_s[1] if node.span_s else np.inf for node in nodes])
-    # What may still have been heard after a log's end is not lost.
-    final = np.isfinite(packets.heard_s) | (packets.sent_s <= ends_s[packets.receiver] - usual_latency_s(packets))
+    # What may still have been received after a log's end is not lost.
+    final = np.isfinite(packets.received_s) | (packets.sent_s <= ends_s[packets.receiver] - usual_latency_s(packets))
     packets = packets.rows(final)
     return NetworkLog(tuple(node.name for node in nodes), packets, _distances_m(packets, robots), notes)
 

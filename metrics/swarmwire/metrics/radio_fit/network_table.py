@@ -43,7 +43,7 @@ def network_comments(fit: NetworkFit) -> list[str]:
         comments.append("range_m is the farthest that was tried: the network may reach farther.")
     if fit.log.has_distances:
         comments.append(
-            "gives: the robots had a tracker, which tells range and bearing of what is heard; exactly, here."
+            "gives: the robots had a tracker, which tells range and bearing of what is received; exactly, here."
         )
     if isinstance(fit.latency, LatencyFit):
         comments.append("Latencies hold the time on air, too: bit_rate_bps is so high that it adds nothing.")

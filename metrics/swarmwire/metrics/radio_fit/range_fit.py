@@ -25,23 +25,23 @@ def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
     """The step of delivery over distance (n,), of which NaN are not known; or what it lacks.
 
     The range is where two shares, one within it and one of at most a hundredth beyond, tell the losses best: maximum
-    likelihood. Its error is the usual distance from one packet heard out there to the next.
+    likelihood. Its error is the usual distance from one packet received out there to the next.
     """
     known = np.isfinite(distance_m)
     order = np.argsort(distance_m[known], kind="stable")
-    distance, heard = distance_m[known][order], ~lost[known][order]
+    distance, received = distance_m[known][order], ~lost[known][order]
     if len(distance) < MIN_PACKETS:
         return f"needs {MIN_PACKETS} packets with a distance, got {len(distance)}"
-    if not heard.any():
+    if not received.any():
         return "needs packets that were received"
-    count, total = np.arange(1.0, len(heard) + 1.0), np.cumsum(heard, dtype=np.float64)
-    beyond, heard_beyond = len(heard) - count, total[-1] - total
-    gain = _log_likelihood(total, count) + _log_likelihood_of(heard_beyond, beyond, STRAY)
-    best = int(np.argmax(np.where(heard, gain, -np.inf)))  # a range ends where a packet was heard
+    count, total = np.arange(1.0, len(received) + 1.0), np.cumsum(received, dtype=np.float64)
+    beyond, received_beyond = len(received) - count, total[-1] - total
+    gain = _log_likelihood(total, count) + _log_likelihood_of(received_beyond, beyond, STRAY)
+    best = int(np.argmax(np.where(received, gain, -np.inf)))  # a range ends where a packet was received
     reached = int(beyond[best]) >= MIN_BEYOND
     if not reached:
-        best = int(np.flatnonzero(heard)[-1])
-    near = distance[: best + 1][heard[: best + 1]][-MIN_BEYOND:]
+        best = int(np.flatnonzero(received)[-1])
+    near = distance[: best + 1][received[: best + 1]][-MIN_BEYOND:]
     error_m = float(near[-1] - near[0]) / max(len(near) - 1, 1)
     return RangeFit(Estimate(float(distance[best]), error_m if reached else float("nan")), reached, int(beyond[best]))
 

@@ -23,8 +23,8 @@ def clock_offsets_s(robots: Sequence[RobotLog]) -> FloatArray:
     place = {robot.name: i for i, robot in enumerate(robots)}
     short_s: dict[tuple[int, int], float] = {}
     for receiver, robot in enumerate(robots):
-        for sender, heard in robot.heard.by_sender.items():
-            known = heard.latency_s[np.isfinite(heard.latency_s)]
+        for sender, received in robot.received.by_sender.items():
+            known = received.latency_s[np.isfinite(received.latency_s)]
             if sender in place and len(known) >= FEWEST:
                 short_s[place[sender], receiver] = float(np.quantile(known, SHORT))
     pairs = [(a, b) for a, b in short_s if a < b and (b, a) in short_s]
@@ -57,15 +57,15 @@ def in_step(logs: RealLogs) -> RealLogs:
 
 def _moved(robot: RobotLog, offset_s: dict[str, float]) -> RobotLog:
     own_s = offset_s[robot.name]
-    of_senders_s = np.array([offset_s.get(name, 0.0) for name in robot.heard.sender.tolist()])
-    heard = replace(
-        robot.heard,
-        time_s=robot.heard.time_s - own_s,
-        latency_s=robot.heard.latency_s - (own_s - of_senders_s),
+    of_senders_s = np.array([offset_s.get(name, 0.0) for name in robot.received.sender.tolist()])
+    received = replace(
+        robot.received,
+        time_s=robot.received.time_s - own_s,
+        latency_s=robot.received.latency_s - (own_s - of_senders_s),
     )
     return replace(
         robot,
         steps=replace(robot.steps, time_s=robot.steps.time_s - own_s),
         sent=replace(robot.sent, time_s=robot.sent.time_s - own_s),
-        heard=heard,
+        received=received,
     )

@@ -1,8 +1,8 @@
-"""What became of every packet on every link, from what was sent and what was heard.
+"""What became of every packet on every link, from what was sent and what was received.
 
 A packet that a robot sent and that another, which it was meant for, did not hear was lost. Of a robot whose own log is
-not there, or that was killed before it had written all, what others heard tells what it sent: numbers between that are
-missing everywhere were sent, too. Numbers start anew where they fall by far: the agent was started again.
+not there, or that was killed before it had written all, what others received tells what it sent: numbers between that
+are missing everywhere were sent, too. Numbers start anew where they fall by far: the agent was started again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.real_log.robot_log import HeardPackets, SentPackets
+from swarmwire.metrics.real_log.robot_log import ReceivedPackets, SentPackets
 
 EVERYBODY, NOBODY = -1, -2  # of `to`: all others; a robot that is not of these
 REORDERED = 50  # numbers that a packet may come late by
@@ -28,8 +28,8 @@ class Node:
 
     name: str
     sent: SentPackets | None  # None: its log is not there
-    heard: HeardPackets | None  # None: its log is not there
-    span_s: tuple[float, float] | None  # in which it listened; None: only what it heard tells
+    received: ReceivedPackets | None  # None: its log is not there
+    span_s: tuple[float, float] | None  # in which it listened; None: only what it received tells
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class LinkPackets:
     to: IntArray  # (n,)
     sequence: IntArray  # (n,)
     sent_s: FloatArray  # (n,)
-    heard_s: FloatArray  # (n,) NaN: lost
+    received_s: FloatArray  # (n,) NaN: lost
     latency_s: FloatArray  # (n,) NaN: lost, or not known
     distance_m: FloatArray  # (n,) as the receiver noted it; NaN: not known
     size_bytes: IntArray  # (n,)
@@ -79,7 +79,7 @@ def link_packets(nodes: Sequence[Node], own: Sequence[OwnPackets]) -> LinkPacket
         _link(nodes[sender], sender, packets, node, receiver)
         for sender, packets in enumerate(own)
         for receiver, node in enumerate(nodes)
-        if node.heard is not None and receiver != sender
+        if node.received is not None and receiver != sender
     ]
     columns: dict[str, Any] = {
         of.name: np.concatenate([getattr(part, of.name) for part in parts]) if parts else np.zeros(0, np.int64)
@@ -89,7 +89,7 @@ def link_packets(nodes: Sequence[Node], own: Sequence[OwnPackets]) -> LinkPacket
 
 
 def usual_latency_s(links: LinkPackets) -> float:
-    """How late packets are that are not unusually late: 99 of 100 are heard sooner; 0 if none tells."""
+    """How late packets are that are not unusually late: 99 of 100 are received sooner; 0 if none tells."""
     known = links.latency_s[np.isfinite(links.latency_s)]
     return max(float(np.quantile(known, USUAL)), 0.0) if len(known) else 0.0
 
@@ -104,9 +104,9 @@ def restarts_s(time_s: FloatArray, sequence: IntArray) -> FloatArray:
 def _own(node: Node, nodes: Sequence[Node], place: Mapping[str, int], tags: dict[str, int], where: str) -> OwnPackets:
     parts = [] if node.sent is None else [_columns(node.sent, node.sent.time_s, place, tags, node.sent.too_large)]
     for other in nodes:
-        heard = None if other.heard is None else other.heard.by_sender.get(node.name)
-        if heard is not None and other.name != node.name:
-            parts.append(_columns(heard, heard.sent_s, place, tags, np.zeros(len(heard.sequence), np.bool_)))
+        received = None if other.received is None else other.received.by_sender.get(node.name)
+        if received is not None and other.name != node.name:
+            parts.append(_columns(received, received.sent_s, place, tags, np.zeros(len(received.sequence), np.bool_)))
     if not parts:
         parts = [(np.zeros(0, np.int64),) * 6]
     sequence, sent_s, to, size, tag, large = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -118,7 +118,7 @@ def _own(node: Node, nodes: Sequence[Node], place: Mapping[str, int], tags: dict
 
 
 def _columns(
-    of: SentPackets | HeardPackets,
+    of: SentPackets | ReceivedPackets,
     sent_s: FloatArray,
     place: Mapping[str, int],
     tags: dict[str, int],
@@ -130,7 +130,7 @@ def _columns(
 
 
 def _filled(of: OwnPackets, where: str) -> OwnPackets:
-    """With the packets that nobody heard, as if sent evenly between those around them, to everybody."""
+    """With the packets that nobody received, as if sent evenly between those around them, to everybody."""
     missed = np.where(np.diff(of.key // _EPOCH) == 0, np.diff(of.key) - 1, 0) if len(of.key) else of.key
     if missed.sum() > MAX_LOST:
         raise BadInput(where, "seq", f"leaves {missed.sum()} packets out; expected {MAX_LOST} lost in all at most")
@@ -159,15 +159,15 @@ def _filled(of: OwnPackets, where: str) -> OwnPackets:
 
 
 def _link(sender_node: Node, sender: int, packets: OwnPackets, node: Node, receiver: int) -> LinkPackets:
-    assert node.heard is not None
-    heard = node.heard.by_sender.get(sender_node.name, _NOTHING)
-    span = node.span_s or _span_s(heard.sent_s)
-    # Its own log knows whom a packet was meant for; without it all that could be heard counts.
+    assert node.received is not None
+    received = node.received.by_sender.get(sender_node.name, _NOTHING)
+    span = node.span_s or _span_s(received.sent_s)
+    # Its own log knows whom a packet was meant for; without it all that could be received counts.
     meant = (packets.to == EVERYBODY) | (packets.to == receiver) | (sender_node.sent is None)
     listened = (packets.sent_s >= span[0]) & (packets.sent_s <= span[1])
     kept = meant & listened & ~packets.too_large
-    # Every packet heard is among those of its sender.
-    at = np.searchsorted(packets.key, heard.sequence + _EPOCH * np.searchsorted(packets.starts_s, heard.sent_s))
+    # Every packet received is among those of its sender.
+    at = np.searchsorted(packets.key, received.sequence + _EPOCH * np.searchsorted(packets.starts_s, received.sent_s))
 
     def by_packet(column: FloatArray) -> FloatArray:
         values = np.full(len(packets.key), np.nan)
@@ -181,9 +181,9 @@ def _link(sender_node: Node, sender: int, packets: OwnPackets, node: Node, recei
         packets.to[kept],
         packets.sequence[kept],
         packets.sent_s[kept],
-        by_packet(heard.time_s),
-        by_packet(heard.latency_s),
-        by_packet(heard.distance_m),
+        by_packet(received.time_s),
+        by_packet(received.latency_s),
+        by_packet(received.distance_m),
         packets.size_bytes[kept],
         packets.tag[kept],
     )
@@ -196,4 +196,4 @@ def _span_s(time_s: FloatArray) -> tuple[float, float]:
 _NONE = np.zeros(0)
 _WHOLE = np.zeros(0, np.int64)
 _WORDS = np.zeros(0, np.str_)
-_NOTHING = HeardPackets(_NONE, _WORDS, _WHOLE, _WORDS, _WHOLE, _WORDS, _NONE, _NONE)
+_NOTHING = ReceivedPackets(_NONE, _WORDS, _WHOLE, _WORDS, _WHOLE, _WORDS, _NONE, _NONE)

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from swarmwire.metrics.real_log.about import ROBOT, read_about_robot
-from swarmwire.metrics.real_log.robot_log import HEARD, SENT, TICKS
+from swarmwire.metrics.real_log.robot_log import RECEIVED, SENT, TICKS
 
-FILES = (ROBOT, TICKS, HEARD, SENT)
+FILES = (ROBOT, TICKS, RECEIVED, SENT)
 
 
 def log_folders(path: Path) -> list[Path]:

@@ -34,8 +34,8 @@ class RadioTruth:
 
 
 def radio_truth(logs: RealLogs, base: TimeBase) -> RadioTruth:
-    """A loss is final as the packet is sent: nobody knows when it would have been heard."""
-    nodes = [Node(robot.name, robot.sent, robot.heard, (base.start_s, base.end_s)) for robot in logs.robots]
+    """A loss is final as the packet is sent: nobody knows when it would have been received."""
+    nodes = [Node(robot.name, robot.sent, robot.received, (base.start_s, base.end_s)) for robot in logs.robots]
     own = own_packets(nodes, logs.where)
     rows = _rows(link_packets(nodes, own), own, len(nodes), base)
     edges_ns = (base.time_s - base.start_s) * NS_PER_S
@@ -58,7 +58,7 @@ def under_way(tallies: Sequence[Tally]) -> Tally:
 
 def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: TimeBase) -> Finished:
     """All that was sent in time, a row per packet and receiver; of one that was too large one for all."""
-    heard = np.isfinite(links.heard_s)
+    received = np.isfinite(links.received_s)
     large = [(sender, of, np.flatnonzero(of.too_large & _within(of.sent_s, base))) for sender, of in enumerate(own)]
     zeros = np.zeros(sum(len(rows) for _, _, rows in large), np.int64)
 
@@ -68,22 +68,22 @@ def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: Ti
     to = with_large(links.to, [of.to[rows] for _, of, rows in large])
     sent_ns = with_large(_ns(links.sent_s, base), [_ns(of.sent_s[rows], base) for _, of, rows in large])
     # A packet cannot arrive before it is sent, whatever clocks say.
-    final_ns = np.maximum(_ns(np.where(heard, links.heard_s, base.start_s), base), sent_ns[: len(heard)])
-    # Packets that may still have been heard after the last tick are not lost.
-    late = ~heard & (links.sent_s > base.end_s - usual_latency_s(links))
+    final_ns = np.maximum(_ns(np.where(received, links.received_s, base.start_s), base), sent_ns[: len(received)])
+    # Packets that may still have been received after the last tick are not lost.
+    late = ~received & (links.sent_s > base.end_s - usual_latency_s(links))
     final_ns[late] = AFTER_ALL_NS
     everybody = [np.where(of.to[rows] == EVERYBODY, robots - 1, of.to[rows] >= 0) for _, of, rows in large]
     return Finished(
         arena=np.zeros(len(to), np.int64),
         sender=with_large(links.sender, [np.full(len(rows), sender) for sender, _, rows in large]),
         receiver=with_large(links.receiver, [zeros + NOBODY]),
-        receivers=with_large(np.ones(len(heard), np.int64), everybody),
+        receivers=with_large(np.ones(len(received), np.int64), everybody),
         to=to,
         sequence=with_large(links.sequence, [of.sequence[rows] for _, of, rows in large]),
         sent_at_ns=sent_ns,
         on_air_at_ns=sent_ns,
-        final_at_ns=with_large(final_ns, [sent_ns[len(heard) :]]),
-        fate=with_large(np.where(heard, Fate.HEARD, Fate.LOST), [zeros + Fate.TOO_LARGE]),
+        final_at_ns=with_large(final_ns, [sent_ns[len(received) :]]),
+        fate=with_large(np.where(received, Fate.RECEIVED, Fate.LOST), [zeros + Fate.TOO_LARGE]),
         size_bytes=with_large(links.size_bytes, [of.size_bytes[rows] for _, of, rows in large]),
         tag=with_large(links.tag, [of.tag[rows] for _, of, rows in large]),
     )
@@ -96,7 +96,7 @@ def _tallies(
     fates = np.zeros((ticks + 1, len(FATE_NAMES)), np.int64)
     np.add.at(fates, (np.minimum(final_tick, ticks), rows.fate), rows.receivers)
     # A real network knows no range: all that a packet on air was meant for count as within it.
-    in_range = fates[:, Fate.HEARD] + fates[:, Fate.LOST]
+    in_range = fates[:, Fate.RECEIVED] + fates[:, Fate.LOST]
     return tuple(
         Tally(sent[t : t + 1], intended[t : t + 1], in_range[t : t + 1], fates[t : t + 1]) for t in range(ticks)
     )

@@ -1,4 +1,4 @@
-"""The log of one robot: what it did in each step, and what its radio sent and heard."""
+"""The log of one robot: what it did in each step, and what its radio sent and received."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -11,11 +11,11 @@ from swarmwire.comms.config import from_json
 from swarmwire.metrics.real_log.about import ROBOT, AboutRobot, read_about_robot
 from swarmwire.metrics.real_log.log_table import LogTable
 
-TICKS, HEARD, SENT, SUMMARY = "ticks.csv", "heard.csv", "sent.csv", "summary.json"
+TICKS, RECEIVED, SENT, SUMMARY = "ticks.csv", "received.csv", "sent.csv", "summary.json"
 POSE = ("x_m", "y_m", "heading_rad")
 COMMAND = ("linear_mps", "angular_radps")
 TICK_COLUMNS = ("t_s", *POSE, *COMMAND, "state", "value")
-HEARD_COLUMNS = ("t_s", "tx", "rx", "seq", "to", "size_bytes", "tag", "latency_s", "distance_m")
+RECEIVED_COLUMNS = ("t_s", "tx", "rx", "seq", "to", "size_bytes", "tag", "latency_s", "distance_m")
 SENT_COLUMNS = ("t_s", "seq", "to", "size_bytes", "tag", "fate")
 TOO_LARGE = "too_large"
 
@@ -32,7 +32,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class HeardPackets:
+class ReceivedPackets:
     """A row per packet that arrived, also of those that were addressed to others."""
 
     time_s: FloatArray  # (k,) UTC since 1970, when it arrived
@@ -45,15 +45,15 @@ class HeardPackets:
     distance_m: FloatArray  # (k,) NaN: not known
 
     @cached_property
-    def by_sender(self) -> "dict[str, HeardPackets]":
+    def by_sender(self) -> "dict[str, ReceivedPackets]":
         """The packets of each sender."""
         names, of = np.unique(self.sender, return_inverse=True)
         rows = np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of, minlength=len(names)))[:-1])
         return {str(name): self.picked(own) for name, own in zip(names, rows, strict=False)}
 
-    def picked(self, rows: IntArray) -> "HeardPackets":
+    def picked(self, rows: IntArray) -> "ReceivedPackets":
         """Some of the packets, by their rows."""
-        return HeardPackets(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+        return ReceivedPackets(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     @property
     def sent_s(self) -> FloatArray:
@@ -80,7 +80,7 @@ class RobotLog:
     about: AboutRobot
     where: str
     steps: Steps
-    heard: HeardPackets
+    received: ReceivedPackets
     sent: SentPackets
     ended: str | None  # None: it was killed
     half_lines: tuple[str, ...]  # files that ended in half a line, which was dropped
@@ -94,22 +94,22 @@ class RobotLog:
 def read_robot_log(folder: Path) -> RobotLog:
     """The log in this folder; BadInput names file, row and column of what cannot be."""
     about = read_about_robot(folder / ROBOT)
-    ticks, heard, sent = (
+    ticks, received, sent = (
         LogTable(folder / name, columns)
-        for name, columns in ((TICKS, TICK_COLUMNS), (HEARD, HEARD_COLUMNS), (SENT, SENT_COLUMNS))
+        for name, columns in ((TICKS, TICK_COLUMNS), (RECEIVED, RECEIVED_COLUMNS), (SENT, SENT_COLUMNS))
     )
-    halves = tuple(name for name, of in ((TICKS, ticks), (HEARD, heard), (SENT, sent)) if of.half_line)
-    return RobotLog(about, str(folder), _steps(ticks), heard_packets(heard), _sent(sent), _ended(folder), halves)
+    halves = tuple(name for name, of in ((TICKS, ticks), (RECEIVED, received), (SENT, sent)) if of.half_line)
+    return RobotLog(about, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves)
 
 
-def heard_packets(table: LogTable) -> HeardPackets:
-    """The rows of a heard.csv, whose columns latency_s and distance_m may be missing."""
+def received_packets(table: LogTable) -> ReceivedPackets:
+    """The rows of a received.csv, whose columns latency_s and distance_m may be missing."""
     nothing = np.full(len(table), np.nan)
     latency_s, distance_m = (
         table.numbers(name) if name in table.columns else nothing for name in ("latency_s", "distance_m")
     )
     has_more = "size_bytes" in table.columns
-    return HeardPackets(
+    return ReceivedPackets(
         table.times_s(),
         np.array(table.texts("tx"), np.str_),
         table.whole_numbers("seq"),

@@ -16,7 +16,7 @@ class DistanceTotals(TotalsRecorder):
     """Observer that writes `radio_distances.parquet`. `RunFolder.radio_distances` says what its columns are.
 
     The summary says besides: `every` (one of so many packets was counted) and `unknown` (receivers that
-    heard, at a distance that was not known any more).
+    received, at a distance that was not known any more).
     """
 
     name = "radio_distances"
@@ -35,10 +35,10 @@ class DistanceTotals(TotalsRecorder):
 
         counts = self._counts
         bins = int(np.flatnonzero(counts.intended.any(axis=0)).max(initial=-1)) + 1
-        arenas, intended, heard = (
+        arenas, intended, received = (
             len(counts.intended),
             counts.intended[:, :bins].ravel(),
-            counts.heard[:, :bins].ravel(),
+            counts.received[:, :bins].ravel(),
         )
         edges_m = counts.width_m * np.arange(bins + 1)
         known = (intended > 0) & (counts.unknown == 0)
@@ -47,8 +47,10 @@ class DistanceTotals(TotalsRecorder):
             "from_m": np.tile(edges_m[:-1], arenas),
             "to_m": np.tile(edges_m[1:], arenas),
             "intended": intended,
-            "heard": heard,
-            "pdr": pl.Series(np.divide(heard, intended, out=np.full(len(heard), np.nan), where=known)).fill_nan(None),
+            "received": received,
+            "pdr": pl.Series(np.divide(received, intended, out=np.full(len(received), np.nan), where=known)).fill_nan(
+                None
+            ),
         }
         return pl.DataFrame(columns, schema_overrides=distance_totals_schema())
 
@@ -66,6 +68,6 @@ def distance_totals_schema() -> "dict[str, Any]":
         "from_m": pl.Float64,
         "to_m": pl.Float64,
         "intended": pl.Int64,
-        "heard": pl.Int64,
+        "received": pl.Int64,
         "pdr": pl.Float64,
     }

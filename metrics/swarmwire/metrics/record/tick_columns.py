@@ -22,7 +22,7 @@ MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot
 ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
 VALUE = "value"  # a list with a number per robot, float64; only once a robot has told one
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
-RADIO = ("sent", "heard", "in_range")  # packets; receivers; receivers: since the tick before
+RADIO = ("sent", "received", "in_range")  # packets; receivers; receivers: since the tick before
 KEYS = ("tick", "time_s", "arena", "seed")
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 
@@ -101,7 +101,7 @@ class TickColumns:
             self._value[at] = truth.value.reshape(shape)
         self._measured[at] = measured
         if truth.tally is not None:
-            self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.HEARD], truth.tally.in_range
+            self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.RECEIVED], truth.tally.in_range
         self.ticks += 1
 
     @property

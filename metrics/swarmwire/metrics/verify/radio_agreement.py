@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LINK_FATES = tuple(
     FATE_NAMES[fate]
     for fate in (
-        Fate.HEARD,
+        Fate.RECEIVED,
         Fate.BLOCKED,
         Fate.LOST,
         Fate.TOO_WEAK,
@@ -56,13 +56,13 @@ def links_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict
 
 
 def distances_agree(files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-    """If every packet was counted: as many that were heard, over all distances."""
+    """If every packet was counted: as many that were received, over all distances."""
     told: dict[str, Any] = {} if summary is None else summary["record"].get("radio_distances", {})
     if told.get("every") != 1 or told.get("unknown") != 0:
         return None
-    heard = FATE_NAMES[Fate.HEARD]
-    totals = {(row["arena"], heard): row["heard"] for row in _sums(scan_files(files), ["heard"])}
-    return _compared(totals, (heard,), summary)
+    received = FATE_NAMES[Fate.RECEIVED]
+    totals = {(row["arena"], received): row["received"] for row in _sums(scan_files(files), ["received"])}
+    return _compared(totals, (received,), summary)
 
 
 def _sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:

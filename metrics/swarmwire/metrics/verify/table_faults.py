@@ -71,9 +71,9 @@ def _value_fault(name: str, table: "pl.LazyFrame", static: Static | None) -> str
 def _ratio_fault(table: "pl.LazyFrame") -> str | None:
     import polars as pl
 
-    apart = (pl.col("pdr") * pl.col("intended") - pl.col("heard")).abs() > TOLERANCE * pl.col("intended") + TOLERANCE
+    apart = (pl.col("pdr") * pl.col("intended") - pl.col("received")).abs() > TOLERANCE * pl.col("intended") + TOLERANCE
     rows = table.filter(apart).select(pl.len()).collect().item()
-    return f"pdr is not heard / intended in {rows} row{'s' if rows != 1 else ''}" if rows else None
+    return f"pdr is not received / intended in {rows} row{'s' if rows != 1 else ''}" if rows else None
 
 
 def _names_fault(table: "pl.LazyFrame", static: Static) -> str | None:

@@ -17,7 +17,7 @@ SERIES: tuple[Color, ...] = (
     (180, 180, 190),
 )
 FATES: dict[Fate, Color] = {
-    Fate.HEARD: (86, 180, 233),
+    Fate.RECEIVED: (86, 180, 233),
     Fate.BLOCKED: (240, 180, 60),
     Fate.LOST: (235, 85, 75),
     Fate.QUEUE_FULL: (160, 140, 250),

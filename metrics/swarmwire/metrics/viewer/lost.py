@@ -35,7 +35,7 @@ def add_lost(rows: RerunRows, finished: Finished, arena: int, position_m: FloatA
     """
     import rerun as rr
 
-    own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.HEARD)
+    own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
     ends = np.column_stack([finished.sender[own], finished.receiver[own]])
     strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
     rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)

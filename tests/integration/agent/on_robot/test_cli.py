@@ -85,15 +85,15 @@ def test_the_guard_hears_of_an_agent_until_all_is_closed(tmp_path, monkeypatch):
     install(tmp_path / "installed")
     monkeypatch.syspath_prepend(tmp_path / "installed")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    heard: list[bool] = []
+    received: list[bool] = []
 
     def slow_to_close(*parts: Any) -> NetworkParts:
-        parts[-1].callback(lambda: heard.append(any(thread.name == "watchdog" for thread in threading.enumerate())))
+        parts[-1].callback(lambda: received.append(any(thread.name == "watchdog" for thread in threading.enumerate())))
         return NetworkParts()
 
     monkeypatch.setattr(assembly, "network_parts", slow_to_close)
     assert cli.main(["run", DRIVING, *robot_flags(tmp_path / "deeds", "--no-guard", "--duration-s", "0.2")]) == 0
-    assert heard == [True]
+    assert received == [True]
 
 
 def test_an_operator_asks_how_the_robot_is_and_stops_it_for_good(tmp_path):

@@ -151,7 +151,7 @@ def test_a_robot_that_was_stopped_for_good_has_not_failed_when_its_process_dies(
         robots.append(robot := Robot(tmp_path, "Driving", "--radio", "zenoh", "--connect", endpoint, watchdog_s=0.5))
         assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
         stopped = len(deeds(robot.file))
-        until(lambda: len(deeds(robot.file)) > stopped + 5)  # so that the guard has heard of it
+        until(lambda: len(deeds(robot.file)) > stopped + 5)  # so that the guard has received of it
         os.kill(robot.agent, signal.SIGKILL)
         assert robot.command.wait()[0] == 0
         assert robot.last() == ["open", "stop", "close"]

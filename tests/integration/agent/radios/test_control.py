@@ -93,11 +93,11 @@ def test_while_a_stop_takes_long_the_network_goes_on(sessions, point):
     asker = threading.Thread(target=lambda: replies.update(ask_all(sessions[2], KEYS, ESTOP, ["flock-0"], 20.0)))
     asker.start()
 
-    def heard() -> bool:
+    def received() -> bool:
         sessions[1].put("other/thing", b"")
         return arrived.is_set()
 
-    until(heard)
+    until(received)
     assert not replies
     go_on.set()
     asker.join()

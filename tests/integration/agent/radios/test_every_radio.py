@@ -10,7 +10,7 @@ from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.world_radio import AirRadio
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
@@ -55,14 +55,14 @@ NEEDS = {"range_m": "radio.range", "bearing_rad": "radio.bearing", "rssi_dbm": "
 
 def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio):
     for _ in range(2):
-        heard, outcomes = any_radio.heard(0)
-        assert (len(heard), len(outcomes)) == (0, 0)
-        assert tuple(heard.given) == any_radio.gives
+        received, outcomes = any_radio.received(0)
+        assert (len(received), len(outcomes)) == (0, 0)
+        assert tuple(received.given) == any_radio.gives
     assert any_radio.needs == {NEEDS[column] for column in any_radio.gives}
 
 
 def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
-    any_radio.send(Sent.none())
+    any_radio.send(SentPackets.none())
     assert any_radio.counts() == {}
     any_radio.send(words(1.0, 2.0, row=1))
     assert any_radio.counts() == {"packets_sent": 2}
@@ -70,11 +70,11 @@ def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
 
 
 def test_what_is_larger_than_the_payload_limit_is_counted_and_raises_nothing(any_radio):
-    any_radio.send(Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes(101)])))
+    any_radio.send(SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes(101)])))
     assert any_radio.counts() == {"packets_too_large": 1}
 
 
 def test_it_may_be_closed_twice_and_asked_even_then(any_radio):
     any_radio.close()
     any_radio.close()
-    assert len(any_radio.heard(0)[0]) == 0
+    assert len(any_radio.received(0)[0]) == 0

@@ -13,7 +13,7 @@ from swarmwire.agent.radios.zenoh_radio import range_bearing
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
-from tests.support.swarms import KEYS, ROBOTS, KeptLog, heard_by, meet, peers, radio, words
+from tests.support.swarms import KEYS, ROBOTS, KeptLog, meet, peers, radio, received_by, words
 from tests.support.waiting import until
 
 NOW_NS = 1_767_225_600 * NS_PER_S
@@ -138,12 +138,12 @@ def test_packets_come_with_range_and_bearing_of_the_tracker():
         meet(other, [a])
         b.send(words(1.0, 2.0))
         until(lambda: len(a._inbox._waiting) == 2)
-        heard, _ = a.heard(0)
-        assert heard.given["range_m"].tolist() == [2.0, 2.0]
-        assert np.allclose(heard.given["bearing_rad"], 0.0)
-        assert all(column.flags.c_contiguous for column in heard.given.values())
-        assert [packet.distance_m for packet in log.heard_packets] == [2.0, 2.0]
-        assert {name: column.shape for name, column in a.heard(0)[0].given.items()} == {
+        received, _ = a.received(0)
+        assert received.given["range_m"].tolist() == [2.0, 2.0]
+        assert np.allclose(received.given["bearing_rad"], 0.0)
+        assert all(column.flags.c_contiguous for column in received.given.values())
+        assert [packet.distance_m for packet in log.received_packets] == [2.0, 2.0]
+        assert {name: column.shape for name, column in a.received(0)[0].given.items()} == {
             "range_m": (0,),
             "bearing_rad": (0,),
         }
@@ -158,16 +158,16 @@ def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
         meet(other, [asks])
         clock.date_ns += OLDEST_NS + 1
         b.send(words(1.0))
-        until(lambda: not len(asks.heard(0)[0]) and asks.counts().get("packets_without_pose") == 1)
-        assert [(packet.distance_m, packet.given) for packet in log.heard_packets] == [(None, False)]
+        until(lambda: not len(asks.received(0)[0]) and asks.counts().get("packets_without_pose") == 1)
+        assert [(packet.distance_m, packet.given) for packet in log.received_packets] == [(None, False)]
         asks.close()
         asks_not = radio(session, "flock-0", clock, tracker=tracker)
         meet(other, [asks_not])
         b.send(words(2.0))
         until(lambda: len(asks_not._inbox._waiting) == 1)
-        heard, _ = asks_not.heard(0)
-        assert np.isnan(heard.given["range_m"]).tolist() == [True]
-        assert np.isnan(heard.given["bearing_rad"]).tolist() == [True]
+        received, _ = asks_not.received(0)
+        assert np.isnan(received.given["range_m"]).tolist() == [True]
+        assert np.isnan(received.given["bearing_rad"]).tolist() == [True]
 
 
 def test_without_a_tracker_nothing_is_given():
@@ -175,5 +175,5 @@ def test_without_a_tracker_nothing_is_given():
         a, b = radio(session, "flock-0", WallClock()), radio(other, "flock-1")
         meet(other, [a])
         b.send(words(1.0))
-        assert heard_by(a, 1) == [(1, 0, 1.0)]
+        assert received_by(a, 1) == [(1, 0, 1.0)]
         assert (a.gives, a.needs) == ((), frozenset())

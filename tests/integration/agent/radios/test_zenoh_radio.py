@@ -5,10 +5,10 @@ import pytest
 import zenoh
 
 from swarmwire.agent.radios import zenoh_radio
-from swarmwire.agent.radios.radio import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.packets import BROADCAST, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from tests.support.swarms import (
@@ -19,11 +19,11 @@ from tests.support.swarms import (
     KeptLog,
     Wide,
     Word,
-    heard_by,
     meet,
     peers,
     radio,
     radios,
+    received_by,
     words,
 )
 from tests.support.waiting import until
@@ -33,18 +33,18 @@ def packet(number: float = 1.0, to: int = BROADCAST, sequence: int = 0, sent_utc
     return PacketHeader(to, sequence, sent_utc_ns).encode() + Word(number=number).encode()
 
 
-def test_a_packet_is_heard_by_all_others_with_sender_and_number_and_never_by_its_sender():
+def test_a_packet_is_received_by_all_others_with_sender_and_number_and_never_by_its_sender():
     with radios(3) as (a, b, c):
         a.send(words(1.0, 2.0))
         b.send(words(3.0))
-        assert heard_by(a, 1) == [(1, 0, 3.0)]
-        assert sorted(heard_by(b, 2)) == [(0, 0, 1.0), (0, 1, 2.0)]
-        assert sorted(heard_by(c, 3)) == [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)]
+        assert received_by(a, 1) == [(1, 0, 3.0)]
+        assert sorted(received_by(b, 2)) == [(0, 0, 1.0), (0, 1, 2.0)]
+        assert sorted(received_by(c, 3)) == [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)]
         a.send(words(4.0))
-        assert heard_by(b, 1) == [(0, 2, 4.0)]
-        assert heard_by(c, 1) == [(0, 2, 4.0)]
+        assert received_by(b, 1) == [(0, 2, 4.0)]
+        assert received_by(c, 1) == [(0, 2, 4.0)]
         assert a.counts()["packets_sent"] == 3
-        assert a.counts()["packets_heard"] == 1
+        assert a.counts()["packets_received"] == 1
 
 
 def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now():
@@ -53,14 +53,16 @@ def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now(
         b.send(words(*range(20)))
         until(lambda: len(c._inbox._waiting) == 40)
         now_ns = 5 * NS_PER_S
-        heard, outcomes = c.heard(now_ns)
-        rows = list(zip(heard.heard_at_ns.tolist(), heard.sender.tolist(), heard.sequence.tolist(), strict=True))
+        received, outcomes = c.received(now_ns)
+        rows = list(
+            zip(received.received_at_ns.tolist(), received.sender.tolist(), received.sequence.tolist(), strict=True)
+        )
         assert rows == sorted(rows)
         assert [sequence for _, sender, sequence in rows if sender == 0] == list(range(20))
         assert 0 < rows[0][0] <= rows[-1][0] <= now_ns
-        assert heard.receiver.tolist() == [2] * 40
+        assert received.receiver.tolist() == [2] * 40
         assert len(outcomes) == 0
-        assert heard.given == {}
+        assert received.given == {}
 
 
 def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it():
@@ -69,18 +71,18 @@ def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it
         a, b, c = (radio(s, own, log=log) for s, own, log in zip(sessions, ROBOTS, logs, strict=True))
         meet(sessions[0], [b, c])
         a.send(words(1.0, to=1))
-        assert heard_by(b, 1) == [(0, 0, 1.0)]
-        until(lambda: len(c.heard(0)[0]) or c.counts().get("packets_overheard"))
-        assert c.counts().get("packets_heard") is None
-    (sent,), (overheard,), (heard,) = logs[0].sent_packets, logs[2].heard_packets, logs[1].heard_packets
+        assert received_by(b, 1) == [(0, 0, 1.0)]
+        until(lambda: len(c.received(0)[0]) or c.counts().get("packets_overheard"))
+        assert c.counts().get("packets_received") is None
+    (sent,), (overheard,), (received,) = logs[0].sent_packets, logs[2].received_packets, logs[1].received_packets
     assert sent == SentPacket(sent.utc_ns, sequence=0, to=1, size_bytes=6, tag=Word.tag, fate="sent")
     latency_ns = overheard.latency_ns
     assert latency_ns is not None
     assert 0 < latency_ns < NS_PER_S
-    assert overheard == HeardPacket(
+    assert overheard == ReceivedPacket(
         sent.utc_ns + latency_ns, 0, 0, 1, 6, Word.tag, latency_ns, distance_m=None, given=False
     )
-    assert heard.given
+    assert received.given
 
 
 def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
@@ -90,14 +92,14 @@ def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
         a, b = radio(sessions[0], ROBOTS[0], log=log, say=said.append), radio(sessions[1], ROBOTS[1])
         meet(sessions[0], [b])
         large = Payloads.of([b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()])
-        a.send(Sent(np.zeros(3, np.int64), np.full(3, BROADCAST), large))
-        a.send(Sent(np.zeros(1, np.int64), np.full(1, BROADCAST), large.rows(np.array([1]))))
+        a.send(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), large))
+        a.send(SentPackets(np.zeros(1, np.int64), np.full(1, BROADCAST), large.rows(np.array([1]))))
         a.send(words(4.0))
         rows: list[int] = []
 
         def three() -> bool:
-            heard, _ = b.heard(0)
-            rows.extend(heard.sequence.tolist())
+            received, _ = b.received(0)
+            rows.extend(received.sequence.tolist())
             return len(rows) == 3
 
         until(three)
@@ -113,7 +115,7 @@ def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbe
         a.send(words(1.0, to=0))
         a.send(words(1.0, to=3))
         a.send(words(2.0))
-        assert heard_by(b, 1) == [(0, 2, 2.0)]
+        assert received_by(b, 1) == [(0, 2, 2.0)]
         assert a.counts()["packets_to_nobody"] == 2
 
 
@@ -146,7 +148,7 @@ def test_what_breaks_the_protocol_is_counted_and_dropped(key, data, counted):
         other.put(key, data, congestion_control=zenoh.CongestionControl.BLOCK)
         proper = packet(7.0, sequence=3)
         other.put(KEYS.radio("flock-1", Word.tag), proper, congestion_control=zenoh.CongestionControl.BLOCK)
-        assert heard_by(a, 1) == [(1, 3, 7.0)]
+        assert received_by(a, 1) == [(1, 3, 7.0)]
         assert a.counts()[counted] == before + 1
 
 
@@ -158,22 +160,22 @@ def test_garbage_never_stops_a_radio():
         for size in rng.integers(0, 60, 300).tolist():
             other.put(KEYS.radio("flock-1", Word.tag), rng.bytes(size))
         other.put(KEYS.radio("flock-1", Word.tag), packet(7.0))
-        assert heard_by(a, 1)[-1][2] == 7.0
+        assert received_by(a, 1)[-1][2] == 7.0
         assert a.counts()["packets_malformed"] > 250
 
 
-def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_heard(monkeypatch):
+def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_received(monkeypatch):
     monkeypatch.setattr(zenoh_radio, "MAX_WAITING", 50)
     with radios() as (a, b):
         a.send(words(*range(80)))
         until(lambda: b.counts().get("packets_dropped") == 30)
-        assert [number for _, _, number in heard_by(b, 50)] == list(range(50))
+        assert [number for _, _, number in received_by(b, 50)] == list(range(50))
         a.send(words(80.0))
-        assert heard_by(b, 1) == [(0, 80, 80.0)]
-        assert (b.links[0].heard, b.links[0].missed) == (51, 30)
+        assert received_by(b, 1) == [(0, 80, 80.0)]
+        assert (b.links[0].received, b.links[0].missed) == (51, 30)
 
 
-def test_a_peer_that_vanishes_and_comes_back_is_heard_again_and_its_link_counts_no_loss():
+def test_a_peer_that_vanishes_and_comes_back_is_received_again_and_its_link_counts_no_loss():
     with peers(1) as (stays,):
         a = radio(stays, "flock-0")
         endpoint = endpoints_of(stays, Network(listen=ANY_PORT))
@@ -182,12 +184,12 @@ def test_a_peer_that_vanishes_and_comes_back_is_heard_again_and_its_link_counts_
             b = radio(session, "flock-1")
             meet(session, [a])
             b.send(words(1.0, 2.0, 3.0 + life))
-            assert [(1, 0, 1.0), (1, 1, 2.0), (1, 2, 3.0 + life)] == heard_by(a, 3)
+            assert [(1, 0, 1.0), (1, 1, 2.0), (1, 2, 3.0 + life)] == received_by(a, 3)
             session.close()
             b.send(words(5.0))  # nobody is hurt
             assert b.counts()["packets_refused"] == 1
             b.close()
-        assert (a.links[1].heard, a.links[1].missed) == (6, 0)
+        assert (a.links[1].received, a.links[1].missed) == (6, 0)
 
 
 def test_who_was_called_and_comes_back_at_its_old_endpoint_is_found_again():
@@ -202,7 +204,7 @@ def test_who_was_called_and_comes_back_at_its_old_endpoint_is_found_again():
             try:
                 meet(again, [b])
                 radio(again, "flock-0").send(words(9.0))
-                assert heard_by(b, 1) == [(0, 0, 9.0)]
+                assert received_by(b, 1) == [(0, 0, 9.0)]
             finally:
                 again.close()
         finally:
@@ -216,8 +218,8 @@ def test_a_radio_that_was_closed_hears_no_more_and_may_be_closed_again():
         c = radio(b._session, "flock-2")
         meet(a._session, [c])
         a.send(words(1.0))
-        assert heard_by(c, 1) == [(0, 0, 1.0)]
-        assert len(b.heard(0)[0]) == 0
+        assert received_by(c, 1) == [(0, 0, 1.0)]
+        assert len(b.received(0)[0]) == 0
 
 
 def test_many_packets_at_once_all_arrive():
@@ -225,5 +227,5 @@ def test_many_packets_at_once_all_arrive():
         for _ in range(5):
             a.send(words(*range(100)))
             for other in (b, c):
-                assert [number for _, _, number in heard_by(other, 100)] == list(range(100))
-        assert (b.links[0].heard, b.links[0].missed) == (500, 0)
+                assert [number for _, _, number in received_by(other, 100)] == list(range(100))
+        assert (b.links[0].received, b.links[0].missed) == (500, 0)

@@ -32,4 +32,4 @@ def test_agents_with_certificates_of_their_names_hear_one_another_in_a_run(tmp_p
             simulation.run()
     radio = simulation.result.radio
     assert radio is not None
-    assert radio.fates["heard"] > 10, radio
+    assert radio.fates["received"] > 10, radio

@@ -1,4 +1,4 @@
-"""A run in one terminal, and in another what it printed: the agent drives its robot, and is heard in the run's air."""
+"""A run in one terminal, and in another what it printed: the agent drives its robot, and is received there."""
 
 import json
 import signal

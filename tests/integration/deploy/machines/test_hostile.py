@@ -59,11 +59,11 @@ def faults(counts: dict[str, int]) -> dict[str, int]:
 
 
 class Hostile:
-    """A session that tries everything at once; `heard` is what it got hold of, then and later."""
+    """A session that tries everything at once; `received` is what it got hold of, then and later."""
 
     def __init__(self, name: str, opened: ExitStack) -> None:
         self.name, self._opened = name, opened
-        self.heard: list[str] = []
+        self.received: list[str] = []
         self._kept: list[object] = []
 
     def __call__(self, world: GuardedWorld) -> None:
@@ -82,11 +82,11 @@ class Hostile:
             self._kept.append(session.declare_subscriber(key, at_once(self._hear)))
 
     def _be_asked(self, query: zenoh.Query) -> None:
-        self.heard.append(f"asked {query.key_expr}")
+        self.received.append(f"asked {query.key_expr}")
 
     def _hear(self, sample: zenoh.Sample) -> None:
         if sample.attachment is None:  # what it puts itself, it hears, too
-            self.heard.append(str(sample.key_expr))
+            self.received.append(str(sample.key_expr))
 
     def _speak_for_others(self, session: zenoh.Session, keys: Keys) -> None:
         for payload in forged(AT_TICK):
@@ -123,7 +123,7 @@ def test_another_members_certificate_gets_nowhere(certs, undisturbed, tmp_path, 
         hostile = Hostile(name, opened)
         result = GuardedWorld(certs, hostile).run(tmp_path / "run")
         assert list(result.trajectory_sha256) == undisturbed
-        assert hostile.heard == []
+        assert hostile.received == []
     arrived = faults(result.counts)
     if name != "mallory":
         assert arrived == {}
@@ -140,13 +140,13 @@ def flood(world: GuardedWorld, name: str, opened: ExitStack) -> None:
         session.put(own, b"x", congestion_control=BLOCK)
 
 
-def test_who_floods_is_heard_no_more_and_the_others_are(certs, undisturbed, tmp_path):
+def test_who_floods_is_received_no_more_and_the_others_are(certs, undisturbed, tmp_path):
     with ExitStack() as opened:
         result = GuardedWorld(certs, lambda world: flood(world, "mallory", opened)).run(tmp_path / "run")
     assert list(result.trajectory_sha256) == undisturbed
     counts = faults(result.counts)
     assert counts.pop("flooded_frames") > LIMITS.flood
-    # Those that were let through before, and answers of the others that were heard twice meanwhile.
+    # Those that were let through before, and answers of the others that were received twice meanwhile.
     assert counts.keys() <= {"unknown_runner_frames", "wrong_tick_frames"}
 
 

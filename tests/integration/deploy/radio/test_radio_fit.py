@@ -124,8 +124,8 @@ def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, argume
 
 def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
     rows = [f"{0.1 * i},a,b,{i},{0.9 if i % 4 == 0 else 0.01 + 1e-5 * i}\n" for i in range(200)]
-    (here / "heard[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
-    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "heard[1].csv")
+    (here / "received[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "received[1].csv")
     assert code == 0
-    assert out.startswith("heard[1].csv: 200 packets")
+    assert out.startswith("received[1].csv: 200 packets")
     assert "no distribution of [radio.delays] fits" in " ".join(out.split())

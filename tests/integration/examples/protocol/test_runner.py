@@ -83,7 +83,7 @@ def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(mixed: list[Mix
     assert together.trajectory_sha256 == alone.trajectory_sha256
     assert together.counts == alone.counts
     assert together.radio is not None
-    assert together.radio.fates["heard"] > 2000
+    assert together.radio.fates["received"] > 2000
 
 
 def test_its_robots_and_those_of_swarmwire_hear_one_another(mixed: list[Mixed]) -> None:

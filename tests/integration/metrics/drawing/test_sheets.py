@@ -135,7 +135,7 @@ def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(t
     assert (tmp_path / "coverage.png").stat().st_size > 1000
 
 
-def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_heard(tmp_path, monkeypatch):
+def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_received(tmp_path, monkeypatch):
     of, drawn = static(6, arenas=2), []
     record(tmp_path, of, ticks(DISK, of, 3, count=20))
     monkeypatch.setattr(distance_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
@@ -146,7 +146,7 @@ def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_heard(tmp
     table = RunFolder(tmp_path).radio_distances(1)
     np.testing.assert_allclose(ratio, table["pdr"].cast(float).to_numpy()[: len(ratio)])
     np.testing.assert_allclose(middle_m, (table["from_m"] + table["to_m"]).to_numpy()[: len(ratio)] / 2)
-    last_m = table.filter(table["heard"] > 0)["to_m"][-1]
+    last_m = table.filter(table["received"] > 0)["to_m"][-1]
     assert upper.get_xlim() == lower.get_xlim()
     assert upper.get_xlim()[1] == pytest.approx(1.5 * last_m, abs=0.1)
     assert "seed 2" in figure.texts[0].get_text()
@@ -169,7 +169,7 @@ def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
     [
         (pl.col("pdr").cast(pl.String), "pdr .*String.*Float64"),
         (pl.lit(None, pl.Float64).alias("from_m"), "from_m .*null"),
-        (pl.lit(7.0).alias("pdr"), "pdr .*heard / intended"),
+        (pl.lit(7.0).alias("pdr"), "pdr .*received / intended"),
         (None, "no column pdr"),
     ],
 )

@@ -165,7 +165,7 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
     of = runs[0][0]
     folder = as_logs(of, tmp_path)
     for robot in folder.iterdir():
-        for name in ("sent.csv", "heard.csv"):
+        for name in ("sent.csv", "received.csv"):
             head, *rows = (robot / name).read_text().splitlines(keepends=True)
             early = [row for row in rows if float(row.split(",")[0]) < BEGAN_S + 10.0]
             (robot / name).write_text("".join([head, *early]))
@@ -185,7 +185,7 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
 def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, tmp_path):
     watched_runs, many = runs
     folder = as_logs(watched_runs[0], tmp_path, about={"radio": {"kind": "air"}})
-    for path in folder.glob("*/heard.csv"):  # such robots do not know when a packet was sent
+    for path in folder.glob("*/received.csv"):  # such robots do not know when a packet was sent
         head, *rows = (line.split(",") for line in path.read_text().splitlines())
         at = head.index("latency_s")
         path.write_text(

@@ -73,7 +73,7 @@ def test_logs_of_robots_in_step_measure_as_the_run_did(tmp_path, emulated):
         np.testing.assert_allclose(of.series[name], series[name], rtol=1e-5, atol=1e-5, err_msg=name)
     # Differences of positions are speeds between ticks, not at them.
     assert np.nanmean(of.series["speed"]) == pytest.approx(np.nanmean(series["speed"]), rel=0.03)
-    assert of.radio["fates"]["heard"] == radio["fates"]["heard"]
+    assert of.radio["fates"]["received"] == radio["fates"]["received"]
     assert of.radio["latency_air_s"] == radio["latency_air_s"]
 
 
@@ -120,7 +120,7 @@ def test_without_a_tracker_the_radio_is_measured_and_nothing_else(tmp_path):
     assert set(of.series) == {"pdr", "throughput", "age_of_information", "latency_air"}
     assert "tracker" in of.left_out["order"]
     assert [("tracker" in note) for note in of.notes] == [True]
-    assert of.radio["fates"]["heard"] > 1000
+    assert of.radio["fates"]["received"] > 1000
 
 
 def test_clocks_that_are_apart_are_told_and_set_right(tmp_path, emulated):

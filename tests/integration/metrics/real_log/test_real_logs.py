@@ -57,21 +57,21 @@ def test_logs_may_lie_one_deeper_and_of_each_robot_the_newest_start_counts(folde
 def test_a_killed_robot_ends_in_half_a_line_which_is_dropped_and_told(folder):
     whole = read_real_logs(folder).robots[1]
     (folder / "flock-1" / "summary.json").unlink()
-    for name in ("ticks.csv", "heard.csv"):
+    for name in ("ticks.csv", "received.csv"):
         path = folder / "flock-1" / name
         path.write_bytes(path.read_bytes()[:-9])
     logs = read_real_logs(folder)
     robot = logs.robots[1]
     assert robot.ended is None
     assert len(robot.steps.time_s) == len(whole.steps.time_s) - 1
-    assert len(robot.heard.time_s) == len(whole.heard.time_s) - 1
+    assert len(robot.received.time_s) == len(whole.received.time_s) - 1
     killed, dropped = logs.notes
     assert "summary of flock-1" in killed
-    assert "flock-1's ticks.csv, heard.csv" in dropped
+    assert "flock-1's ticks.csv, received.csv" in dropped
 
 
 def test_a_robot_that_was_killed_at_once_wrote_nothing(folder):
-    for name in ("ticks.csv", "heard.csv", "sent.csv"):
+    for name in ("ticks.csv", "received.csv", "sent.csv"):
         (folder / "flock-1" / name).write_bytes(b"")
     assert len(read_real_logs(folder).robots[1].steps.time_s) == 0
 
@@ -79,7 +79,7 @@ def test_a_robot_that_was_killed_at_once_wrote_nothing(folder):
 def test_missing_robots_and_different_agents_are_told(folder):
     told(folder, "flock-0", agent="other:Agent", params={"a": 1})
     (folder / "flock-3" / "robot.json").rename(folder / "robot.json.old")
-    for name in ("ticks.csv", "heard.csv", "sent.csv", "summary.json"):
+    for name in ("ticks.csv", "received.csv", "sent.csv", "summary.json"):
         (folder / "flock-3" / name).unlink()
     notes = read_real_logs(folder).notes
     assert "flock-3" in notes[0]
@@ -115,8 +115,8 @@ def test_robots_of_different_kinds_of_runs_are_refused_with_file_and_key(folder,
         ("ticks.csv", "9,soon,0,,,,1,0,0,,,", "t_s"),
         ("ticks.csv", "9,5.0,0,,,,1,0,0,,,", "t_s"),
         ("ticks.csv", "9,1e300,0,,,,1,0,0,,,", "t_s"),
-        ("heard.csv", "9.0,flock-0,flock-1,1.5,,14,say,0.1,1.0,1", "seq"),
-        ("heard.csv", "9.0,flock-0,flock-1,1,,14,say,inf,1.0,1", "latency_s"),
+        ("received.csv", "9.0,flock-0,flock-1,1.5,,14,say,0.1,1.0,1", "seq"),
+        ("received.csv", "9.0,flock-0,flock-1,1,,14,say,inf,1.0,1", "latency_s"),
         ("sent.csv", "9.0,flock-1,,,14,say,sent", "seq"),
         ("sent.csv", "9.0,flock-1,1,,14,say,sent,and,more", ""),
     ],

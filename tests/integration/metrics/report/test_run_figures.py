@@ -142,20 +142,20 @@ def test_trajectories_are_coloured_by_group_where_there_are_several_else_by_time
 
 
 def test_ratios_over_distance_have_their_binomial_intervals():
-    heard, intended = np.array([9, 5, 0]), np.array([10, 10, 4])
+    received, intended = np.array([9, 5, 0]), np.array([10, 10, 4])
     table = pl.DataFrame(
         {
             "from_m": [0.0, 1.0, 2.0],
             "to_m": [1.0, 2.0, 3.0],
             "intended": intended,
-            "heard": heard,
-            "pdr": heard / intended,
+            "received": received,
+            "pdr": received / intended,
         }
     )
     upper, lower = delivery_by_distance(table, 2.0).axes
-    np.testing.assert_array_equal(upper.lines[0].get_ydata(), heard / intended)
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), received / intended)
     bars = np.array([segment[:, 1] for segment in upper.collections[0].get_segments()])
-    np.testing.assert_allclose(bars.T, binomial_interval(heard, intended))
+    np.testing.assert_allclose(bars.T, binomial_interval(received, intended))
     assert lower.patches[0].get_data().values.tolist() == intended.tolist()
 
 
@@ -178,8 +178,8 @@ def test_packets_tell_when_their_receivers_act_as_the_summary_does(tmp_path, rad
         assert one.finished is not None
         agent_ns += latencies.of(one.finished, one.tick)[2].tolist()
     record(tmp_path, of, seen, packets=1.0)
-    heard = RunFolder(tmp_path).packets().filter(pl.col("fate") == "heard")
-    final, sent, receiver = (heard[name].to_numpy() for name in ("final_at_ns", "sent_at_ns", "receiver"))
+    received = RunFolder(tmp_path).packets().filter(pl.col("fate") == "received")
+    final, sent, receiver = (received[name].to_numpy() for name in ("final_at_ns", "sent_at_ns", "receiver"))
     assert sorted(acts_at_ns(final, receiver, of) - sent) == sorted(agent_ns)
     assert len(agent_ns) > 20
 
@@ -188,10 +188,10 @@ def test_links_add_up_to_the_account_of_the_radio(tmp_path):
     of = static(6)
     seen = list(ticks(RADIOS[1], of, 3, count=30))
     record(tmp_path, of, seen, links=True)
-    heard, in_range = of_links(RunFolder(tmp_path).radio_links(), of.robots)
+    received, in_range = of_links(RunFolder(tmp_path).radio_links(), of.robots)
     fates = np.sum([one.tally.fates[0] for one in seen if one.tally], axis=0)
-    assert heard.sum() == fates[Fate.HEARD]
-    assert (heard <= in_range).all()
+    assert received.sum() == fates[Fate.RECEIVED]
+    assert (received <= in_range).all()
     assert not in_range.diagonal().any()
     rows = RunFolder(tmp_path).radio_links()["packets"].sum()
     assert in_range.sum() == rows - fates[Fate.BLOCKED] > 0

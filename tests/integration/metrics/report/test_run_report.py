@@ -100,8 +100,8 @@ def test_of_several_arenas_the_first_is_drawn_and_tables_are_of_all(tmp_path):
     assert summary is not None
     finals = [arena["order"]["final"] for arena in summary["metrics"]]
     assert table(report, "Final values")["order"][:2] == ("3", number(min(finals)))
-    heard = sum(arena["fates"]["heard"] for arena in summary["radio"])
-    assert table(report, "Fates of packets in 3 arenas")["heard"][0] == f"{heard:,}"
+    received = sum(arena["fates"]["received"] for arena in summary["radio"])
+    assert table(report, "Fates of packets in 3 arenas")["received"][0] == f"{received:,}"
 
 
 def test_a_killed_run_is_reported_up_to_its_last_tick(tmp_path):

@@ -28,8 +28,8 @@ DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 def seen_ticks(of):
     kill = Happened(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
-    ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.HEARD, Fate.LOST, Fate.HEARD])
-    counted = tally({Fate.HEARD: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.HEARD: 1})
+    ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED])
+    counted = tally({Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.RECEIVED: 1})
     yield from wandering(of, TICKS, events=(kill,), finished=ended, tally=counted)
 
 
@@ -197,7 +197,7 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
         ({"events": []}, "events", ("20 rows", "0 events")),
         ({"metrics": [{"order": {"final": 2.0}}] * 2}, "ticks", ("order", "2.0")),
         ({"metrics": [{"speed": {"final": 2.0}}] * 2}, "ticks", ("speed",)),
-        ({"radio": [{"fates": {"heard": 11}}] * 2}, "packets", ("10 heard (arena 0)", "11")),
+        ({"radio": [{"fates": {"received": 11}}] * 2}, "packets", ("10 received (arena 0)", "11")),
         ({"metrics": [{"order": {}}] * 2}, "ticks", ("summary.json",)),
         ({"radio": [{"fates": 3}] * 2}, "packets", ("summary.json",)),
         ({"events": [1]}, "events", ("summary.json",)),
@@ -216,7 +216,7 @@ def test_an_arena_too_few_is_found(tmp_path):
 
 
 def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run_broken_off(tmp_path):
-    other = {"radio": [{"fates": {"heard": 11}}] * 2}
+    other = {"radio": [{"fates": {"received": 11}}] * 2}
     rows = {"ticks": {"rows": 20, "dropped": 0}, "events": {"rows": 20, "dropped": 0}}
     for number, given in enumerate(
         [

@@ -99,20 +99,21 @@ def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
 
 def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tmp_path):
     of = static(4)
-    counts = [{Fate.HEARD: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
+    counts = [{Fate.RECEIVED: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
     record(tmp_path / "run.rrd", of, [truth(of, tick, tally=tally(count)) for tick, count in enumerate(counts)])
     drawn = series(tmp_path / "run.rrd", "packets")
-    assert drawn.keys() == {"heard", "lost"}
+    assert drawn.keys() == {"received", "lost"}
     assert min(drawn["lost"]) == 12
-    for fate, name in ((Fate.HEARD, "heard"), (Fate.LOST, "lost")):
+    for fate, name in ((Fate.RECEIVED, "received"), (Fate.LOST, "lost")):
         for tick, value in drawn[name].items():
             last = [count[fate] for count in counts[max(0, tick - 9) : tick + 1]]
             assert value == pytest.approx(10 * sum(last) / len(last))
     delivery = series(tmp_path / "run.rrd", "shares")["delivery"]
-    heard, in_range = (
-        sum(sum(count[f] for f in fates) for count in counts[-10:]) for fates in ([Fate.HEARD], [Fate.HEARD, Fate.LOST])
+    received, in_range = (
+        sum(sum(count[f] for f in fates) for count in counts[-10:])
+        for fates in ([Fate.RECEIVED], [Fate.RECEIVED, Fate.LOST])
     )
-    assert delivery[39] == pytest.approx(heard / in_range)
+    assert delivery[39] == pytest.approx(received / in_range)
 
 
 def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
@@ -163,7 +164,7 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
         **dict.fromkeys(
             ("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
         ),
-        fate=np.array([Fate.LOST, Fate.HEARD, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
+        fate=np.array([Fate.LOST, Fate.RECEIVED, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
     )
     first, second = moving(of, 2)
     record(tmp_path / "run.rrd", of, [replace(first, finished=own), second], arena=1)
@@ -203,7 +204,7 @@ def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp
     for observer in (metrics, recording):
         observer.begin(of)
     sent = []
-    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.HEARD: 150})):
+    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.RECEIVED: 150})):
         calls.clear()
         clock.time_ns += 7 * NS_PER_S // 10
         for observer in (metrics, recording):
@@ -275,7 +276,7 @@ def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(t
     of = static(3, obstacles=OBSTACLES)
     contents = []
     for path in (tmp_path / "a.rrd", tmp_path / "b.rrd"):
-        record(path, of, moving(of, 5, edges=edges((0, 1)), tally=tally({Fate.HEARD: 2})))
+        record(path, of, moving(of, 5, edges=edges((0, 1)), tally=tally({Fate.RECEIVED: 2})))
         chunks = list(rerun.chunk.RrdReader(str(path)).stream())
         assert {name for chunk in chunks for name in chunk.timeline_names} == {"tick", "sim_time"}
         columns = {(chunk.entity_path, name) for chunk in chunks for name in chunk.to_record_batch().schema.names}

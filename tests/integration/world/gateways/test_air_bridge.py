@@ -9,7 +9,7 @@ from swarmwire.agent.radios import world_radio
 from swarmwire.agent.radios.world_radio import AirRadio
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_air
@@ -17,7 +17,7 @@ from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
 from tests.support.clocks import FakeClock
-from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, heard_by, words
+from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, received_by, words
 from tests.support.waiting import until
 
 GIVES = ("range_m", "bearing_rad")
@@ -58,13 +58,13 @@ def joined(session, own="flock-1", clock=None, **given) -> AirRadio:
     return radio
 
 
-def heard(*packets: tuple[int, int, int, int], payloads=None) -> Heard:
+def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPackets:
     """Receiver, sender, sequence, and time of each packet, sorted; each is a word with its sequence."""
     columns = [np.array(column, np.int64) for column in zip(*packets, strict=True)]
     receiver, sender, sequence, at_ns = columns
     payloads = payloads or Payloads.of([Word(number=float(number)).encode() for number in sequence])
     given = {"range_m": 0.5 + sender, "bearing_rad": -0.5 * sender}
-    return Heard(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
+    return ReceivedPackets(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
 
 
 def exchange(bridge: AirBridge, radio: AirRadio) -> None:
@@ -75,19 +75,19 @@ def exchange(bridge: AirBridge, radio: AirRadio) -> None:
     def reached() -> bool:
         nonlocal number
         number += 1
-        bridge.publish(0, heard((row, 0, number, 0)), NO_OUTCOMES)
-        return len(radio.heard(0)[0]) > 0
+        bridge.publish(0, received((row, 0, number, 0)), NO_OUTCOMES)
+        return len(radio.received(0)[0]) > 0
 
     until(reached)
     number += 1
-    bridge.publish(0, heard((row, 0, number, 0)), NO_OUTCOMES)
-    until(lambda: number in radio.heard(0)[0].sequence.tolist())
+    bridge.publish(0, received((row, 0, number, 0)), NO_OUTCOMES)
+    until(lambda: number in radio.received(0)[0].sequence.tolist())
 
 
-def taken(bridge: AirBridge, packets: int) -> Sent:
-    parts: list[Sent] = []
+def taken(bridge: AirBridge, packets: int) -> SentPackets:
+    parts: list[SentPackets] = []
     until(lambda: parts.append(bridge.take()) or sum(map(len, parts)) >= packets)
-    return Sent.joined(parts)
+    return SentPackets.joined(parts)
 
 
 def test_a_robot_learns_what_the_worlds_radio_gives():
@@ -102,7 +102,7 @@ def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
     with bridged() as (bridge, session):
         one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
         payloads = Payloads.of([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
-        one.send(Sent(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
+        one.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
         sent = taken(bridge, 2)
         assert (sent.sender.tolist(), sent.to.tolist(), sent.outcome_ids.tolist()) == ([1, 1], [BROADCAST, 2], [-1, 7])
         assert [sent.payloads.row(i) for i in range(2)] == [payloads.row(i) for i in range(2)]
@@ -121,7 +121,7 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
         exchange(bridge, one)
         exchange(bridge, two)
         shared = Payloads.of([Word(number=8).encode(), Word(number=9).encode()])
-        table = Heard(
+        table = ReceivedPackets(
             np.array([0, 1, 1, 2]),
             np.array([1, 0, 2, 0]),
             np.array([4, 8, 9, 8]),
@@ -132,11 +132,11 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
         )
         told = Outcomes(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, SendResult.QUEUE_FULL, 0]))
         bridge.publish(7, table, told)
-        found: list[tuple[Heard, Outcomes]] = []
+        found: list[tuple[ReceivedPackets, Outcomes]] = []
 
-        def of(radio: AirRadio, packets: int) -> tuple[Heard, Outcomes]:
+        def of(radio: AirRadio, packets: int) -> tuple[ReceivedPackets, Outcomes]:
             found.clear()
-            until(lambda: found.append(radio.heard(NS_PER_S)) or len(found[-1][0]) == packets)
+            until(lambda: found.append(radio.received(NS_PER_S)) or len(found[-1][0]) == packets)
             return found[-1]
 
         its, outcomes = of(one, 2)
@@ -150,14 +150,14 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
         assert (its.receiver.tolist(), its.sequence.tolist(), outcomes.id.tolist()) == ([2], [8], [5])
 
 
-def test_nothing_heard_is_no_frame(monkeypatch):
+def test_nothing_received_is_no_frame(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
         monkeypatch.setattr("swarmwire.world.gateways.radio_bridge.encode_air", lambda *_: published.append(1) or b"")
-        bridge.publish(1, Heard.none(GIVES), NO_OUTCOMES)
-        bridge.publish(2, heard((0, 1, 1, 1)), NO_OUTCOMES)  # nobody behind the bridge heard it
+        bridge.publish(1, ReceivedPackets.none(GIVES), NO_OUTCOMES)
+        bridge.publish(2, received((0, 1, 1, 1)), NO_OUTCOMES)  # nobody behind the bridge received it
         assert not published
-        bridge.publish(3, heard((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_OUTCOMES)
+        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_OUTCOMES)
         assert len(published) == 2
 
 
@@ -166,13 +166,13 @@ def test_times_are_the_agents_own_by_how_old_a_packet_was_when_its_tick_began():
         log, clock = KeptLog(), DatedClock()
         radio = joined(session(), clock=clock, log=log)
         exchange(bridge, radio)
-        log.heard_packets.clear()
-        bridge.publish(20, heard((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_OUTCOMES)
+        log.received_packets.clear()
+        bridge.publish(20, received((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_OUTCOMES)
         until(lambda: len(radio._inbox._waiting) == 1)
         clock.time_ns += 10_000_000
-        its, _ = radio.heard(5 * NS_PER_S)
-        assert its.heard_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
-        (packet,) = log.heard_packets
+        its, _ = radio.received(5 * NS_PER_S)
+        assert its.received_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
+        (packet,) = log.received_packets
         assert (packet.sender, packet.sequence, packet.to) == (0, 5, BROADCAST)
         assert (packet.latency_ns, packet.distance_m, packet.given) == (None, 0.5, True)
 
@@ -182,7 +182,7 @@ def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
         log = KeptLog()
         radio = joined(session(), log=log)
         large = Payloads.of([bytes(20), bytes(21)])
-        radio.send(Sent(np.full(2, 1), np.full(2, BROADCAST), large))
+        radio.send(SentPackets(np.full(2, 1), np.full(2, BROADCAST), large))
         assert taken(bridge, 2).payloads.sizes.tolist() == [20, 21]
         assert [(packet.sequence, packet.fate) for packet in log.sent_packets] == [(0, "sent"), (1, "too_large")]
         assert radio.counts() == {"packets_sent": 1, "packets_too_large": 1}
@@ -233,31 +233,31 @@ def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
 
 def bad_frames() -> list[bytes]:
     """Frames that no robot can use, most of them almost right."""
-    good = frames.decode(encode_air(3, 1, heard((1, 0, 1, 1), (1, 2, 2, 2)), NO_OUTCOMES))
+    good = frames.decode(encode_air(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_OUTCOMES))
 
     def changed(name, value) -> bytes:
         return frames.encode("tick", 3, {**good.arrays, name: value})
 
-    numbers = good.arrays["heard/numbers"]
+    numbers = good.arrays["received/numbers"]
     return [
         b"",
         frames.encode("end", 3, {}),
         frames.encode("tick", -1, good.arrays),
         frames.encode("tick", 3, {}),
-        encode_air(3, 1, heard((2, 0, 1, 1)), NO_OUTCOMES),
-        encode_air(3, 1, Heard.none(GIVES), Outcomes(np.array([2]), np.array([1]), np.array([0]))),
-        changed("heard/numbers", numbers[:4]),
-        changed("heard/numbers", numbers[0]),
-        changed("heard/numbers", numbers.astype(np.float64)),
-        changed("heard/numbers", numbers + np.array([[0], [3], [0], [0], [0]])),
-        changed("heard/numbers", numbers + np.array([[0], [0], [0], [0], [1]])),
-        changed("heard/numbers", numbers - np.array([[0], [0], [0], [0], [1]])),
-        changed("heard/given", good.arrays["heard/given"][:1]),
-        changed("heard/given", good.arrays["heard/given"][0]),
-        changed("heard/offset", good.arrays["heard/offset"][:-1]),
-        changed("heard/offset", good.arrays["heard/offset"][::-1]),
-        changed("heard/offset", np.empty(0, np.int64)),
-        changed("heard/data", good.arrays["heard/data"][:-1]),
+        encode_air(3, 1, received((2, 0, 1, 1)), NO_OUTCOMES),
+        encode_air(3, 1, ReceivedPackets.none(GIVES), Outcomes(np.array([2]), np.array([1]), np.array([0]))),
+        changed("received/numbers", numbers[:4]),
+        changed("received/numbers", numbers[0]),
+        changed("received/numbers", numbers.astype(np.float64)),
+        changed("received/numbers", numbers + np.array([[0], [3], [0], [0], [0]])),
+        changed("received/numbers", numbers + np.array([[0], [0], [0], [0], [1]])),
+        changed("received/numbers", numbers - np.array([[0], [0], [0], [0], [1]])),
+        changed("received/given", good.arrays["received/given"][:1]),
+        changed("received/given", good.arrays["received/given"][0]),
+        changed("received/offset", good.arrays["received/offset"][:-1]),
+        changed("received/offset", good.arrays["received/offset"][::-1]),
+        changed("received/offset", np.empty(0, np.int64)),
+        changed("received/data", good.arrays["received/data"][:-1]),
     ]
 
 
@@ -267,10 +267,10 @@ def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it(
         exchange(bridge, radio)
         bad = bad_frames()
         for data in bad:
-            bridge.session.put(KEYS.air_heard("flock-1"), data)
-        bridge.session.put(KEYS.air_heard("flock-1"), bytes(2**20 + 1))
-        bridge.publish(4, heard((1, 0, 5, 1)), NO_OUTCOMES)
-        assert heard_by(radio, 1) == [(0, 5, 5.0)]
+            bridge.session.put(KEYS.air_received("flock-1"), data)
+        bridge.session.put(KEYS.air_received("flock-1"), bytes(2**20 + 1))
+        bridge.publish(4, received((1, 0, 5, 1)), NO_OUTCOMES)
+        assert received_by(radio, 1) == [(0, 5, 5.0)]
         counts = radio.counts()
         assert (counts["frames_malformed"], counts["frames_oversized"]) == (len(bad), 1)
 
@@ -281,9 +281,9 @@ def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch)
         radio = joined(session())
         exchange(bridge, radio)
         for tick in range(14):
-            bridge.publish(tick, heard((1, 0, tick, tick * NS_PER_S // 10)), NO_OUTCOMES)
+            bridge.publish(tick, received((1, 0, tick, tick * NS_PER_S // 10)), NO_OUTCOMES)
         until(lambda: radio.counts().get("frames_dropped") == 4)
-        assert [number for _, number, _ in heard_by(radio, 10)] == list(range(10))
+        assert [number for _, number, _ in received_by(radio, 10)] == list(range(10))
 
 
 def test_after_the_run_neither_side_is_hurt():

@@ -90,7 +90,7 @@ def test_the_range_is_found_where_packets_were_sent_from_beyond(fit):
     assert any("from beyond the range count as out of range" in note for note in fit.notes)
 
 
-def test_where_nobody_went_far_the_range_is_at_least_what_was_heard(steady):
+def test_where_nobody_went_far_the_range_is_at_least_what_was_received(steady):
     of = steady
     assert isinstance(of.range, RangeFit)
     assert not of.range.reached
@@ -114,7 +114,7 @@ def test_each_link_has_its_delivery_and_each_robot_its_neighbours(steady):
     assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
 
 
-def test_of_one_robots_log_those_that_it_heard_are_its_neighbours(tmp_path):
+def test_of_one_robots_log_those_that_it_received_are_its_neighbours(tmp_path):
     of = fit_network(network_log_of_robots(read_real_logs(as_logs(flock(), tmp_path) / "flock-0")))
     assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
     assert of.neighbours["flock-1"] == ("flock-0",)  # of the others nothing is known
@@ -122,7 +122,7 @@ def test_of_one_robots_log_those_that_it_heard_are_its_neighbours(tmp_path):
 
 def test_a_link_that_delivers_one_way_alone_makes_no_neighbours(tmp_path):
     folder = as_logs(flock(), tmp_path)
-    (folder / "flock-1" / "heard.csv").write_text(HEAD)  # it is there, and heard nobody
+    (folder / "flock-1" / "received.csv").write_text(HEAD)  # it is there, and received nobody
     assert "flock-1" not in fit_network(network_log_of_robots(read_real_logs(folder))).neighbours["flock-0"]
 
 
@@ -146,7 +146,7 @@ def test_clocks_that_are_apart_are_set_right_before_latencies_are_fitted(tmp_pat
 def test_latencies_that_are_not_uniform_become_a_table_of_delays(tmp_path):
     draws = np.random.default_rng(4).lognormal(-4.0, 0.8, 2000)
     rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i},,14,say,{late_s:.9f},1.0,1\n" for i, late_s in enumerate(draws)]
-    path = tmp_path / "heard.csv"
+    path = tmp_path / "received.csv"
     path.write_text(HEAD + "".join(rows))
     of = fit_network(network_log_of_table(path))
     table = network_table(of)["radio"]
@@ -183,15 +183,15 @@ def test_a_robot_whose_log_is_missing_still_has_links_to_others(tmp_path):
     assert all(0.5 < link.pdr < 0.9 for link in from_there)
 
 
-def test_packets_before_the_first_and_after_the_last_that_was_heard_count_where_the_sender_logged_them(tmp_path):
+def test_packets_before_the_first_and_after_the_last_that_was_received_count_where_the_sender_logged_them(tmp_path):
     folder = as_logs(flock(), tmp_path)
-    path = folder / "flock-1" / "heard.csv"
+    path = folder / "flock-1" / "received.csv"
     head, *rows = path.read_text().splitlines(keepends=True)
     middle = [row for row in rows if 30 <= int(row.split(",")[3]) < 60]
     path.write_text("".join([head, *middle]))
     links = deliveries(network_log_of_robots(read_real_logs(folder)))
     into = [link for link in links if link.receiver == "flock-1"]
-    assert all(190 <= link.packets <= 200 and 10 <= link.heard <= 30 for link in into)
+    assert all(190 <= link.packets <= 200 and 10 <= link.received <= 30 for link in into)
     (table,) = [network_log_of_table(path)]
     assert max(np.bincount(table.packets.sender)) <= 30  # the table alone tells nothing of the others
 
@@ -199,7 +199,7 @@ def test_packets_before_the_first_and_after_the_last_that_was_heard_count_where_
 def test_an_agent_that_was_started_again_loses_nothing(tmp_path):
     """Its numbers fall to 0: the packets before and after are counted, none between."""
     rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i if i < 200 else i - 200},,14,say,0.01,1.0,1\n" for i in range(400)]
-    path = tmp_path / "heard.csv"
+    path = tmp_path / "received.csv"
     path.write_text(HEAD + "".join(rows))
     log = network_log_of_table(path)
     assert (len(log.lost), int(log.lost.sum())) == (400, 0)
@@ -208,10 +208,10 @@ def test_an_agent_that_was_started_again_loses_nothing(tmp_path):
 def test_rows_may_come_late_and_twice(tmp_path):
     sent = [*range(150), 7, 3]
     rows = [f"{1000.0 + 0.1 * i + (0.35 if i % 50 == 9 else 0.01):.9f},a,b,{i}\n" for i in sent if i % 10]
-    path = tmp_path / "heard.csv"
+    path = tmp_path / "received.csv"
     path.write_text("t_s,tx,rx,seq\n" + "".join(rows) + "9")
     log = network_log_of_table(path)
-    assert len(log.lost) == 149  # from the first that was heard to the last
+    assert len(log.lost) == 149  # from the first that was received to the last
     assert int(log.lost.sum()) == 14
     assert log.notes == ("half a line at the end was dropped",)
     assert np.isnan(log.distance_m).all()
@@ -243,7 +243,7 @@ def test_tables_are_told_apart_by_their_columns(tmp_path):
 
 
 def test_more_lost_packets_than_can_be_are_refused(tmp_path):
-    path = tmp_path / "heard.csv"
+    path = tmp_path / "received.csv"
     path.write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,900000000\n")
     with pytest.raises(BadInput, match="leaves 899999998 packets out"):
         network_log_of_table(path)

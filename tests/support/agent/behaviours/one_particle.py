@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
 from swarmwire.agent.host import hosted
 from swarmwire.comms.messages import Message
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses
 from tests.support.agent.hosts import group
 
@@ -30,7 +30,7 @@ class One:
         zeros = np.zeros(k, np.int64)
         given = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
         payloads = Payloads.of([best.encode() for best in bests])
-        heard = Heard(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), payloads)
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), payloads)
         fields = {
             "proximity.value": self.rays[None, :],
             "compass.heading_rad": np.array([self.heading_rad]),
@@ -41,7 +41,7 @@ class One:
             "positioning.y_m": np.array([self.place[1]]),
         }
         actions = self._host.act(
-            (self.tick, self.tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), heard
+            (self.tick, self.tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received
         )
         self.tick += 1
         return actions

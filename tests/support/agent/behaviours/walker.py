@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.agent.host import hosted
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.messages import Message
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses
 from tests.support.agent.hosts import group
 
@@ -26,19 +26,22 @@ class Walker:
         return self._host._state
 
     def step(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> Actions:
-        """Neighbours, as range in m and bearing in rad, are heard by all; a thing is near in direction `near_rad`."""
+        """Neighbours, as range in m and bearing in rad, are received by all.
+
+        A thing is near in direction `near_rad`.
+        """
         k, n = len(neighbours), self._n
         table = np.tile(np.array(neighbours, np.float64).reshape(-1, 2), (n, 1))
         zeros, receiver = np.zeros(n * k, np.int64), np.repeat(np.arange(n), k)
         given = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         payloads = Payloads.of([self._word().encode()] * (n * k) if self._word else [])
-        heard = Heard(receiver, zeros + n, zeros, zeros, given, np.arange(n * k), payloads)
+        received = ReceivedPackets(receiver, zeros + n, zeros, zeros, given, np.arange(n * k), payloads)
         value = np.zeros((n, 8))
         if near_rad is not None:
             value[:] = np.maximum(np.cos(RAYS_RAD - near_rad), 0.0) ** 4
         time = (self._tick, self._tick * 10**8, 10**8)
         self._tick += 1
-        return self._host.act(time, GroupSenses(np.arange(n), {"proximity.value": value}), heard)
+        return self._host.act(time, GroupSenses(np.arange(n), {"proximity.value": value}), received)
 
     def first_turns_rad(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> np.ndarray:
         """How far each turns on the spot before it first goes straight, (n,), positive to the left."""

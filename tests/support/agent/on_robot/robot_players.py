@@ -4,7 +4,7 @@ import ctypes
 import os
 from typing import ClassVar
 
-from swarmwire.agent import Agent, Message, PerRobot, Robot, Robots, State, VectorAgent, i2, vector_agent
+from swarmwire.agent import Agent, Message, PerRobot, Robot, Robots, State, VectorAgent, i2, per_robot
 
 
 class Count(Message):
@@ -37,7 +37,7 @@ class Once(Agent):
 
 
 class Telling(Agent):
-    """Names its step, switches an LED in the first, sends how many packets it heard."""
+    """Names its step, switches an LED in the first, sends how many packets it received."""
 
     def __init__(self) -> None:
         self.steps = 0
@@ -47,7 +47,7 @@ class Telling(Agent):
             robot.led(1.0, 0.0, 0.0, which=2)
             robot.note("first", value=1.5)
         robot.drive(0.01, 0.0)
-        robot.radio.send(Count(number=len(robot.radio.heard(Count))), to=1)
+        robot.radio.send(Count(number=len(robot.radio.received(Count))), to=1)
         self.steps += 1
 
 
@@ -142,7 +142,7 @@ class Scribbling(Agent):
 class Laned(VectorAgent):
     """Drives as fast as its lane says."""
 
-    lane: PerRobot[int] = vector_agent(0)
+    lane: PerRobot[int] = per_robot(0)
 
     def step(self, robots: Robots, state: State) -> None:
         robots.drive(0.01 * self.lane, 0.0)
@@ -154,4 +154,4 @@ class Ranging(Agent):
     needs = ("radio.range",)
 
     def step(self, robot: Robot) -> None:
-        robot.drive(sum(packet.range_m for packet in robot.radio.heard(Count)), 0.0)
+        robot.drive(sum(packet.range_m for packet in robot.radio.received(Count)), 0.0)

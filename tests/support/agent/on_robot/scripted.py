@@ -18,7 +18,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 
@@ -114,21 +114,21 @@ class ScriptedRadio:
         self._row = row
         self.brings: list[list[tuple[int, int, bytes]]] = []
         self.asked_ns: list[int] = []
-        self.sent: list[Sent] = []
+        self.sent: list[SentPackets] = []
 
     def open(self) -> None:
         pass
 
-    def heard(self, now_ns: int) -> tuple[Heard, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         self.asked_ns.append(now_ns)
         packets = self.brings.pop(0) if self.brings else []
         n = len(packets)
         column = [np.array([packet[i] for packet in packets], np.int64) for i in (0, 1)]
         payloads = Payloads.of([packet[2] for packet in packets])
         row, at = np.full(n, self._row), np.full(n, now_ns)
-        return Heard(row, *column, at, {}, np.arange(n), payloads), NO_OUTCOMES
+        return ReceivedPackets(row, *column, at, {}, np.arange(n), payloads), NO_OUTCOMES
 
-    def send(self, sent: Sent) -> None:
+    def send(self, sent: SentPackets) -> None:
         self.sent.append(sent)
 
     def counts(self) -> dict[str, int]:

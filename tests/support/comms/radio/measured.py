@@ -1,4 +1,4 @@
-"""Measured links of three robots, and what of them was heard."""
+"""Measured links of three robots, and what of them was received."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ def trace_of(quantity: Quantity, rows: Sequence[Row]) -> LinkTrace:
     return link_trace(quantity, TRIO, time_ns, sender, receiver, value.astype(np.float64))
 
 
-def numbers_heard(told: Run, sender: int, receiver: int) -> list[int]:
-    """The sequence numbers of the packets that the receiver heard of the sender."""
-    mine = (told.heard("sender") == sender) & (told.heard("receiver") == receiver)
-    return told.heard("sequence")[mine].tolist()
+def numbers_received(told: Run, sender: int, receiver: int) -> list[int]:
+    """The sequence numbers of the packets that the receiver received of the sender."""
+    mine = (told.received("sender") == sender) & (told.received("receiver") == receiver)
+    return told.received("sequence")[mine].tolist()

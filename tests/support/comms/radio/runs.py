@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
@@ -42,13 +42,13 @@ class Run:
         """Receivers by fate, those with none left out."""
         return {fate.name: int(n) for fate, n in zip(Fate, self.tally.fates.sum(axis=0), strict=True) if n}
 
-    def heard(self, name: str) -> IntArray:
-        """A column of everything heard, in order."""
-        return np.concatenate([getattr(one.heard, name) for one in self.news])
+    def received(self, name: str) -> IntArray:
+        """A column of everything received, in order."""
+        return np.concatenate([getattr(one.received, name) for one in self.news])
 
     def given(self, name: str) -> FloatArray:
         """What receivers learned, in order."""
-        return np.concatenate([one.heard.given[name] for one in self.news])
+        return np.concatenate([one.received.given[name] for one in self.news])
 
     def finished(self, name: str) -> IntArray:
         """A column of all links that became final, in order."""
@@ -72,7 +72,7 @@ def make_air(
     return Air(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces)
 
 
-def run(air: Air, pose: FloatArray, sent_in: Callable[[int], Sent], ticks: int, quiet_ticks: int = 0) -> Run:
+def run(air: Air, pose: FloatArray, sent_in: Callable[[int], SentPackets], ticks: int, quiet_ticks: int = 0) -> Run:
     """Ticks in the loop's order with robots at rest, then quiet ones, then the end."""
     out = Run(air)
     alive = np.ones(len(pose), np.bool_)
@@ -86,15 +86,15 @@ def run(air: Air, pose: FloatArray, sent_in: Callable[[int], Sent], ticks: int, 
     return out
 
 
-def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Sequence[int] | int = 10) -> Sent:
+def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Sequence[int] | int = 10) -> SentPackets:
     """Packets whose bytes tell their place in the list."""
     k = len(sender)
     sizes = np.broadcast_to(np.asarray(size, np.int64), (k,))
     payloads = Payloads.of([bytes([i % 256]) * int(n) for i, n in enumerate(sizes)])
-    return Sent(np.asarray(sender, np.int64), np.broadcast_to(np.asarray(to, np.int64), (k,)).copy(), payloads)
+    return SentPackets(np.asarray(sender, np.int64), np.broadcast_to(np.asarray(to, np.int64), (k,)).copy(), payloads)
 
 
-def everybody(rows: int) -> Callable[[int], Sent]:
+def everybody(rows: int) -> Callable[[int], SentPackets]:
     """A broadcast of ten bytes from every robot in every tick."""
     sent = packets(range(rows))
     return lambda _: sent

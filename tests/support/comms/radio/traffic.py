@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import BROADCAST, Sent
+from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import Air
@@ -28,7 +28,7 @@ RADIOS = st.builds(
 OBSTACLES = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.4), Obstacle("box", -1.0, -1.0, 0.3, size_m=(1.5, 0.4))]
 
 
-def random_traffic(rng: np.random.Generator, arenas: int, robots: int) -> Sent:
+def random_traffic(rng: np.random.Generator, arenas: int, robots: int) -> SentPackets:
     """Some robots send some packets, to all or to one, in any order."""
     k = int(rng.integers(0, 3 * robots))
     sender = rng.integers(0, arenas * robots, k)
@@ -36,7 +36,9 @@ def random_traffic(rng: np.random.Generator, arenas: int, robots: int) -> Sent:
     return packets(sender, np.where(rng.random(k) < 0.6, BROADCAST, to), rng.integers(0, 70, k))
 
 
-def run_disrupted(air: Air, pose: FloatArray, sent: dict[int, Sent], now: dict[int, Disruption], ticks: int) -> Run:
+def run_disrupted(
+    air: Air, pose: FloatArray, sent: dict[int, SentPackets], now: dict[int, Disruption], ticks: int
+) -> Run:
     """What is sent, and what holds from then on, by tick."""
     out, current = Run(air), Disruption.none(len(pose))
     for tick in range(ticks):
@@ -45,6 +47,6 @@ def run_disrupted(air: Air, pose: FloatArray, sent: dict[int, Sent], now: dict[i
         air.disrupt(current)
         out.news.append(air.advance(at_ns))
         air.hold(pose, current.alive)
-        air.send(at_ns, tick, sent.get(tick, Sent.none()))
+        air.send(at_ns, tick, sent.get(tick, SentPackets.none()))
     out.last = air.end()
     return out

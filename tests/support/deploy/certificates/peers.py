@@ -76,15 +76,15 @@ class Inbox:
     """Keys of what a session hears, in the order of each link."""
 
     def __init__(self, session: zenoh.Session, *keys: str) -> None:
-        self._heard: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._received: queue.SimpleQueue[str] = queue.SimpleQueue()
         for key in keys:
-            session.declare_subscriber(key, at_once(lambda sample: self._heard.put(str(sample.key_expr))))
+            session.declare_subscriber(key, at_once(lambda sample: self._received.put(str(sample.key_expr))))
 
     def next(self) -> str:
-        return self._heard.get(timeout=WITHIN_S)
+        return self._received.get(timeout=WITHIN_S)
 
     def empty(self) -> bool:
-        return self._heard.empty()
+        return self._received.empty()
 
 
 class Links:

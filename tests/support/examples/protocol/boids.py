@@ -23,6 +23,6 @@ class Boid(Agent):
         heading, sheet = robot.compass.heading_rad, robot.body.proximity
         assert sheet is not None
         angles = [math.radians(angle) for angle in sheet.angles_deg]
-        heard = [(p.range_m, p.bearing_rad, p.message.heading_rad) for p in robot.radio.heard(Heading)]
-        robot.drive(*steer(heading, angles, robot.proximity.value.tolist(), heard))
+        received = [(p.range_m, p.bearing_rad, p.message.heading_rad) for p in robot.radio.received(Heading)]
+        robot.drive(*steer(heading, angles, robot.proximity.value.tolist(), received))
         robot.radio.send(Heading(heading_rad=heading))

@@ -13,7 +13,7 @@ from swarmwire.comms.truth import Static, Tally, Truth
 
 BEGAN_S = 1_767_225_600.0
 TICKS = "tick,t_s,late,x_m,y_m,heading_rad,drive,linear_mps,angular_radps,state,value,charge"
-HEARD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given"
+RECEIVED = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given"
 SENT = "t_s,tx,seq,to,size_bytes,tag,fate"
 
 
@@ -44,7 +44,7 @@ def as_logs(
     begins_s = np.array([to_s(truth.time_ns) for truth in of.truths])
     pose = np.stack([truth.pose for truth in of.truths])
     pose[:, :, 2] = np.unwrap(pose[:, :, 2], axis=0)
-    sent, heard = _radio(of)
+    sent, received = _radio(of)
     group = static.groups[0]
     for robot, name in enumerate(static.robot_names):
         own = folder / name
@@ -83,21 +83,21 @@ def as_logs(
         rows = [f"{clock_s + to_s(at):.9f},{name},{seq},{to},{size},say,sent" for at, seq, to, size in sent[robot]]
         (own / "sent.csv").write_text("\n".join([SENT, *rows]) + "\n")
         rows = []
-        for at, sender, seq, to, size, sent_at, distance_m in heard[robot]:
+        for at, sender, seq, to, size, sent_at, distance_m in received[robot]:
             tx = static.robot_names[sender]
             late_s = to_s(at - sent_at) + (ahead_s or {}).get(name, 0.0) - (ahead_s or {}).get(tx, 0.0)
             far = f"{distance_m:.4f}" if tracker else ""
             rows.append(f"{clock_s + to_s(at):.9f},{tx},{name},{seq},{to},{size},say,{late_s:.9f},{far},1")
-        (own / "heard.csv").write_text("\n".join([HEARD, *rows]) + "\n")
+        (own / "received.csv").write_text("\n".join([RECEIVED, *rows]) + "\n")
         (own / "summary.json").write_text(json.dumps({"ended": "stopped", "ticks": len(at_s), "counts": {}}))
     return folder
 
 
 def _radio(of: Watched) -> tuple[list[list[Any]], list[list[Any]]]:
-    """By robot what it sent, and what it heard, in the order of time."""
+    """By robot what it sent, and what it received, in the order of time."""
     names, robots = of.static.robot_names, of.static.robots
     sent: list[dict[int, Any]] = [{} for _ in range(robots)]
-    heard: list[list[Any]] = [[] for _ in range(robots)]
+    received: list[list[Any]] = [[] for _ in range(robots)]
     sizes: dict[tuple[int, int], int] = {}
     for truth in of.truths:
         if truth.finished is None or truth.departed is None:
@@ -108,13 +108,13 @@ def _radio(of: Watched) -> tuple[list[list[Any]], list[list[Any]]]:
             at, to = int(ended.sent_at_ns[row]), int(ended.to[row])
             size = sizes[sender, seq] = int(ended.size_bytes[row])
             sent[sender][seq] = (at, seq, names[to] if to >= 0 else "", size)
-            if ended.fate[row] == Fate.HEARD:
+            if ended.fate[row] == Fate.RECEIVED:
                 apart = truth.pose[sender, :2] - truth.pose[receiver, :2]
                 addressed = names[to] if to >= 0 else ""
                 final = int(ended.final_at_ns[row])
-                heard[receiver].append((final, sender, seq, addressed, size, at, float(np.hypot(*apart))))
+                received[receiver].append((final, sender, seq, addressed, size, at, float(np.hypot(*apart))))
         for row in range(len(gone.sender)):
             sender, seq, to = int(gone.sender[row]), int(gone.sequence[row]), int(gone.to[row])
             told = (int(gone.on_air_at_ns[row]), seq, names[to] if to >= 0 else "", sizes.get((sender, seq), 14))
             sent[sender].setdefault(seq, told)
-    return [sorted(of_robot.values()) for of_robot in sent], [sorted(of_robot) for of_robot in heard]
+    return [sorted(of_robot.values()) for of_robot in sent], [sorted(of_robot) for of_robot in received]

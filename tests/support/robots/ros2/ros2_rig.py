@@ -30,7 +30,7 @@ AT_START: Fields = {
 class Ros2Rig(Rig):
     """A TurtleBot with two photocells whose scanner has a new reading in each tick, behind a bridge.
 
-    A base tells all the time, so the driver has heard of each sense once it is connected.
+    A base tells all the time, so the driver has received of each sense once it is connected.
     """
 
     lacks: ClassVar[frozenset[str]] = frozenset({"proximity", "bumper", "positioning", "infrared", "ground", "camera"})
@@ -73,10 +73,10 @@ class Ros2Rig(Rig):
         return driver
 
     def connect(self, address: str = "") -> Driver:
-        """As `Rig.connect`, and wait until the driver has heard of each sense."""
+        """As `Rig.connect`, and wait until the driver has received of each sense."""
         driver = super().connect(address)
 
-        def heard() -> bool:
+        def received() -> bool:
             self.publish(AT_START)
             try:
                 fields = driver.sense(driver.gives)
@@ -84,7 +84,7 @@ class Ros2Rig(Rig):
                 return False
             return all(np.isfinite(value).all() for value in fields.values())
 
-        until(heard)
+        until(received)
         self.come_back(AT_START)
         return driver
 

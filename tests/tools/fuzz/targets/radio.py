@@ -11,7 +11,7 @@ from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.world_radio import AirRadio, _Arrival
 from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
-from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, SentPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import AirTerms, Pose, encode_air, encode_pose
@@ -65,7 +65,7 @@ class AirReceived(FrameTarget):
         run, row = small_run(), 1
         self.robots = run.world.static.robot_names
         self.terms = AirTerms(row, self.robots, 10, 100, MEASURES, ())
-        received = run.heard.select(np.flatnonzero(run.heard.receiver == row)).compacted()
+        received = run.received.select(np.flatnonzero(run.received.receiver == row)).compacted()
         assert len(received), "the robot received something"
         statuses = Outcomes(np.array([row]), np.array([4]), np.array([1]))
         nothing = received.select(np.array([], np.int64))
@@ -75,7 +75,7 @@ class AirReceived(FrameTarget):
         radio = AirRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
         radio.terms, radio.gives = self.terms, MEASURES
         radio._inbox.put(_Arrival(case, CLOCK.now_ns(), CLOCK.utc_ns()))
-        radio.heard(3_000_000_000)
+        radio.received(3_000_000_000)
         return " ".join(name for name in radio.counts() if name.startswith("frames_")) or None
 
 
@@ -86,7 +86,7 @@ class AirSent(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         row, zero = np.array([1]), np.zeros(1)
-        packets = Sent(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.of([b"abc", b"defg"]))
+        packets = SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.of([b"abc", b"defg"]))
         self.bridge = AirBridge(Network(), KEYS, {"b": 1}, LentAir(("a", "b", "c"), 10, 100, MEASURES, ()))
         return [encode_actions(7, Actions(row, np.zeros(1, np.bool_), zero, zero, zero, packets))]
 
@@ -153,16 +153,16 @@ class Packets(ByteTarget):
     def feed(self, case: KeyedPacket) -> str | None:
         radio = ZenohRadio(None, KEYS, ROBOTS, SELF, MAX_PAYLOAD_BYTES, CLOCK, self.tracker)
         radio._arrive(Sample(case.key, Payload(case.data)))
-        received, _ = radio.heard(3_000_000_000)
-        received.payloads.tags()
+        packets, _ = radio.received(3_000_000_000)
+        packets.payloads.tags()
         counts = radio.counts()
         if sum(counts.values()) != 1:
             raise AssertionError(f"a packet that is not counted exactly once: {counts}")
-        if len(received) != counts.get("packets_heard", 0):
+        if len(packets) != counts.get("packets_received", 0):
             raise AssertionError("received, and not counted")
         if not all(0.0 <= link.delivery <= 1.0 for link in radio.links.values()):
             raise AssertionError("a delivery ratio that is none")
-        return None if len(received) else next(iter(counts))
+        return None if len(packets) else next(iter(counts))
 
 
 class Poses(ByteTarget):

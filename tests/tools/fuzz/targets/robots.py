@@ -77,7 +77,7 @@ class Epuck2Commands(ByteTarget):
         for chunk in chunks(case):
             if transport.closed:
                 break
-            robot.hear(connection, chunk)
+            robot.on_receive(connection, chunk)
         robot.miss(connection)
         commands = gateway.take()
         if not (np.isfinite(commands.linear_mps).all() and np.isfinite(commands.angular_radps).all()):

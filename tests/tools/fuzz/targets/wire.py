@@ -112,7 +112,7 @@ class WorldFrames(FrameTarget):
         return self.rosters[stage]
 
     def _open_tick(self, roster: Any) -> None:
-        inputs = (self.run.senses, self.run.heard, self.run.outcomes)
+        inputs = (self.run.senses, self.run.received, self.run.outcomes)
         roster.open_tick(*((TICK, 0) if isinstance(roster, RealTime) else (TICK,)), *inputs)
 
 
@@ -170,7 +170,7 @@ class RunnerFrames(FrameTarget):
         self.host: Host | None = None
         decoded = decode_tick(frames.decode(run.frames["one"][-1]), run.whole.gives or (), senses_of(run.parts, "one"))
         self.shapes = _shapes(decoded[0])
-        between = encode_packets(11, 1_150_000_000, 3, run.heard, run.outcomes)
+        between = encode_packets(11, 1_150_000_000, 3, run.received, run.outcomes)
         end = frames.encode("end", -1, {}, {"why": "it sent far more than it was asked for"})
         return [*run.frames["one"][-3:], between, end]
 
@@ -189,7 +189,7 @@ class RunnerFrames(FrameTarget):
     def _act(self, host: Host, inputs: Any) -> str | None:
         """Only the agents' own code may fail, or all that misses a reading that the world does not give."""
         try:
-            host.hear(*inputs) if len(inputs) == 2 else host.act(*inputs)
+            host.on_receive(*inputs) if len(inputs) == 2 else host.act(*inputs)
         except AgentFailed as error:
             lines = [line for line in error.traceback.splitlines() if line.startswith('  File "')]
             if str(PLAYERS) not in lines[-1] and (len(inputs) == 2 or _shapes(inputs[1]) == self.shapes):

@@ -12,7 +12,7 @@ from swarmwire.agent.fields import Vectors
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
@@ -29,15 +29,15 @@ class One:
         self._host = hosted(group("", [0], params=dict(params)), BeaconAvoidance)
 
     def step(self, *beacons: tuple[float, float, float, float], late_ns: int = 0) -> tuple[float, float]:
-        """Forward speed and turn rate; packets were heard `late_ns` before the step."""
+        """Forward speed and turn rate; packets were received `late_ns` before the step."""
         table = np.array(beacons, np.float64).reshape(-1, 4)
         k, now_ns = len(table), self.tick * PERIOD_NS
         payloads = Payloads.of([Beacon(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()])
         zeros, given = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
-        heard = Heard(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
         senses = GroupSenses(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
-        actions = self._host.act((self.tick, now_ns, PERIOD_NS), senses, heard)
+        actions = self._host.act((self.tick, now_ns, PERIOD_NS), senses, received)
         self.tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 
@@ -101,11 +101,11 @@ def test_a_neighbour_is_remembered_where_it_should_be_by_now_and_then_forgotten(
 
 
 def test_a_packet_is_moved_on_by_its_age_and_by_a_delay_that_is_known() -> None:
-    heard, delayed = One(strength=0.0, close=0.0), One(strength=0.0, close=0.0, latency_s=1.5)
-    for one in (heard, delayed):
+    received, delayed = One(strength=0.0, close=0.0), One(strength=0.0, close=0.0, latency_s=1.5)
+    for one in (received, delayed):
         one.step()
         one.step((1.0, 0.0, np.pi, 0.1), late_ns=PERIOD_NS // 2)
-    assert heard.place() == pytest.approx((1.0 - 0.2 * 0.05, 0.0), abs=1e-7)
+    assert received.place() == pytest.approx((1.0 - 0.2 * 0.05, 0.0), abs=1e-7)
     assert delayed.place() == pytest.approx((1.0 - 0.2 * 1.55, 0.0), abs=1e-7)
 
 
@@ -141,9 +141,9 @@ def test_each_robot_decides_alone(trial: Trial) -> None:
 
 def test_crossing_traffic_meets_without_the_radio_and_not_with_it() -> None:
     short = ["duration_s=20"]
-    heard, unheard = (
+    received, unheard = (
         run(SCENARIO, seeds=[2], overrides=o).arenas[0].metrics["collisions"].final
         for o in (short, [*short, "radio.loss=1.0"])
     )
-    assert heard == 0.0
+    assert received == 0.0
     assert unheard not in (0.0, None)

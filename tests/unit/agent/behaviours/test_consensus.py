@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours import Consensus
 from swarmwire.agent.behaviours.consensus import Value
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
@@ -22,9 +22,9 @@ def told(*others: float, **params: float) -> float:
     """What a robot comes to that starts with 1 and hears these numbers in its first step."""
     zeros = np.zeros(len(others), np.int64)
     payloads = Payloads.of([Value(value=other).encode() for other in others])
-    heard = Heard(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
+    received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
     host = hosted(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
-    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), {}), heard)
+    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), {}), received)
     (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
     (value,) = actions.values.value.tolist()
     assert Value.decode(payload).value == value  # what it says to others is what it tells

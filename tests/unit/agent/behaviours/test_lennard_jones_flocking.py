@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours import LennardJonesFlocking
 from swarmwire.agent.behaviours.lennard_jones_flocking import Here
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from swarmwire.comms.packets import Heard, Payloads
+from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
@@ -30,13 +30,15 @@ class One:
         table = np.array(neighbours, np.float64).reshape(-1, 2)
         zeros = np.zeros(k, np.int64)
         given = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
-        heard = Heard(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.of([Here().encode()] * k))
+        received = ReceivedPackets(
+            zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.of([Here().encode()] * k)
+        )
         light = np.zeros((1, 24))
         if light_ray is not None:
             light[0, light_ray] = 0.4
         fields = {"light.value": light}
         actions = self._host.act(
-            (self._tick, self._tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), heard
+            (self._tick, self._tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received
         )
         self._tick += 1
         forward, turn = float(actions.linear_mps[0]), float(actions.angular_radps[0])

@@ -7,7 +7,7 @@ from swarmwire.agent.behaviours import MinimalistFlocking
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from tests.support.agent.hosts import group
 
@@ -36,7 +36,7 @@ class One:
     def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
         fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
         senses = GroupSenses(np.zeros(1, np.int64), fields)
-        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), senses, Heard.none())
+        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), senses, ReceivedPackets.none())
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

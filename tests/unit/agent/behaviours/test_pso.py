@@ -51,7 +51,7 @@ def test_the_rule_adds_inertia_and_a_pull_to_each_best_within_its_weight() -> No
     assert x / 0.4 != pytest.approx(y / -0.6), "each axis has a draw of its own"
 
 
-def test_of_several_bests_heard_the_brightest_wins_and_a_darker_one_later_does_not_replace_it() -> None:
+def test_of_several_bests_received_the_brightest_wins_and_a_darker_one_later_does_not_replace_it() -> None:
     one = One()
     one.step(place(0.5, 0.0, 0.0), place(0.75, 3.0, 1.0), place(0.625, -3.0, 0.0))
     assert one.memory.best_brightness[0] == 0.75
@@ -96,7 +96,7 @@ def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on
     assert one.vector("own") == pytest.approx((0.0, -0.2))
 
 
-def test_a_vector_from_a_sender_starts_where_the_sender_is_heard() -> None:
+def test_a_vector_from_a_sender_starts_where_the_sender_is_received() -> None:
     one = One(PsoSearch)
     one.heading_rad = np.pi / 2.0
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
@@ -159,7 +159,7 @@ def test_on_a_ring_only_those_next_to_a_robot_count(index: int, width: int, heed
     assert one.vector("best")[0] == pytest.approx(heeded - 1.0)
 
 
-def test_without_a_ring_all_who_are_heard_count() -> None:
+def test_without_a_ring_all_who_are_received_count() -> None:
     one = One()
     one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert one.vector("best")[0] == pytest.approx(4.0)
@@ -195,8 +195,8 @@ def test_one_robot_of_a_ring_is_told_its_index_alone() -> None:
     assert checked(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
 
 
-def test_what_was_heard_is_forgotten_after_the_update_that_it_was_told_for_unless_it_is_kept() -> None:
-    kept, asked = One(), One(keeps_heard=False)
+def test_what_was_received_is_forgotten_after_the_update_that_it_was_told_for_unless_it_is_kept() -> None:
+    kept, asked = One(), One(keeps_received=False)
     for one in (kept, asked):
         one.steps(199)
         one.step(place(9.0, 2.0, 2.0))
@@ -208,7 +208,7 @@ def test_what_was_heard_is_forgotten_after_the_update_that_it_was_told_for_unles
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
-@pytest.mark.parametrize("more", [{}, RING, {"keeps_heard": False, "again_m": 0.5}])
+@pytest.mark.parametrize("more", [{}, RING, {"keeps_received": False, "again_m": 0.5}])
 def test_each_robot_decides_for_itself(kind: Any, more: dict[str, Any]) -> None:
     assert_rows_independent(kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
 

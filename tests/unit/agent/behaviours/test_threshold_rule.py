@@ -16,7 +16,7 @@ from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
@@ -37,7 +37,7 @@ class One:
     def step(self, **senses: FloatArray) -> tuple[float, float]:
         fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in senses.items()}
         at = GroupSenses(np.zeros(1, np.int64), fields)
-        actions = self._host.act((self._tick, self._tick * 10**8, 10**8), at, Heard.none(()))
+        actions = self._host.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

@@ -52,7 +52,7 @@ def test_a_tick_is_a_step_of_the_model_for_the_same_noise(noise_rad: float) -> N
     with Simulation(PAPER, overrides=[*SHORT, f"robots.particles.params.noise_rad={noise_rad}"]) as simulation:
         world = simulation.world
         place_m = world.pose[:, :2].copy()
-        # Nothing is heard in the first tick, so it only turns each by its noise.
+        # Nothing is received in the first tick, so it only turns each by its noise.
         theta = world.pose[:, 2] + noise_of(simulation, 0, noise_rad)
         for tick in range(20):
             simulation.step()

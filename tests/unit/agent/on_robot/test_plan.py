@@ -26,7 +26,7 @@ from swarmwire.agent.on_robot.plan import (
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.packets import NO_OUTCOMES, Heard
+from swarmwire.comms.packets import NO_OUTCOMES, ReceivedPackets
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 
 
@@ -50,7 +50,7 @@ def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
     settings = plan.settings
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, seed=1)
     mind = Mind(group, 10, None, plan.limits)
-    assert mind.step(0, {}, Heard.none(), NO_OUTCOMES).command.linear_mps == pytest.approx(0.04)
+    assert mind.step(0, {}, ReceivedPackets.none(), NO_OUTCOMES).command.linear_mps == pytest.approx(0.04)
 
 
 @pytest.mark.parametrize(

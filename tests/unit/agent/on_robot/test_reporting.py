@@ -1,4 +1,4 @@
-"""What a robot tells: log and status once a second, the terminal, who is heard and seen."""
+"""What a robot tells: log and status once a second, the terminal, who is received and seen."""
 
 import json
 import os
@@ -138,7 +138,7 @@ def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tm
 def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.onlookers.silent(0.512)
-    told = "watchdog: nothing was heard of the agent for 0.51 s; motors off until it goes on"
+    told = "watchdog: nothing was received of the agent for 0.51 s; motors off until it goes on"
     assert until(lambda: capsys.readouterr().err) == f"robot-0: {told}\n"
     looking.onlookers.end("duration")
 
@@ -232,10 +232,10 @@ class _Swarm:
     """What a robot among k-1 and k-2 hears and sees, looked at once a second."""
 
     def __init__(self, pace: float = 1.0) -> None:
-        self.clock, self.said, self.heard = FakeClock(), list[str](), set[str]()
+        self.clock, self.said, self.received = FakeClock(), list[str](), set[str]()
         self.pose: Pose | None = None
         others = ("k-1", "k-2")
-        self.presence = Presence(self.clock, self.said.append, others, lambda: self.heard, lambda: self.pose, pace)
+        self.presence = Presence(self.clock, self.said.append, others, lambda: self.received, lambda: self.pose, pace)
 
     def seconds(self, n: int) -> list[str]:
         """What it says in so many seconds."""
@@ -246,26 +246,26 @@ class _Swarm:
         return list(self.said)
 
 
-def test_others_that_were_never_heard_are_told_once_after_five_seconds_and_when_they_come():
+def test_others_that_were_never_received_are_told_once_after_five_seconds_and_when_they_come():
     swarm = _Swarm()
     swarm.pose = HERE
     assert swarm.seconds(4) == []
     assert swarm.seconds(10) == ["radio: hears none of k-1, k-2"]
-    swarm.heard.add("k-2")
+    swarm.received.add("k-2")
     assert swarm.seconds(3) == ["radio: now hears k-2"]
-    swarm.heard.add("k-1")
+    swarm.received.add("k-1")
     assert swarm.seconds(3) == ["radio: now hears k-1"]
 
 
-def test_those_that_were_heard_in_time_are_not_told_of():
+def test_those_that_were_received_in_time_are_not_told_of():
     swarm = _Swarm()
-    swarm.pose, swarm.heard = HERE, {"k-1"}
-    assert swarm.seconds(9) == ["radio: has never heard k-2"]
+    swarm.pose, swarm.received = HERE, {"k-1"}
+    assert swarm.seconds(9) == ["radio: has never received k-2"]
 
 
 def test_poses_that_do_not_come_are_told_of_and_counted_and_again_when_they_come():
     swarm = _Swarm()
-    swarm.heard = {"k-1", "k-2"}
+    swarm.received = {"k-1", "k-2"}
     assert swarm.seconds(9) == ["tracker: no pose of this robot has come for 5 s"]
     swarm.pose = HERE
     assert swarm.seconds(9) == ["tracker: poses come"]

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.on_robot.log import RowFile, TickRow, new_log
-from swarmwire.agent.radios.radio import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
@@ -35,8 +35,8 @@ def test_a_log_that_ended_has_all_its_files_and_rows(tmp_path):
     log.begin({"format": 1, "name": "flock-1"})
     log.tick(TickRow(3, AT_NS, True, Pose(1.0, 2.5, -0.5), True, Command(0.05, -1.5), "search, slow", 2.5, 0.75))
     log.tick(TickRow(4, AT_NS, False, None, False, Command(), "", None, None))
-    log.heard(HeardPacket(AT_NS, 2, 7, BROADCAST, 6, 4660, latency_ns=1_500_000, distance_m=0.25, given=True))
-    log.heard(HeardPacket(AT_NS, 0, 8, 2, 6, 4660, latency_ns=None, distance_m=None, given=False))
+    log.received(ReceivedPacket(AT_NS, 2, 7, BROADCAST, 6, 4660, latency_ns=1_500_000, distance_m=0.25, given=True))
+    log.received(ReceivedPacket(AT_NS, 0, 8, 2, 6, 4660, latency_ns=None, distance_m=None, given=False))
     log.sent(SentPacket(AT_NS, 0, BROADCAST, 6, 4660, "sent"))
     log.sent(SentPacket(AT_NS, 1, 9, 600, 4660, "too_large"))
     log.end({"ended": "duration"})
@@ -48,7 +48,7 @@ def test_a_log_that_ended_has_all_its_files_and_rows(tmp_path):
         ["3", "1795000000.000000123", "1", "1.0", "2.5", "-0.5", "1", "0.05", "-1.5", "search, slow", "2.5", "0.75"],
         ["4", "1795000000.000000123", "0", "", "", "", "0", "0.0", "0.0", "", "", ""],
     ]
-    assert [list(row.values())[1:] for row in _rows(folder / "heard.csv")] == [
+    assert [list(row.values())[1:] for row in _rows(folder / "received.csv")] == [
         ["flock-2", "flock-1", "7", "", "6", "4660", "0.001500000", "0.25", "1"],
         ["flock-0", "flock-1", "8", "flock-2", "6", "4660", "", "", "0"],
     ]

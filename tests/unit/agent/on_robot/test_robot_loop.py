@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import ActuatorSheet
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, ReceivedPackets
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.robot_players import Count
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, RATE_HZ, UTC_NS, Rig, ScriptedRadio, lost
@@ -88,8 +88,8 @@ def test_a_command_above_the_limits_is_slowed_down_as_a_whole_and_counted():
 
 def test_leds_notes_and_packets_reach_driver_log_and_radio():
     radio = ScriptedRadio()
-    heard = Count(number=3).encode()
-    radio.brings = [[], [(1, 0, heard), (2, 5, heard)]]
+    received = Count(number=3).encode()
+    radio.brings = [[], [(1, 0, received), (2, 5, received)]]
     rig = Rig("Telling", radio=radio)
     rows = rig.run(3)
     assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {}, {}]
@@ -152,10 +152,10 @@ def test_a_robot_that_may_have_been_switched_off_gets_its_leds_again():
     assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {2: 0xFF0000}, {}]
 
 
-def test_packets_are_still_sent_in_a_step_that_loses_the_driver_and_those_heard_meanwhile_are_counted():
+def test_packets_are_still_sent_in_a_step_that_loses_the_driver_and_those_received_meanwhile_are_counted():
     radio = ScriptedRadio()
-    heard = Count(number=3).encode()
-    radio.brings = [[], [(1, 0, heard), (2, 5, heard)]]
+    received = Count(number=3).encode()
+    radio.brings = [[], [(1, 0, received), (2, 5, received)]]
     rig = Rig("Telling", radio=radio)
     rig.driver.faults = {"act": [lost]}
     rig.run(1)
@@ -315,5 +315,5 @@ def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_m
     group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
     mind = Mind(group, RATE_HZ, None, limits_for(body, None, None, ""))
     for tick in range(2):
-        mind.step(tick, {}, Heard.none(()), NO_OUTCOMES)
+        mind.step(tick, {}, ReceivedPackets.none(()), NO_OUTCOMES)
     assert mind.actuations == 6

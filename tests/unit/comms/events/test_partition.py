@@ -54,8 +54,8 @@ def islands(edges: IntArray, robots: int) -> set[frozenset[int]]:
     return set(island.values())
 
 
-def heard_pairs(told: Run) -> set[tuple[int, int]]:
-    return set(zip(told.heard("sender").tolist(), told.heard("receiver").tolist(), strict=True))
+def received_pairs(told: Run) -> set[tuple[int, int]]:
+    return set(zip(told.received("sender").tolist(), told.received("receiver").tolist(), strict=True))
 
 
 SCRIPTS: list[tuple[dict[str, Any], list[set[int]]]] = [
@@ -75,9 +75,9 @@ SCRIPTS: list[tuple[dict[str, Any], list[set[int]]]] = [
 def test_there_are_as_many_islands_as_the_script_says_and_nothing_crosses(keys: dict[str, Any], sets: list[set[int]]):
     told = broadcasts(held(partition(**keys)))
     assert islands(told.edges, 6) == {frozenset(own) for own in sets}
-    assert heard_pairs(told) == {(a, b) for own in sets for a in own for b in own if a != b}
-    heard = sum(len(own) * (len(own) - 1) for own in sets)
-    assert told.fates() == {fate: n for fate, n in (("HEARD", heard), ("PARTITIONED", 30 - heard)) if n}
+    assert received_pairs(told) == {(a, b) for own in sets for a in own for b in own if a != b}
+    received = sum(len(own) * (len(own) - 1) for own in sets)
+    assert told.fates() == {fate: n for fate, n in (("RECEIVED", received), ("PARTITIONED", 30 - received)) if n}
 
 
 def test_nothing_is_apart_any_more_once_it_is_over():
@@ -85,7 +85,7 @@ def test_nothing_is_apart_any_more_once_it_is_over():
         event = partition(**keys, for_s=1.0)
         conditions = held(event)
         event.end(0, conditions)
-        assert broadcasts(conditions).fates() == {"HEARD": 30}
+        assert broadcasts(conditions).fates() == {"RECEIVED": 30}
 
 
 def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
@@ -97,7 +97,7 @@ def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
         told = broadcasts(held(partition(**keys)))
         crossing = {(a, b) for a in halves[0] for b in halves[1]}
         crossing |= {(b, a) for a, b in crossing}
-        assert heard_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - crossing
+        assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - crossing
         assert islands(told.edges, 6) == {frozenset(EVERYBODY)}
 
 
@@ -113,8 +113,8 @@ def test_one_way_the_second_set_does_not_hear_the_first_and_no_edge_joins_them(k
     told = broadcasts(held(partition(**keys, one_way=True)))
     second = EVERYBODY - first
     unheard = {(a, b) for a in first for b in second}
-    assert heard_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - unheard
-    assert told.fates() == {"HEARD": 30 - len(unheard), "PARTITIONED": len(unheard)}
+    assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - unheard
+    assert told.fates() == {"RECEIVED": 30 - len(unheard), "PARTITIONED": len(unheard)}
     assert islands(told.edges, 6) == {frozenset(first), frozenset(second)}
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SendResult, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Accounts, Lives
 from swarmwire.comms.radio.medium import Air
@@ -35,15 +35,15 @@ def test_fates_add_up_to_intended_receivers(radio: Radio, arenas: int, robots: i
 
 @given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
 def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int, seed: int):
-    """Heard packets, listed links and the tally tell the same story, in every tick."""
+    """Received packets, listed links and the tally tell the same story, in every tick."""
     for one in random_run(radio, arenas, robots, seed, 2).news:
         listed = np.zeros_like(one.tally.fates)
         np.add.at(listed, (one.finished.arena, one.finished.fate), one.finished.receivers)
         but_far = [fate for fate in Fate if fate != Fate.OUT_OF_RANGE]
         np.testing.assert_array_equal(listed[:, but_far], one.tally.fates[:, but_far])
         assert not listed[:, Fate.OUT_OF_RANGE].any()
-        assert len(one.heard) == listed[:, Fate.HEARD].sum()
-        in_range = listed[:, Fate.HEARD] + listed[:, Fate.LOST]
+        assert len(one.received) == listed[:, Fate.RECEIVED].sum()
+        in_range = listed[:, Fate.RECEIVED] + listed[:, Fate.LOST]
         assert (one.tally.in_range >= in_range).all()
         if not one.tally.fates[:, Fate.QUEUE_FULL].any():
             np.testing.assert_array_equal(one.tally.in_range, in_range)
@@ -63,7 +63,7 @@ def test_a_broadcast_intends_only_robots_alive():
     air.send(0, 0, packets([0]))
     tally = air.advance(10**8).tally
     assert tally.intended.tolist() == [2]
-    assert tally.fates[0, Fate.HEARD] == 2
+    assert tally.fates[0, Fate.RECEIVED] == 2
 
 
 def test_what_the_run_ends_under_way_or_queued_is_in_flight():
@@ -101,7 +101,7 @@ def check_packets(ended: Run) -> None:
     assert len(packet) == tally.sent.sum()
     assert told(ended, "intended").sum() == tally.intended.sum()
     assert told(ended, "out_of_range").sum() == tally.fates[:, Fate.OUT_OF_RANGE].sum()
-    never, on, off = told(ended, "fate") != Fate.HEARD, told(ended, "on_air_at_ns"), told(ended, "off_air_at_ns")
+    never, on, off = told(ended, "fate") != Fate.RECEIVED, told(ended, "on_air_at_ns"), told(ended, "off_air_at_ns")
     assert (off >= on).all()
     assert (off == on)[never].all()
 
@@ -132,9 +132,9 @@ def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
     rows = sorted(zip(*(told(ended, name).tolist() for name in columns), strict=True))
     airtime_ns = 20_000_000
     assert rows == [
-        (0, BROADCAST, 2, 1, Fate.HEARD, 0, airtime_ns),
+        (0, BROADCAST, 2, 1, Fate.RECEIVED, 0, airtime_ns),
         (2, BROADCAST, 2, 0, Fate.QUEUE_FULL, 0, 0),
-        (2, 1, 1, 1, Fate.HEARD, 0, airtime_ns),
+        (2, 1, 1, 1, Fate.RECEIVED, 0, airtime_ns),
     ]
 
 
@@ -176,7 +176,7 @@ def sent(radio: str) -> Air:
     air = make_air(NEWS_RADIOS[radio], ROBOTS, [1, 2])
     air.advance(0)
     air.hold(POSE, ALIVE)
-    air.send(0, 0, Sent(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
+    air.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
     return air
 
 
@@ -198,12 +198,12 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
 def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
     air = sent(radio)
-    heard, _ = air.advance_within(TICK_NS // 2)
-    assert heard.receiver.tolist() == [0, 2, 3]
+    received, _ = air.advance_within(TICK_NS // 2)
+    assert received.receiver.tolist() == [0, 2, 3]
     air.leave(np.arange(2) == over)
     news, left = air.advance(TICK_NS), 1 - over
-    assert news.heard.receiver.tolist() == [[0, 2], [3]][left]
-    assert {news.heard.payloads.row(int(row)) for row in news.heard.payload} == {PAYLOADS[left]}
+    assert news.received.receiver.tolist() == [[0, 2], [3]][left]
+    assert {news.received.payloads.row(int(row)) for row in news.received.payload} == {PAYLOADS[left]}
     assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {left}
 
 
@@ -212,7 +212,7 @@ def test_nor_what_its_senders_learned(over: int):
     air = make_air(with_access("csma-802154"), ROBOTS, [1, 2])
     air.advance(0)
     air.hold(POSE, ALIVE)
-    air.send(0, 0, Sent(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
+    air.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
     _, learned = air.advance_within(TICK_NS // 2)
     assert learned.row.tolist() == [1, 5]
     air.leave(np.arange(2) == over)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import Heard, Sent
+from swarmwire.comms.packets import ReceivedPackets, SentPackets
 from swarmwire.comms.radio.config.impairments import BearingGiven, Delays, Gives, RangeGiven
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
@@ -33,26 +33,26 @@ RADIO = Radio(
     gives=Gives(RangeGiven(0.1), BearingGiven(0.2)),
 )
 OBSTACLES = [[Obstacle("cylinder", 0.1 * a, 0.0, radius_m=0.3 + 0.1 * a)] for a in range(3)]
-COLUMNS = ("receiver", "sender", "sequence", "heard_at_ns")
+COLUMNS = ("receiver", "sender", "sequence", "received_at_ns")
 
 
 def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
-    """Everything heard in one arena, with what came with it, then its tally."""
+    """Everything received in one arena, with what came with it, then its tally."""
     rows: list[tuple[object, ...]] = []
     for tick, one in enumerate(told.news):
-        h = one.heard
+        h = one.received
         for i in np.flatnonzero(h.receiver // ROBOTS == arena):
             given = tuple(column[i] for column in h.given.values())
-            rest = h.sender[i], h.sequence[i], h.heard_at_ns[i], *given, h.payloads.row(h.payload[i])
+            rest = h.sender[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
             rows.append((tick, h.receiver[i] % ROBOTS, *rest))
     return [*rows, (*told.tally.fates[arena], told.tally.in_range[arena])]
 
 
-def two_each(arenas: int) -> Sent:
+def two_each(arenas: int) -> SentPackets:
     """Each robot sends two different packets."""
     sent = packets(range(2 * ROBOTS), size=20)
     payloads = sent.payloads.rows(np.tile(np.arange(2 * ROBOTS), arenas))
-    return Sent(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
+    return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
 
 
 def test_an_arena_alone_gives_the_same_as_beside_others():
@@ -77,7 +77,7 @@ def test_the_order_among_senders_is_indifferent(shuffle):
     index[:] = np.array(place)
     for s in range(ROBOTS):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
-    mixed = Sent(sent.sender[index], sent.to[index], sent.payloads.rows(index))
+    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
     pose = scattered(ROBOTS)
     assert story(run(make_air(RADIO, ROBOTS), pose, lambda _: mixed, 3, 2)) == story(
         run(make_air(RADIO, ROBOTS), pose, lambda _: sent, 3, 2)
@@ -92,33 +92,33 @@ def test_no_stage_shifts_the_draws_of_another():
         for radio in (RADIO, replace(RADIO, gives=Gives()))
     )
     for name in COLUMNS:
-        np.testing.assert_array_equal(full.heard(name), bare.heard(name))
+        np.testing.assert_array_equal(full.received(name), bare.received(name))
 
 
-def test_heard_is_sorted_by_receiver_time_sender_and_sequence():
+def test_received_is_sorted_by_receiver_time_sender_and_sequence():
     """Also where times tie, and for robots that hear many."""
     for radio in (RADIO, Radio(99.0, send_offset="tick", jitter_s=0.2), Radio(99.0, send_offset="tick", latency_s=0.1)):
         told = run(make_air(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
         for one in told.news:
-            h = one.heard
-            order = np.lexsort((h.sequence, h.sender, h.heard_at_ns, h.receiver))
+            h = one.received
+            order = np.lexsort((h.sequence, h.sender, h.received_at_ns, h.receiver))
             np.testing.assert_array_equal(order, np.arange(len(h)))
-        assert len(told.heard("receiver")) > 1000
+        assert len(told.received("receiver")) > 1000
 
 
 def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
-    """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are heard at 150 ms."""
+    """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are received at 150 ms."""
     air = make_air(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
     told = run(air, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
-    heard_by_0 = told.heard("receiver") == 0
-    assert told.heard("heard_at_ns")[heard_by_0].tolist() == [150_000_000] * 2
-    assert told.heard("sender")[heard_by_0].tolist() == [1, 2]
+    received_by_0 = told.received("receiver") == 0
+    assert told.received("received_at_ns")[received_by_0].tolist() == [150_000_000] * 2
+    assert told.received("sender")[received_by_0].tolist() == [1, 2]
 
 
-def test_payloads_hold_only_packets_that_somebody_heard():
+def test_payloads_hold_only_packets_that_somebody_received():
     told = run(make_air(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
     for one in told.news:
-        np.testing.assert_array_equal(np.unique(one.heard.payload), np.arange(len(one.heard.payloads)))
+        np.testing.assert_array_equal(np.unique(one.received.payload), np.arange(len(one.received.payloads)))
 
 
 SIX, TICKS = 6, 5
@@ -129,11 +129,11 @@ def told(news: list[News]) -> list[Any]:
     """All that was told, whenever that was: as plain values, sorted."""
     out = []
     for one in news:
-        h, f, d = one.heard, one.finished, one.departed
+        h, f, d = one.received, one.finished, one.departed
         for i in range(len(h)):
             given = tuple(float(column[i]) for column in h.given.values())
-            numbers = int(h.receiver[i]), int(h.sender[i]), int(h.sequence[i]), int(h.heard_at_ns[i])
-            out.append(("heard", *numbers, given, h.payloads.row(int(h.payload[i]))))
+            numbers = int(h.receiver[i]), int(h.sender[i]), int(h.sequence[i]), int(h.received_at_ns[i])
+            out.append(("received", *numbers, given, h.payloads.row(int(h.payload[i]))))
         columns = f.sender, f.receiver, f.receivers, f.sequence, f.on_air_at_ns, f.final_at_ns, f.fate
         out += [("finished", *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
         columns = d.sender, d.sequence, d.intended, d.fate, d.on_air_at_ns, d.off_air_at_ns
@@ -144,12 +144,12 @@ def told(news: list[News]) -> list[Any]:
 def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[list[Any], list[int]]:
     """What becomes of packets sent at several times within ticks, where time passes in these parts of a tick, too.
 
-    Where robots are out, one is dead and one's radio is off for two ticks. What is heard by a tick's start is told
-    before that: a robot that has been handed a packet has heard it, though it be dead a moment later.
+    Where robots are out, one is dead and one's radio is off for two ticks. What is received by a tick's start is told
+    before that: a robot that has been handed a packet has received it, though it be dead a moment later.
     """
     rng = np.random.default_rng(seed)
     pose, alive = scattered(SIX, seed), np.ones(SIX, np.bool_)
-    news, within = list[News](), list[Heard]()
+    news, within = list[News](), list[ReceivedPackets]()
     for tick in range(TICKS):
         start_ns = tick_start_ns(tick, RATE_HZ)
         if out is not None and tick in (1, 3):
@@ -173,7 +173,7 @@ def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[li
     last = air.end()
     tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
     assert tallies.fates.sum() == tallies.intended.sum()
-    assert sum(map(len, within)) == sum(len(one.heard) for one in news)  # each is handed over once
+    assert sum(map(len, within)) == sum(len(one.received) for one in news)  # each is handed over once
     return told(news), [int(count.sum()) for count in (tallies.sent, tallies.intended, tallies.in_range)]
 
 
@@ -199,8 +199,8 @@ def kept(radio: Radio) -> Radio:
     return replace(radio, delays=replace(radio.delays, keep_order=True))
 
 
-def heard(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray:
-    """Receiver, sender, sequence and time of all that is heard, as it is told, (k, 4).
+def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray:
+    """Receiver, sender, sequence and time of all that is received, as it is told, (k, 4).
 
     `between` are moments, as shares of a tick, at which the air is asked, too.
     """
@@ -210,12 +210,12 @@ def heard(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray:
     told = []
     for tick in range(LATE_TICKS + 40):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        told.append(air.advance(at_ns).heard)
+        told.append(air.advance(at_ns).received)
         air.hold(pose, alive)
         if tick < LATE_TICKS:
             air.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
-        told += [air.advance(at_ns + int(share * TICK_NS)).heard for share in between]
-    return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.heard_at_ns], axis=1) for h in told])
+        told += [air.advance(at_ns + int(share * TICK_NS)).received for share in between]
+    return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.received_at_ns], axis=1) for h in told])
 
 
 def sorted_rows(found: IntArray) -> Any:
@@ -223,7 +223,7 @@ def sorted_rows(found: IntArray) -> Any:
 
 
 def overtaken(found: IntArray) -> int:
-    """How many packets are heard before one of their link with a smaller number."""
+    """How many packets are received before one of their link with a smaller number."""
     count = 0
     for link in np.unique(found[:, :2], axis=0):
         count += int(np.count_nonzero(np.diff(found[(found[:, :2] == link).all(axis=1), 2]) < 0))
@@ -232,7 +232,7 @@ def overtaken(found: IntArray) -> int:
 
 @pytest.mark.parametrize("radio", LATE_RADIOS)
 def test_packets_overtake_unless_order_is_kept(radio: Radio):
-    free, ordered = heard(radio, 3), heard(kept(radio), 3)
+    free, ordered = received(radio, 3), received(kept(radio), 3)
     assert overtaken(free) > 10
     assert overtaken(ordered) == 0
     # The same packets, each as late as the latest up to it on its link.
@@ -250,7 +250,7 @@ def test_packets_overtake_unless_order_is_kept(radio: Radio):
     st.lists(st.floats(0.0, 0.999), min_size=1, max_size=3).map(sorted),
 )
 def test_when_the_air_is_asked_changes_nothing(radio: Radio, seed: int, between: list[float]):
-    at_ticks, often = heard(kept(radio), seed), heard(kept(radio), seed, between)
+    at_ticks, often = received(kept(radio), seed), received(kept(radio), seed, between)
     assert overtaken(often) == 0
     assert sorted_rows(at_ticks) == sorted_rows(often)
 
@@ -267,10 +267,10 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
             now.radio_on[0] = tick != 1
             air.disrupt(now)
             at_ns = tick_start_ns(tick, RATE_HZ)
-            told = air.advance(at_ns).heard
+            told = air.advance(at_ns).received
             times[-1] |= {
                 (s, q): t
-                for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.heard_at_ns, strict=True)
+                for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.received_at_ns, strict=True)
                 if r == 0
             }
             air.hold(pose, np.ones(12, np.bool_))
@@ -287,4 +287,4 @@ def test_nobody_waits_where_delays_are_even():
     radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
     pose = scattered(4)
     free, ordered = (run(make_air(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))
-    np.testing.assert_array_equal(free.heard("heard_at_ns"), ordered.heard("heard_at_ns"))
+    np.testing.assert_array_equal(free.received("received_at_ns"), ordered.received("received_at_ns"))

@@ -19,11 +19,11 @@ FALSE_ALARM_RATE = 1e-4
 
 
 @pytest.mark.parametrize("loss", [0.05, 0.3, 0.9])
-def test_share_heard_lies_in_the_exact_binomial_interval(loss: float):
+def test_share_received_lies_in_the_exact_binomial_interval(loss: float):
     told = run(make_air(Radio(2.0, loss=loss), 20), scattered(20), everybody(20), 30, 2)
-    heard, in_range = len(told.heard("receiver")), int(told.tally.in_range[0])
+    received, in_range = len(told.received("receiver")), int(told.tally.in_range[0])
     assert in_range > 2000
-    assert binomtest(heard, in_range, 1.0 - loss).pvalue > FALSE_ALARM_RATE
+    assert binomtest(received, in_range, 1.0 - loss).pvalue > FALSE_ALARM_RATE
 
 
 def test_both_directions_and_following_packets_are_lost_independently():
@@ -41,7 +41,7 @@ def test_both_directions_and_following_packets_are_lost_independently():
 
 
 def test_no_loss_loses_nothing_and_full_loss_everything():
-    for loss, fate in ((0.0, "HEARD"), (1.0, "LOST")):
+    for loss, fate in ((0.0, "RECEIVED"), (1.0, "LOST")):
         assert run(make_air(Radio(99.0, loss=loss), 5), scattered(5), everybody(5), 3, 2).fates() == {fate: 60}
 
 
@@ -62,7 +62,7 @@ def sequences(radio: Radio) -> np.ndarray:
     sent = packets(range(SENDERS), SENDERS)
     told = run(make_air(radio, SENDERS + 1), pose, lambda _: sent, TICKS, 2)
     lost = np.zeros((SENDERS, TICKS), bool)
-    lost[told.finished("sender"), told.finished("sequence")] = told.finished("fate") != Fate.HEARD
+    lost[told.finished("sender"), told.finished("sequence")] = told.finished("fate") != Fate.RECEIVED
     return lost
 
 
@@ -104,18 +104,18 @@ def air_of(radio: Radio, robots: int, arenas: int = 1) -> Air:
 
 @pytest.mark.parametrize(
     ("between_y_m", "fates"),
-    [(0.0, {"HEARD": 4, "BLOCKED": 2}), (0.099, {"HEARD": 4, "BLOCKED": 2}), (0.101, {"HEARD": 6})],
+    [(0.0, {"RECEIVED": 4, "BLOCKED": 2}), (0.099, {"RECEIVED": 4, "BLOCKED": 2}), (0.101, {"RECEIVED": 6})],
 )
 def test_a_disc_on_the_line_between_two_centres_blocks_both_ways(between_y_m: float, fates: dict[str, int]):
     pose = at((-1, 0), (0, between_y_m), (1, 0))
     told = run(air_of(BLOCKING, 3), pose, everybody(3), 1)
     assert told.fates() == fates
-    assert told.tally.in_range.tolist() == [fates["HEARD"]]
+    assert told.tally.in_range.tolist() == [fates["RECEIVED"]]
 
 
 def test_bodies_do_not_block_unless_asked_to():
     told = run(air_of(Radio(9.0, send_offset="tick"), 3), at((-1, 0), (0, 0), (1, 0)), everybody(3), 1)
-    assert told.fates() == {"HEARD": 6}
+    assert told.fates() == {"RECEIVED": 6}
 
 
 def test_the_dead_are_in_the_way_and_the_graph_has_no_edge_through_bodies():

@@ -1,4 +1,4 @@
-"""When packets are sent, go on air and are heard, to the nanosecond."""
+"""When packets are sent, go on air and are received, to the nanosecond."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
     st.integers(200, 10**6),
     st.sampled_from(["uniform", "tick", 0.05]),
 )
-def test_heard_no_earlier_than_airtime_and_latency_allow(
+def test_received_no_earlier_than_airtime_and_latency_allow(
     latency_s: float, jitter_s: float, bit_rate_bps: int, send_offset: str | float
 ):
     """And, jitter included, no later; so never in the packet's own tick."""
@@ -35,29 +35,29 @@ def test_heard_no_earlier_than_airtime_and_latency_allow(
     assert (told.finished("on_air_at_ns") >= told.finished("sent_at_ns")).all()
 
 
-def test_what_is_told_at_a_tick_was_heard_by_it_and_not_before_the_last():
+def test_what_is_told_at_a_tick_was_received_by_it_and_not_before_the_last():
     told = run(make_air(Radio(9.0, latency_s=0.15, jitter_s=0.1), 6), scattered(6), everybody(6), 4, 6)
-    assert sum(len(one.heard) for one in told.news) == 120
+    assert sum(len(one.received) for one in told.news) == 120
     for tick, one in enumerate(told.news):
-        assert (one.heard.heard_at_ns <= tick * TICK_NS).all()
-        assert (one.heard.heard_at_ns > (tick - 1) * TICK_NS).all()
-        assert (one.heard.sequence < tick).all()
+        assert (one.received.received_at_ns <= tick * TICK_NS).all()
+        assert (one.received.received_at_ns > (tick - 1) * TICK_NS).all()
+        assert (one.received.sequence < tick).all()
 
 
 @pytest.mark.parametrize(("late_ns", "ticks"), [(-1, 1), (0, 1), (1, 2)])
-def test_a_packet_due_exactly_at_a_tick_is_heard_in_it(late_ns: int, ticks: int):
+def test_a_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: int):
     """In float seconds it would slip a tick now and then."""
     latency_s = (TICK_NS - AIRTIME_NS + late_ns) / 1e9
     told = run(make_air(Radio(9.0, latency_s=latency_s, send_offset="tick"), 2), PAIR, everybody(2), 50, 3)
-    heard = [len(one.heard) for one in told.news]
-    assert heard == [0] * ticks + [2] * 50 + [0] * (4 - ticks)
+    received = [len(one.received) for one in told.news]
+    assert received == [0] * ticks + [2] * 50 + [0] * (4 - ticks)
 
 
 def test_airtime_counts_overhead_and_is_rounded_up():
     told = run(
         make_air(Radio(9.0, bit_rate_bps=7_000_000, overhead_bytes=5, send_offset="tick"), 2), PAIR, everybody(2), 1
     )
-    assert told.heard("heard_at_ns").tolist() == [17_143, 17_143]
+    assert told.received("received_at_ns").tolist() == [17_143, 17_143]
 
 
 def test_phase_spans_the_tick_and_jitter_a_fifth_of_it():
@@ -100,13 +100,13 @@ def test_no_other_offset_is_taken(send_offset: str | float):
 def test_geometry_is_that_of_the_tick_in_which_a_packet_goes_on_air():
     """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
     near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
-    for before, after, send_offset, heard in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
+    for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
         air = make_air(Radio(2.0, send_offset=send_offset), 2)
         air.hold(before, np.ones(2, bool))
         air.send(0, 0, packets([0]))
         assert len(air.advance(TICK_NS).finished.fate) == 0
         air.hold(after, np.ones(2, bool))
-        assert len(air.advance(2 * TICK_NS).heard) == heard
+        assert len(air.advance(2 * TICK_NS).received) == received
 
 
 def test_time_does_not_run_backwards():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace
-from tests.support.comms.radio.measured import TRIO, numbers_heard, trace_of
+from tests.support.comms.radio.measured import TRIO, numbers_received, trace_of
 from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, run
 
 ROBOTS = 3
@@ -93,17 +93,17 @@ def replayed(traces: LinkTraces, others: str, ticks: int, radio: Radio = DISK, a
 def test_a_ratio_holds_from_its_time_on_for_its_direction_alone():
     ratio = trace_of("delivery_ratio", [(0, 0, 1, 1.0), (2, 0, 1, 0.0), (4, 0, 1, 1.0), (0, 1, 0, 0.0)])
     told = replayed(LinkTraces(delivery_ratio=ratio), "model", 6)
-    assert numbers_heard(told, 0, 1) == [0, 1, 4, 5]
-    assert numbers_heard(told, 1, 0) == []
-    assert numbers_heard(told, 0, 2) == numbers_heard(told, 2, 1) == list(range(6))
-    assert told.fates() == {"HEARD": 4 + 4 * 6, "LOST": 2 + 6}
+    assert numbers_received(told, 0, 1) == [0, 1, 4, 5]
+    assert numbers_received(told, 1, 0) == []
+    assert numbers_received(told, 0, 2) == numbers_received(told, 2, 1) == list(range(6))
+    assert told.fates() == {"RECEIVED": 4 + 4 * 6, "LOST": 2 + 6}
     assert told.tally.in_range.sum() == 36
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.7])
-def test_a_ratio_is_the_share_that_is_heard(ratio: float):
+def test_a_ratio_is_the_share_that_is_received(ratio: float):
     told = replayed(LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 0, 1, ratio)])), "none", 500, arenas=4)
-    share = len(told.heard("sequence")) / 2000
+    share = len(told.received("sequence")) / 2000
     assert abs(share - ratio) < 4.4 * np.sqrt(ratio * (1.0 - ratio) / 2000)
 
 
@@ -112,17 +112,17 @@ def test_links_without_a_value_yet_are_out_of_range_or_as_the_model_has_them():
         trace_of("delivery_ratio", [(0, 0, 1, 1.0), (3, 2, 0, 0.0)]), None, trace_of("delay_s", [(2, 1, 0, 0.0)])
     )
     told = replayed(traces, "none", 5)
-    assert (numbers_heard(told, 0, 1), numbers_heard(told, 1, 0)) == ([0, 1, 2, 3, 4], [2, 3, 4])
-    assert told.fates() == {"HEARD": 8, "LOST": 2, "OUT_OF_RANGE": 20}
+    assert (numbers_received(told, 0, 1), numbers_received(told, 1, 0)) == ([0, 1, 2, 3, 4], [2, 3, 4])
+    assert told.fates() == {"RECEIVED": 8, "LOST": 2, "OUT_OF_RANGE": 20}
     assert told.tally.in_range.sum() == 10
     assert Fate.OUT_OF_RANGE not in told.finished("fate")
-    assert replayed(traces, "model", 5).fates() == {"HEARD": 28, "LOST": 2}
+    assert replayed(traces, "model", 5).fates() == {"RECEIVED": 28, "LOST": 2}
 
 
 def test_a_delay_comes_on_top_of_the_radio_s_own():
     delay = trace_of("delay_s", [(0, 0, 1, 0.25), (1, 0, 1, 0.0)])
     told = replayed(LinkTraces(delay_s=delay), "none", 2, replace(DISK, latency_s=0.01))
-    assert told.heard("heard_at_ns").tolist() == [
+    assert told.received("received_at_ns").tolist() == [
         TICK_NS + AIRTIME_NS + 10_000_000,
         AIRTIME_NS + 260_000_000,
     ]
@@ -133,9 +133,9 @@ def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
     without = run(make_air(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
     ones = trace_of("delivery_ratio", [(0, s, (s + d) % 3, 1.0) for s in range(3) for d in (1, 2)])
     told = replayed(LinkTraces(delivery_ratio=ones), "none", 30, lossy)
-    for name in ("sender", "receiver", "sequence", "heard_at_ns"):
-        np.testing.assert_array_equal(told.heard(name), without.heard(name))
-    assert not numbers_heard(told, 1, 2)
+    for name in ("sender", "receiver", "sequence", "received_at_ns"):
+        np.testing.assert_array_equal(told.received(name), without.received(name))
+    assert not numbers_received(told, 1, 2)
 
 
 def test_the_graph_has_the_pairs_whose_worse_direction_suffices_now():

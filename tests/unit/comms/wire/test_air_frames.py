@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.radio_bridge import (
     MAX_RADIO_FRAME_BYTES,
@@ -24,16 +24,16 @@ from swarmwire.comms.wire.radio_bridge import (
     encode_pose,
 )
 from swarmwire.comms.wire.tick_frames import decode_packets, decode_sent, encode_packets, encode_sent
-from tests.support.agent.hosts import GIVES, heard_from
+from tests.support.agent.hosts import GIVES, received_from
 
 ROW = 4  # of the robot, in the world; in its arena there are two
 TERMS = AirTerms(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
-# From both robots of the arena; the first message was heard twice, and the last is empty.
-HEARD = Heard(
+# From both robots of the arena; the first message was received twice, and the last is empty.
+RECEIVED = ReceivedPackets(
     receiver=np.array([ROW, ROW, ROW]),
     sender=np.array([0, 1, 1]),
     sequence=np.array([7, 0, 1]),
-    heard_at_ns=np.array([10, 20, 30]),
+    received_at_ns=np.array([10, 20, 30]),
     given={"range_m": np.array([0.5, 1.0, 1.5]), "bearing_rad": np.array([-1.0, 0.0, 1.0])},
     payload=np.array([0, 0, 1]),
     payloads=Payloads.of([b"abc", b""]),
@@ -43,54 +43,54 @@ OUTCOMES = Outcomes(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 def changed(**arrays: Any) -> bytes:
     """A sound frame but for these arrays, "_" for "/"."""
-    whole = frames.decode(encode_air(3, ROW, HEARD, OUTCOMES))
+    whole = frames.decode(encode_air(3, ROW, RECEIVED, OUTCOMES))
     wrong = {name.replace("_", "/"): array for name, array in arrays.items()}
     return frames.encode(whole.kind, whole.tick, {**whole.arrays, **wrong})
 
 
 def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
-    """The table of what was heard, with these columns in place of its own."""
-    heard = replace(HEARD, **{name: np.array(column) for name, column in columns.items()})
-    return np.array((heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, heard.payload))
+    """The table of what was received, with these columns in place of its own."""
+    received = replace(RECEIVED, **{name: np.array(column) for name, column in columns.items()})
+    return np.array((received.receiver, received.sender, received.sequence, received.received_at_ns, received.payload))
 
 
-def test_what_was_heard_and_learned_comes_over_whole() -> None:
-    tick, heard, outcomes = decode_air(encode_air(3, ROW, HEARD, OUTCOMES), TERMS)
+def test_what_was_received_and_learned_comes_over_whole() -> None:
+    tick, received, outcomes = decode_air(encode_air(3, ROW, RECEIVED, OUTCOMES), TERMS)
     assert tick == 3
-    for name in ("receiver", "sender", "sequence", "heard_at_ns", "payload"):
-        assert getattr(heard, name).tolist() == getattr(HEARD, name).tolist()
-    assert {name: column.tolist() for name, column in heard.given.items()} == {
+    for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+        assert getattr(received, name).tolist() == getattr(RECEIVED, name).tolist()
+    assert {name: column.tolist() for name, column in received.given.items()} == {
         "range_m": [0.5, 1.0, 1.5],
         "bearing_rad": [-1.0, 0.0, 1.0],
     }
-    assert [heard.payloads.row(at) for at in range(2)] == [b"abc", b""]
+    assert [received.payloads.row(at) for at in range(2)] == [b"abc", b""]
     assert (outcomes.row.tolist(), outcomes.id.tolist(), outcomes.result.tolist()) == ([ROW, ROW], [0, 5], [1, 0])
 
 
 def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
-    tick, heard, outcomes = decode_air(encode_air(0, ROW, Heard.none(TERMS.gives), NO_OUTCOMES), TERMS)
-    assert (tick, len(heard), len(outcomes)) == (0, 0, 0)
-    assert set(heard.given) == set(TERMS.gives)
+    tick, received, outcomes = decode_air(encode_air(0, ROW, ReceivedPackets.none(TERMS.gives), NO_OUTCOMES), TERMS)
+    assert (tick, len(received), len(outcomes)) == (0, 0, 0)
+    assert set(received.given) == set(TERMS.gives)
 
 
 @pytest.mark.parametrize(
     ("arrays", "told"),
     [
-        ({"heard_numbers": numbers(receiver=[ROW, ROW, 5])}, "to itself"),
-        ({"heard_numbers": numbers(receiver=[3, ROW, ROW])}, "to itself"),
-        ({"heard_numbers": numbers(sender=[0, 2, 1])}, "to itself"),
-        ({"heard_numbers": numbers(sender=[-1, 1, 1])}, "to itself"),
-        ({"heard_numbers": numbers(payload=[0, 0, 2])}, "payloads that are there"),
-        ({"heard_numbers": numbers(payload=[0, -1, 1])}, "payloads that are there"),
-        ({"heard_numbers": numbers()[:4]}, "heard/numbers"),
-        ({"heard_numbers": numbers().astype(np.float64)}, "heard/numbers"),
-        ({"heard_given": np.zeros((2, 2))}, "heard/given"),
-        ({"heard_given": np.zeros((1, 3))}, "heard/given"),
-        ({"heard_data": np.zeros(3)}, "heard/data"),
-        ({"heard_offset": np.array([], np.int64)}, "heard/offset"),
-        ({"heard_offset": np.array([1, 3, 3])}, "heard/offset"),
-        ({"heard_offset": np.array([0, 3, 2])}, "heard/offset"),
-        ({"heard_offset": np.array([0, 4, 3])}, "heard/offset"),
+        ({"received_numbers": numbers(receiver=[ROW, ROW, 5])}, "to itself"),
+        ({"received_numbers": numbers(receiver=[3, ROW, ROW])}, "to itself"),
+        ({"received_numbers": numbers(sender=[0, 2, 1])}, "to itself"),
+        ({"received_numbers": numbers(sender=[-1, 1, 1])}, "to itself"),
+        ({"received_numbers": numbers(payload=[0, 0, 2])}, "payloads that are there"),
+        ({"received_numbers": numbers(payload=[0, -1, 1])}, "payloads that are there"),
+        ({"received_numbers": numbers()[:4]}, "received/numbers"),
+        ({"received_numbers": numbers().astype(np.float64)}, "received/numbers"),
+        ({"received_given": np.zeros((2, 2))}, "received/given"),
+        ({"received_given": np.zeros((1, 3))}, "received/given"),
+        ({"received_data": np.zeros(3)}, "received/data"),
+        ({"received_offset": np.array([], np.int64)}, "received/offset"),
+        ({"received_offset": np.array([1, 3, 3])}, "received/offset"),
+        ({"received_offset": np.array([0, 3, 2])}, "received/offset"),
+        ({"received_offset": np.array([0, 4, 3])}, "received/offset"),
         ({"outcomes": np.array([[ROW, 3], [0, 5], [1, 0]])}, "robot's own"),
         ({"outcomes": np.array([[ROW, 5], [0, 5], [1, 0]])}, "robot's own"),
     ],
@@ -103,7 +103,7 @@ def test_tables_that_contradict_one_another_are_refused(arrays: dict[str, Any], 
 
 
 def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
-    whole = frames.decode(encode_air(3, ROW, HEARD, OUTCOMES))
+    whole = frames.decode(encode_air(3, ROW, RECEIVED, OUTCOMES))
     for kind, tick in (("packets", 3), ("tick", -1)):
         with pytest.raises(BadFrame, match="expected a tick"):
             decode_air(frames.encode(kind, tick, whole.arrays), TERMS)
@@ -111,13 +111,13 @@ def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
 
 def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     sizes = [
-        len(encode_air(3, ROW, replace(HEARD, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)) for n in (0, 2**17)
+        len(encode_air(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)) for n in (0, 2**17)
     ]
     most = MAX_RADIO_FRAME_BYTES - sizes[1] + 2**17
     assert sizes[0] < 2**10
     assert MAX_RADIO_FRAME_BYTES == 2**20
     fits, exceeds = (
-        encode_air(3, ROW, replace(HEARD, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES) for n in (most, most + 1)
+        encode_air(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES) for n in (most, most + 1)
     )
     assert len(fits) == MAX_RADIO_FRAME_BYTES
     assert decode_air(fits, TERMS)[0] == 3
@@ -128,7 +128,7 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
 @pytest.mark.parametrize("tick", [2**62 // 10**8 + 1, 2**63, 2**64 - 1])
 def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
     with pytest.raises(BadFrame):
-        decode_air(encode_air(tick, ROW, HEARD, OUTCOMES), TERMS)
+        decode_air(encode_air(tick, ROW, RECEIVED, OUTCOMES), TERMS)
 
 
 TOLD_TERMS = AirTerms(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.outcomes"))
@@ -209,18 +209,20 @@ def test_what_is_not_finite_is_none(place: int, wrong: float) -> None:
 
 
 ROWS = np.array([5, 2])  # group after group: they need not rise
-SENT = Sent(np.array([2, 5, 2]), np.array([BROADCAST, 0, 1]), Payloads.of([b"abc", b"", b"d"]), np.array([-1, 0, 7]))
+SENT = SentPackets(
+    np.array([2, 5, 2]), np.array([BROADCAST, 0, 1]), Payloads.of([b"abc", b"", b"d"]), np.array([-1, 0, 7])
+)
 
 
 def test_packets_and_outcomes_come_back_with_time_and_number() -> None:
-    heard, outcomes = heard_from(SENT, [2, 5]), Outcomes(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
-    frame = frames.decode(encode_packets(7, 712_000_000, 3, heard, outcomes))
+    received, outcomes = received_from(SENT, [2, 5]), Outcomes(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
+    frame = frames.decode(encode_packets(7, 712_000_000, 3, received, outcomes))
     assert (frame.kind, frame.tick) == ("packets", 7)
     at_ns, number, got, told = decode_packets(frame, GIVES)
     assert (at_ns, number) == (712_000_000, 3)
-    for name in ("receiver", "sender", "sequence", "heard_at_ns", "payload"):
-        assert getattr(got, name).tolist() == getattr(heard, name).tolist()
-    assert [got.payloads.row(i) for i in range(3)] == [heard.payloads.row(i) for i in range(3)]
+    for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+        assert getattr(got, name).tolist() == getattr(received, name).tolist()
+    assert [got.payloads.row(i) for i in range(3)] == [received.payloads.row(i) for i in range(3)]
     assert (told.row.tolist(), told.id.tolist(), told.result.tolist()) == ([2, 5], [0, 3], [1, 0])
 
 
@@ -231,8 +233,8 @@ def test_packets_without_time_and_number_are_refused(values: dict[str, Any]) -> 
 
 
 def test_packets_with_a_table_missing_are_refused() -> None:
-    whole = frames.decode(encode_packets(0, 0, 0, heard_from(SENT, [2]), NO_OUTCOMES))
-    for name in ("heard/given", "heard/data", "heard/offset"):
+    whole = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_OUTCOMES))
+    for name in ("received/given", "received/data", "received/offset"):
         arrays = {key: array for key, array in whole.arrays.items() if key != name}
         with pytest.raises(BadFrame):
             decode_packets(frames.Frame("packets", 0, arrays, whole.values), GIVES)
@@ -254,15 +256,17 @@ def test_packets_of_robots_that_are_not_the_runners_own_are_refused_and_so_are_n
             decode_sent(frames.decode(data), rows)
 
 
-def test_nothing_heard_is_a_frame_of_outcomes_alone() -> None:
+def test_nothing_received_is_a_frame_of_outcomes_alone() -> None:
     outcomes = Outcomes(np.array([2]), np.array([0]), np.array([1]))
-    _, _, heard, told = decode_packets(frames.decode(encode_packets(0, 0, 0, Heard.none(GIVES), outcomes)), GIVES)
-    assert (len(heard), len(told)) == (0, 1)
+    _, _, received, told = decode_packets(
+        frames.decode(encode_packets(0, 0, 0, ReceivedPackets.none(GIVES), outcomes)), GIVES
+    )
+    assert (len(received), len(told)) == (0, 1)
 
 
 def test_a_runner_of_one_robot_or_of_none_speaks_for_no_other() -> None:
     for sender in (4, 6):
-        one = frames.decode(encode_sent(7, Sent(np.array([sender]), np.array([0]), Payloads.of([b"a"]))))
+        one = frames.decode(encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.of([b"a"]))))
         assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]
         assert one.values == {}
         for rows in ([5], []):

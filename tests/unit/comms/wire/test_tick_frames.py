@@ -11,7 +11,16 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, UNTOLD, Heard, Outcomes, Payloads, SendResult, Sent
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_OUTCOMES,
+    UNTOLD,
+    Outcomes,
+    Payloads,
+    ReceivedPackets,
+    SendResult,
+    SentPackets,
+)
 from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
@@ -40,13 +49,13 @@ def senses_(draw: st.DrawFn) -> Senses:
 
 
 @st.composite
-def heard_(draw: st.DrawFn, gives: tuple[str, ...]) -> Heard:
+def received_(draw: st.DrawFn, gives: tuple[str, ...]) -> ReceivedPackets:
     payloads = draw(payload_lists)
     k = draw(st.integers(0, 5))
     which = draw(st.lists(st.integers(0, len(payloads) - 1), min_size=k, max_size=k))
     given_columns = {name: draw(floats(k)) for name in gives}
     columns = [np.sort(draw(ints(k))), *(draw(ints(k)) for _ in range(3))]
-    return Heard(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
+    return ReceivedPackets(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
 
 
 def same(one: Any, other: Any) -> bool:
@@ -54,10 +63,12 @@ def same(one: Any, other: Any) -> bool:
 
 
 @given(senses_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
-def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[str, ...], data: st.DataObject) -> None:
+def test_senses_and_received_packets_come_over_whole(
+    senses: Senses, gives: tuple[str, ...], data: st.DataObject
+) -> None:
     assume(senses)
-    heard = data.draw(heard_(gives))
-    frame = frames.decode(encode_tick(5, senses, heard, NO_OUTCOMES))
+    received = data.draw(received_(gives))
+    frame = frames.decode(encode_tick(5, senses, received, NO_OUTCOMES))
     got_senses, got, outcomes = decode_tick(frame, gives, senses.keys())
     assert "outcomes" not in frame.arrays
     assert len(outcomes) == 0
@@ -66,16 +77,16 @@ def test_senses_and_heard_packets_come_over_whole(senses: Senses, gives: tuple[s
         assert same(got_senses[name].rows, group.rows)
         assert list(got_senses[name].fields) == list(group.fields)
         assert all(same(got_senses[name].fields[field], column) for field, column in group.fields.items())
-    assert len(got) == len(heard)
+    assert len(got) == len(received)
     assert set(got.given) == set(gives)
-    for column in ("receiver", "sender", "sequence", "heard_at_ns", "payload"):
-        assert same(getattr(got, column), getattr(heard, column))
-    assert all(same(got.given[name], heard.given[name]) for name in gives)
-    of, got_of = heard.payloads, got.payloads
-    assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in heard.payload]
+    for column in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+        assert same(getattr(got, column), getattr(received, column))
+    assert all(same(got.given[name], received.given[name]) for name in gives)
+    of, got_of = received.payloads, got.payloads
+    assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in received.payload]
 
 
-TWO_HEARD = Heard(
+TWO_RECEIVED = ReceivedPackets(
     *(np.array(column, np.int64) for column in ([4, 5], [0, 1], [0, 0], [9, 9])),
     {"range_m": np.array([0.5, 1.5])},
     np.array([0, 1], np.int64),
@@ -86,23 +97,23 @@ TWO_HEARD = Heard(
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [
-        ("heard/numbers", np.array([[5, 4], [0, 1], [0, 0], [9, 9], [0, 1]])),  # receivers fall
-        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [0, 2]])),  # there is no third payload
-        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [-1, 1]])),
-        ("heard/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9]])),
-        ("heard/numbers", np.zeros((5, 2))),
-        ("heard/given", np.array([[0.5]])),
-        ("heard/given", np.zeros((1, 2), np.int64)),
-        ("heard/data", np.zeros(4, np.uint8)),
-        ("heard/offset", np.array([0, 6, 5])),
-        ("heard/offset", np.array([1, 3, 5])),
-        ("heard/offset", np.array([0.0, 3.0, 5.0])),
-        ("heard/offset", np.array([], np.int64)),
+        ("received/numbers", np.array([[5, 4], [0, 1], [0, 0], [9, 9], [0, 1]])),  # receivers fall
+        ("received/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [0, 2]])),  # there is no third payload
+        ("received/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9], [-1, 1]])),
+        ("received/numbers", np.array([[4, 5], [0, 1], [0, 0], [9, 9]])),
+        ("received/numbers", np.zeros((5, 2))),
+        ("received/given", np.array([[0.5]])),
+        ("received/given", np.zeros((1, 2), np.int64)),
+        ("received/data", np.zeros(4, np.uint8)),
+        ("received/offset", np.array([0, 6, 5])),
+        ("received/offset", np.array([1, 3, 5])),
+        ("received/offset", np.array([0.0, 3.0, 5.0])),
+        ("received/offset", np.array([], np.int64)),
     ],
     ids=repr,
 )
 def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_HEARD, NO_OUTCOMES))
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_RECEIVED, NO_OUTCOMES))
     decode_tick(frame, ("range_m",), {"flock"})
     with pytest.raises(BadFrame) as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, name: wrong}), ("range_m",), {"flock"})
@@ -128,7 +139,7 @@ def test_senses_and_packets_of_other_robots_are_refused(
 
     def checked(rows: list[int], column: list[float], receiver: list[int]) -> None:
         senses = {"flock": GroupSenses(np.array(rows), {"compass.heading_rad": np.array(column)})}
-        check_rows(senses, replace(TWO_HEARD, receiver=np.array(receiver)), known)
+        check_rows(senses, replace(TWO_RECEIVED, receiver=np.array(receiver)), known)
 
     checked([4, 5], [0.0, 0.0], [4, 5])
     with pytest.raises(BadFrame) as caught:
@@ -137,7 +148,7 @@ def test_senses_and_packets_of_other_robots_are_refused(
 
 
 def telling(outcomes: Outcomes) -> frames.Frame:
-    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, Heard.none(), outcomes))
+    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, ReceivedPackets.none(), outcomes))
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(SendResult)), min_size=1))
@@ -149,15 +160,17 @@ def test_outcomes_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
 
 def test_senses_of_other_groups_or_none_are_refused() -> None:
     for senses, known in (({"flock": GroupSenses(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
-        frame = frames.decode(encode_tick(5, senses, Heard.none(), NO_OUTCOMES))
+        frame = frames.decode(encode_tick(5, senses, ReceivedPackets.none(), NO_OUTCOMES))
         with pytest.raises(BadFrame, match="expected groups of this runner"):
             decode_tick(frame, (), known)
 
 
 @pytest.mark.parametrize("gives", [(), ("range_m", "bearing_rad")])
 def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(gives: tuple[str, ...]) -> None:
-    heard = Heard(*np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"]))
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, heard, NO_OUTCOMES))
+    received = ReceivedPackets(
+        *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"])
+    )
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, received, NO_OUTCOMES))
     with pytest.raises(BadFrame):
         decode_tick(frame, gives, {"flock"})
 
@@ -187,7 +200,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
     drive = data.draw(npst.arrays(np.bool_, 3))
     ids = np.where(to == BROADCAST, UNTOLD, data.draw(npst.arrays(np.int64, k, elements=st.integers(UNTOLD, I64.max))))
-    sent = Sent(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
+    sent = SentPackets(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
     actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
     assert (frame.kind, frame.tick) == ("actions", 8)
@@ -202,7 +215,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
 
 
 def sound(**more: Any) -> Actions:
-    sent = Sent(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
+    sent = SentPackets(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
     return replace(Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent), **more)
 
 
@@ -221,7 +234,7 @@ def test_actuators_and_leds_come_over_whole_and_what_was_not_done_takes_no_room(
     got = decode_actions(frames.decode(encode_actions(0, sound(own=ACTUATED, leds=LEDS))), ROWS)
     assert all(same(getattr(got.own, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
     assert all(same(getattr(got.leds, name), getattr(LEDS, name)) for name in ("rows", "which", "rgb"))
-    silent = frames.decode(encode_actions(0, sound(sent=Sent.none())))
+    silent = frames.decode(encode_actions(0, sound(sent=SentPackets.none())))
     assert not [name for name in silent.arrays if name.startswith(("sent", "own", "leds"))]
     assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).own)) == (0, 0)
 

@@ -72,7 +72,7 @@ class World:
             closed_after(open_world(LISTEN, 10.0, network, agents_access(KEYS, ACCESS)))
         )
         self.endpoint = listens_at(self.session)[0]
-        self.heard: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self.received: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self.asked: list[str] = []
         self.alive: list[str] = []
         for key in (KEYS.any_offer, KEYS.any_join):
@@ -88,7 +88,7 @@ class World:
             query.reply(query.key_expr, b"yes")
 
     def _hear(self, sample: zenoh.Sample) -> None:
-        self.heard.put((str(sample.key_expr), sample.payload.to_bytes()))
+        self.received.put((str(sample.key_expr), sample.payload.to_bytes()))
 
 
 @pytest.fixture
@@ -130,8 +130,8 @@ def test_a_runner_does_its_own_and_nothing_of_anothers(folder, world, endpoint, 
         assert replies(a, key) == []
     assert replies(a, KEYS.offer("a")) == replies(a, KEYS.join("a")) == [b"yes"]
     a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
-    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
-    assert world.heard.empty()
+    assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
+    assert world.received.empty()
     assert world.asked == [KEYS.offer("a"), KEYS.join("a")]
     assert world.alive == [KEYS.alive("a")]
     del tokens
@@ -148,7 +148,7 @@ def test_nobody_reads_anothers_frames_or_answers_or_poses_as_the_world(folder, w
         wait_for_listeners(world.session, KEYS.frame(name))
     wait_for_listeners(a, KEYS.answer("a"))
     a.put(KEYS.answer("a"), b"of a", congestion_control=BLOCK)
-    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"of a")
+    assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"of a")
     wait_for_listeners(b, KEYS.answer("b"))
     b.put(KEYS.frame("a"), b"forged", congestion_control=BLOCK)
     spied.clear()  # what it puts itself, it hears
@@ -172,7 +172,7 @@ def test_who_is_revoked_or_no_runner_has_a_link_and_nothing_else(folder, world, 
     a = runner(folder, "a", world.endpoint, opened)
     wait_for_listeners(a, KEYS.answer("a"))
     a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
-    assert world.heard.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
+    assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
     assert not world.asked
 
 

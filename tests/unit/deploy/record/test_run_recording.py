@@ -56,8 +56,8 @@ def test_fates_are_the_runs_own_tally(recorded):
     for name, values in drawn.items():
         fate = FATE_NAMES.index(name.replace(" ", "_"))
         assert sum(values.get(tick, 0.0) for tick in seconds) == sum(int(seen.tally.fates[0, fate]) for seen in ticks)
-    heard = sum(drawn["heard"][tick] for tick in seconds)
-    assert heard == result.radio.fates["heard"]
+    received = sum(drawn["received"][tick] for tick in seconds)
+    assert received == result.radio.fates["received"]
     listed = {name for name, count in result.radio.fates.items() if count and name not in ("in_flight", "out_of_range")}
     assert {name.replace(" ", "_") for name in drawn} == listed
 
@@ -66,7 +66,7 @@ def test_lines_of_lost_packets_are_those_that_the_radio_finished(recorded):
     rrd, _, ticks = recorded
     lines = column(rrd, "/world/lost_packets", "LineStrips2D:strips")
     for seen in ticks:
-        unheard = (seen.finished.fate != Fate.HEARD) & (seen.finished.receiver >= 0)
+        unheard = (seen.finished.fate != Fate.RECEIVED) & (seen.finished.receiver >= 0)
         assert len(lines.get(seen.tick, [])) == unheard.sum()
     assert any(lines.values())
 

@@ -102,7 +102,9 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
     figures.begin(of)
     assert np.isnan([figures.pdr, figures.pdr_of_second, figures.speed(1.0)]).all()
     for tick in range(40):
-        fates = {Fate.HEARD: 1, Fate.LOST: 3} if tick < 20 else {Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 5}
+        fates = (
+            {Fate.RECEIVED: 1, Fate.LOST: 3} if tick < 20 else {Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 5}
+        )
         moment = truth(of, tick, tally=tally(fates), edges=edges((0, 1), (1, 2)) if tick < 20 else edges())
         metrics.see(moment)
         clock.time_ns += (50 if tick < 20 else 200) * MS

@@ -49,11 +49,11 @@ def test_a_time_is_told_also_if_it_did_not_come(result):
 def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     radio = result.radio
     assert radio is not None
-    fates = dict.fromkeys(FATE_NAMES, 0) | {"heard": 60, "lost": 20, "out_of_range": 10}
+    fates = dict.fromkeys(FATE_NAMES, 0) | {"received": 60, "lost": 20, "out_of_range": 10}
     told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.75, fates=fates)
-    assert row(shown(result, radio=told), "radio").endswith("80 in range; 75.0% of these heard it")
+    assert row(shown(result, radio=told), "radio").endswith("80 in range; 75.0% of these received it")
     told = replace(told, fates=fates | {"blocked": 10})
-    assert row(shown(result, radio=told), "radio").endswith("80 in range and sight; 75.0% of these heard it")
+    assert row(shown(result, radio=told), "radio").endswith("80 in range and sight; 75.0% of these received it")
 
 
 def test_where_nobody_was_in_range_there_is_no_share(result):

@@ -30,18 +30,18 @@ def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
     one = {"on_air_at_ns": 70, "payload": b"told"}
     seen = table(
         {**one, "receiver": 2, "fate": "collided", "rssi_dbm": -80.0},
-        {**one, "receiver": 1, "fate": "heard", "rssi_dbm": -61.5},
+        {**one, "receiver": 1, "fate": "received", "rssi_dbm": -61.5},
         {"sequence": 1, "receiver": None, "fate": "channel_busy", "on_air_at_ns": 90},
     )
-    told = ("a-0 to all: Beacon, packet 0", "heard: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
+    told = ("a-0 to all: Beacon, packet 0", "received: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
     assert list(frames_on_air(seen, NAMES)) == [Frame(70, 0, None, 0, 4, b"told", -61.5, told)]
 
 
 def test_frames_are_in_the_order_of_time_and_addressed_ones_say_to_whom():
     seen = table(
         {"sequence": 7, "receiver": 1, "to": 1, "fate": "lost", "on_air_at_ns": 5},
-        {"sender": 2, "receiver": 0, "fate": "heard", "on_air_at_ns": 3},
-        {"sender": 1, "receiver": 0, "fate": "heard", "on_air_at_ns": 3},
+        {"sender": 2, "receiver": 0, "fate": "received", "on_air_at_ns": 3},
+        {"sender": 1, "receiver": 0, "fate": "received", "on_air_at_ns": 3},
     )
     found = list(frames_on_air(seen, NAMES))
     assert [(frame.on_air_at_ns, frame.sender, frame.to) for frame in found] == [(3, 1, None), (3, 2, None), (5, 0, 1)]

@@ -70,11 +70,11 @@ def delivery(frame):
     return film_of(run, 0, "run").metrics["delivery"]
 
 
-def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second():
+def test_delivery_is_what_was_received_of_what_was_in_range_within_the_last_second():
     ticks = 31
-    heard, in_range = np.full(ticks, 3), np.full(ticks, 4)
-    heard[:15], in_range[0] = 0, 0
-    counts = {"heard": pl.Series(heard), "in_range": pl.Series(in_range)}
+    received, in_range = np.full(ticks, 3), np.full(ticks, 4)
+    received[:15], in_range[0] = 0, 0
+    counts = {"received": pl.Series(received), "in_range": pl.Series(in_range)}
     frame = ticks_frame(film(ticks)).with_columns(**counts)
     found = delivery(frame)
     assert np.isnan(found[0])
@@ -83,7 +83,7 @@ def test_delivery_is_what_was_heard_of_what_was_in_range_within_the_last_second(
 
 def test_without_a_radio_there_is_no_delivery():
     none = pl.Series([None] * 31, dtype=pl.Int64)
-    frame = ticks_frame(film()).with_columns(heard=none, in_range=none)
+    frame = ticks_frame(film()).with_columns(received=none, in_range=none)
     assert np.isnan(delivery(frame)).all()
 
 

@@ -30,13 +30,13 @@ def tallied(of, *ticks, last=None):
 
 def test_fates_add_up_to_the_intended_receivers_with_what_was_in_flight():
     ticks = [
-        {"tally": tally({Fate.HEARD: 6, Fate.LOST: 2}, {Fate.OUT_OF_RANGE: 3})},
-        {"tally": tally({Fate.HEARD: 1, Fate.BLOCKED: 4}, {})},
+        {"tally": tally({Fate.RECEIVED: 6, Fate.LOST: 2}, {Fate.OUT_OF_RANGE: 3})},
+        {"tally": tally({Fate.RECEIVED: 1, Fate.BLOCKED: 4}, {})},
     ]
     first, second = tallied(static(arenas=2), *ticks, last=tally({Fate.IN_FLIGHT: 5}, {Fate.IN_FLIGHT: 1}, sent=0))
     assert first["fates"] == {
         **dict.fromkeys(FATE_NAMES, 0),
-        "heard": 7,
+        "received": 7,
         "lost": 2,
         "blocked": 4,
         "in_flight": 5,
@@ -46,8 +46,8 @@ def test_fates_add_up_to_the_intended_receivers_with_what_was_in_flight():
     assert first["sent"] == 2
 
 
-def test_the_delivery_ratio_is_heard_over_in_range_and_null_if_none_was():
-    ticks = [{"tally": tally({Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 3})}]
+def test_the_delivery_ratio_is_received_over_in_range_and_null_if_none_was():
+    ticks = [{"tally": tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 3})}]
     first, second = tallied(static(arenas=2), *ticks)
     assert first["pdr"] == 0.75
     assert second["pdr"] is None
@@ -59,7 +59,7 @@ def test_latency_on_air_ends_at_hearing_and_to_the_agent_at_the_tick_that_hands_
     assert found["latency_agent_s"] == {p: pytest.approx(0.06, rel=0.005) for p in ("p50", "p90", "p99")}
 
 
-def test_only_heard_packets_have_a_latency():
+def test_only_received_packets_have_a_latency():
     lost = finished([0], [50_000_000], fate=Fate.LOST)
     [found] = tallied(static(), {"tally": tally({Fate.LOST: 1}), "finished": lost})
     assert found["latency_air_s"] == {"p50": None, "p90": None, "p99": None}
@@ -73,7 +73,7 @@ def test_without_a_radio_the_summary_has_no_part_of_it():
 
 
 def test_the_summary_is_plain_json():
-    found = tallied(static(), {"tally": tally({Fate.HEARD: 2}), "finished": finished([0, 0], [5, 7])})
+    found = tallied(static(), {"tally": tally({Fate.RECEIVED: 2}), "finished": finished([0, 0], [5, 7])})
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
@@ -90,27 +90,27 @@ def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
     counts = RobotCounts(static(3, arenas=2))
     refused = links([2], [-1], 4, 0, fate=Fate.QUEUE_FULL, receivers=2, arena=1)
     counts.see(departed([2], intended=2, fate=Fate.QUEUE_FULL, arena=1), refused)
-    ended = links([0, 0], [1, 2], 7, 0, fate=[Fate.HEARD, Fate.LOST], arena=1)
+    ended = links([0, 0], [1, 2], 7, 0, fate=[Fate.RECEIVED, Fate.LOST], arena=1)
     counts.see(departed([0], intended=5, out_of_range=2, on_air_at_ns=10, off_air_at_ns=40, arena=1), ended)
     assert counts.packets.tolist() == [0, 0, 0, 1, 0, 1]
     assert counts.packets_on_air.tolist() == [0, 0, 0, 1, 0, 0]
     assert counts.on_air_ns.tolist() == [0, 0, 0, 30, 0, 0]
     assert counts.intended.tolist() == [0, 0, 0, 5, 0, 2]
-    assert counts.in_flight.tolist() == [0, 0, 0, 1, 0, 0]  # heard, lost, two out of range, and one to come
-    expected = {Fate.HEARD: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 2}
+    assert counts.in_flight.tolist() == [0, 0, 0, 1, 0, 0]  # received, lost, two out of range, and one to come
+    expected = {Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 2}
     assert counts.as_sender[3].tolist() == [expected.get(fate, 0) for fate in Fate]
     assert counts.as_sender[5, Fate.QUEUE_FULL] == 2
-    assert (counts.as_receiver[4, Fate.HEARD], counts.as_receiver[5, Fate.LOST]) == (1, 1)
+    assert (counts.as_receiver[4, Fate.RECEIVED], counts.as_receiver[5, Fate.LOST]) == (1, 1)
     assert counts.as_receiver.sum() == 2
-    assert counts.heard_bytes.tolist() == [0, 0, 0, 0, ended.size_bytes[0], 0]
+    assert counts.received_bytes.tolist() == [0, 0, 0, 0, ended.size_bytes[0], 0]
 
 
 def test_a_link_has_a_row_for_each_fate_that_occurred_on_it():
     counts = LinkCounts(static(3, arenas=2))
-    counts.see(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.HEARD, Fate.LOST, Fate.HEARD]))
+    counts.see(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED]))
     counts.see(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
     rows = np.column_stack(list(counts.columns().values())).tolist()
-    assert rows == [[0, 0, 1, Fate.LOST, 1], [0, 2, 1, Fate.HEARD, 2], [1, 2, 1, Fate.LOST, 1]]
+    assert rows == [[0, 0, 1, Fate.LOST, 1], [0, 2, 1, Fate.RECEIVED, 2], [1, 2, 1, Fate.LOST, 1]]
 
 
 @settings(max_examples=25)
@@ -127,14 +127,14 @@ def test_robots_have_what_counters_have(run):
             as_sender[arena, sender, fate] += receivers
             if receiver >= 0:
                 as_receiver[arena, receiver, fate] += 1
-                got[arena, receiver] += size if fate == Fate.HEARD else 0
+                got[arena, receiver] += size if fate == Fate.RECEIVED else 0
         for arena, sender, far in rows_of(one.departed, "arena", "sender", "out_of_range"):
             as_sender[arena, sender, Fate.OUT_OF_RANGE] += far
             packets[arena, sender] += 1
     robots = [divmod(row, of.robots) for row in range(of.arenas * of.robots)]
     assert counts.as_sender.tolist() == [[as_sender[*robot, fate] for fate in Fate] for robot in robots]
     assert counts.as_receiver.tolist() == [[as_receiver[*robot, fate] for fate in Fate] for robot in robots]
-    assert counts.heard_bytes.tolist() == [got[robot] for robot in robots]
+    assert counts.received_bytes.tolist() == [got[robot] for robot in robots]
     assert counts.packets.tolist() == [packets[robot] for robot in robots]
     assert (counts.in_flight >= 0).all()
     np.testing.assert_array_equal(counts.as_sender.reshape(of.arenas, of.robots, -1).sum(axis=1), tally)
@@ -176,9 +176,9 @@ def test_of_a_packet_longer_than_a_tick_the_rest_counts_in_those_that_follow():
     assert found.tolist() == pytest.approx([0.5, (1.0 + 0.5) / 2, 0.25, 0.0])
 
 
-def test_throughput_counts_payload_once_for_each_that_heard_it():
+def test_throughput_counts_payload_once_for_each_that_received_it():
     of = static(3, arenas=2)
-    told = links([0, 0, 1], [1, 2, 0], 0, 0, fate=[Fate.HEARD, Fate.HEARD, Fate.LOST])
+    told = links([0, 0, 1], [1, 2, 0], 0, 0, fate=[Fate.RECEIVED, Fate.RECEIVED, Fate.LOST])
     told = replace(told, size_bytes=np.array([12, 12, 50]))
     assert measured("throughput", of, truth(of, finished=told)) == [2 * 12 * 8 * 10.0, 0.0]
 
@@ -214,7 +214,7 @@ def test_airtime_and_throughput_are_sums_over_packets(run):
         for arena, sender, fate, on, off in rows_of(
             one.departed, "arena", "sender", "fate", "on_air_at_ns", "off_air_at_ns"
         ):
-            assert off >= on if fate == Fate.HEARD else off == on
+            assert off >= on if fate == Fate.RECEIVED else off == on
             owed_ns[arena, sender] += off - on
         share, bits = np.zeros(of.arenas), np.zeros(of.arenas)
         alive = one.alive.reshape(of.arenas, of.robots)
@@ -223,6 +223,6 @@ def test_airtime_and_throughput_are_sums_over_packets(run):
             owed_ns[arena, robot] -= counted_ns
             share[arena] += counted_ns / (TICK_MS * MS) / alive[arena].sum() if alive[arena, robot] else 0.0
         for arena, fate, size in rows_of(one.finished, "arena", "fate", "size_bytes"):
-            bits[arena] += 8 * size if fate == Fate.HEARD else 0
+            bits[arena] += 8 * size if fate == Fate.RECEIVED else 0
         assert metrics.latest["airtime"] == pytest.approx(share)
         assert metrics.latest["throughput"] == pytest.approx(bits * of.rate_hz)

@@ -56,7 +56,7 @@ def test_everybody_alive_is_meant_by_a_broadcast_however_far_away_and_only_one_b
     told = {"departed": departed([0], intended=2, out_of_range=1), "finished": ended}
     counts = seen_by(of, {"pose": pose, "alive": alive}, {"pose": line(9.0, 9.0, 9.0, 9.0), **told})
     assert counts.width_m == pytest.approx(0.1)
-    assert (bins(counts.intended), bins(counts.heard)) == ({5: 1, 15: 1}, {5: 1})
+    assert (bins(counts.intended), bins(counts.received)) == ({5: 1, 15: 1}, {5: 1})
     addressed = {"departed": departed([0], intended=1, to=2), "finished": links([], [], 0, 0)}
     assert bins(seen_by(of, {"pose": pose, **addressed}).intended) == {15: 1}
 
@@ -67,7 +67,7 @@ def test_a_packet_that_never_went_on_air_tells_nothing_of_distance():
     assert not seen_by(static(4), told).intended.any()
 
 
-def test_who_heard_so_late_that_the_distance_is_forgotten_is_counted_apart(monkeypatch):
+def test_who_received_so_late_that_the_distance_is_forgotten_is_counted_apart(monkeypatch):
     monkeypatch.setattr(distance_counts, "POSES_KEPT_S", 0.2)
     nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
     late = {**nothing, "finished": links([0], [1], 0, 0)}
@@ -83,7 +83,7 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
         patch.setattr(distance_counts, "PAIRS_PER_TICK", pairs_per_tick)
         counts = DistanceCounts(of)
     spread = int(distance_counts.SPREAD_SEQUENCE), int(distance_counts.SPREAD_SENDER)
-    intended, heard = Counter(), Counter()
+    intended, received = Counter(), Counter()
 
     def place(arena, a, b, on_air_at_ns):
         tick = max(one.tick for one in seen if one.time_ns <= on_air_at_ns)
@@ -102,15 +102,15 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
             alive = seen[tick].alive.reshape(of.arenas, of.robots)[arena]
             for robot in range(of.robots):
                 meant = alive[robot] if to == BROADCAST else robot == to
-                if meant and robot != sender and fate == Fate.HEARD and taken(sender, sequence):
+                if meant and robot != sender and fate == Fate.RECEIVED and taken(sender, sequence):
                     intended[place(arena, sender, robot, on_air)] += 1
         for arena, sender, receiver, sequence, fate, on_air in rows_of(
             one.finished, "arena", "sender", "receiver", "sequence", "fate", "on_air_at_ns"
         ):
-            if fate == Fate.HEARD and taken(sender, sequence):
-                heard[place(arena, sender, receiver, on_air)] += 1
+            if fate == Fate.RECEIVED and taken(sender, sequence):
+                received[place(arena, sender, receiver, on_air)] += 1
     last = counts.intended.shape[1] - 1  # beyond the arena's corners, where these robots may walk
-    for table, expected in ((counts.intended, intended), (counts.heard, heard)):
+    for table, expected in ((counts.intended, intended), (counts.received, received)):
         within = Counter()
         for (arena, b), packets in expected.items():
             within[arena, min(b, last)] += packets

@@ -46,8 +46,8 @@ def test_a_window_is_rounded_up_to_whole_ticks():
 def test_the_ratio_is_of_receivers_in_range_and_of_the_window_alone():
     of = static(arenas=2)
     counts = [
-        tally({Fate.HEARD: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
-        tally({Fate.HEARD: 1, Fate.COLLIDED: 3}, {}),
+        tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
+        tally({Fate.RECEIVED: 1, Fate.COLLIDED: 3}, {}),
         tally({}, {Fate.LOST: 4}),
         tally({}, {}),
     ]
@@ -77,17 +77,17 @@ def test_they_are_sums_over_the_packets_of_the_window(run, size, every):
     for tick in range(len(seen)):
         for arena in range(of.arenas):
             window = seen[max(0, tick + 1 - size) : tick + 1]
-            heard = sum(int(one.tally.fates[arena, Fate.HEARD]) for one in window)
+            received = sum(int(one.tally.fates[arena, Fate.RECEIVED]) for one in window)
             in_range = sum(int(one.tally.in_range[arena]) for one in window)
             air, agent = [], []
             for one in window:
                 acts_ns = next(tick for tick in range(one.tick, one.tick + every) if tick % every == 0) * 100 * MS
                 for its, sent, final, fate in rows_of(one.finished, "arena", "sent_at_ns", "final_at_ns", "fate"):
-                    if its == arena and fate == Fate.HEARD:
+                    if its == arena and fate == Fate.RECEIVED:
                         air.append((final - sent) / 1e9)
                         agent.append((acts_ns - sent) / 1e9)
             expected = [
-                heard / in_range if in_range else np.nan,
+                received / in_range if in_range else np.nan,
                 np.mean(air) if air else np.nan,
                 np.mean(agent) if agent else np.nan,
             ]
@@ -123,18 +123,18 @@ def ages(of, seen):
     return in_each_tick(of, seen, NAME)[:, 0]
 
 
-def links_heard(sender, receiver, sent_at_ms, fate=Fate.HEARD, arena=0):
+def links_received(sender, receiver, sent_at_ms, fate=Fate.RECEIVED, arena=0):
     return links(sender, receiver, 0, [at * MS for at in sent_at_ms], fate=fate, arena=arena)
 
 
 def test_age_is_the_mean_over_pairs_of_the_time_since_the_newest_was_sent():
     of = static(3, arenas=2)
-    nothing = links_heard([], [], [])
+    nothing = links_received([], [], [])
     told = [
         nothing,
-        links_heard([0, 0], [1, 2], [30, 40]),  # at 100 ms: ages of 70 and 60 ms
+        links_received([0, 0], [1, 2], [30, 40]),  # at 100 ms: ages of 70 and 60 ms
         nothing,
-        links_heard([0], [1], [210]),  # at 300 ms: 90 and 260 ms
+        links_received([0], [1], [210]),  # at 300 ms: 90 and 260 ms
     ]
     found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told)])
     assert found[:, 0].tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.065, 0.165, 0.175)]
@@ -142,9 +142,9 @@ def test_age_is_the_mean_over_pairs_of_the_time_since_the_newest_was_sent():
 
 
 def test_a_pair_that_went_out_of_reach_ages_on():
-    of, nothing = static(2), links_heard([], [], [])
+    of, nothing = static(2), links_received([], [], [])
     apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
-    seen = [truth(of, 1, finished=links_heard([0], [1], [50]))]
+    seen = [truth(of, 1, finished=links_received([0], [1], [50]))]
     seen += [truth(of, tick, finished=nothing, pose=apart) for tick in (2, 3)]
     assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.05, 0.15, 0.25)]
 
@@ -152,20 +152,20 @@ def test_a_pair_that_went_out_of_reach_ages_on():
 def test_what_was_overtaken_or_lost_changes_nothing_and_several_at_once_count_once():
     of = static(2)
     told = [
-        links_heard([0, 0, 0], [1, 1, 1], [40, 80, 50]),
-        links_heard([0, 0], [1, 1], [60, 150], fate=[Fate.HEARD, Fate.LOST]),
+        links_received([0, 0, 0], [1, 1, 1], [40, 80, 50]),
+        links_received([0, 0], [1, 1], [60, 150], fate=[Fate.RECEIVED, Fate.LOST]),
     ]
     found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told, 1)])
     assert found.ravel().tolist() == [pytest.approx(0.02), pytest.approx(0.12)]
 
 
 def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
-    of, nothing = static(3), links_heard([], [], [])
+    of, nothing = static(3), links_received([], [], [])
     dead = np.array([False, True, True])
     seen = [
-        truth(of, 1, finished=links_heard([0, 1], [1, 2], [10, 80])),  # ages of 90 and 20 ms
+        truth(of, 1, finished=links_received([0, 1], [1, 2], [10, 80])),  # ages of 90 and 20 ms
         truth(of, 2, finished=nothing, alive=dead),
-        truth(of, 3, finished=links_heard([0], [2], [250]), alive=dead),  # still on its way when its sender died
+        truth(of, 3, finished=links_received([0], [2], [250]), alive=dead),  # still on its way when its sender died
         truth(of, 4, finished=nothing),  # 390, 320 and 150 ms
     ]
     assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.055, 0.12, 0.22, 0.86 / 3)]
@@ -174,31 +174,31 @@ def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
 def test_of_many_robots_every_nth_counts_as_a_receiver(monkeypatch):
     monkeypatch.setattr(age_of_information, "MAX_PAIRS", 20)  # 6 x 6 / 20: every second
     of = static(6)
-    told = links_heard([0, 0, 0], [1, 2, 4], [90, 80, 60])
+    told = links_received([0, 0, 0], [1, 2, 4], [90, 80, 60])
     assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
 
 
 def test_a_run_so_long_that_times_add_up_beyond_64_bits_has_its_mean():
     of, long_ns = static(4), 10**18
     pairs = [(a, b) for a in range(4) for b in range(4) if a != b]
-    told = [links_heard(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
+    told = [links_received(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
     seen = [truth(of, tick, time_ns=(tick + 2) * long_ns, finished=one) for tick, one in enumerate(told)]
     assert ages(of, seen).ravel().tolist() == [pytest.approx(1e9), pytest.approx(2e9)]
     dead = np.array([False, True, True, True])
-    seen.append(truth(of, 2, time_ns=4 * long_ns, finished=links_heard([], [], []), alive=dead))
+    seen.append(truth(of, 2, time_ns=4 * long_ns, finished=links_received([], [], []), alive=dead))
     assert ages(of, seen)[2, 0] == pytest.approx(3e9)
 
 
 @settings(max_examples=25)
 @given(radio_runs())
-def test_age_is_that_of_a_dictionary_of_what_each_has_heard(run):
+def test_age_is_that_of_a_dictionary_of_what_each_has_received(run):
     of, seen = run
     newest, expected = {}, []
     for one in seen:
         for arena, sender, receiver, sent, fate in rows_of(
             one.finished, "arena", "sender", "receiver", "sent_at_ns", "fate"
         ):
-            if fate == Fate.HEARD:
+            if fate == Fate.RECEIVED:
                 pair = arena, sender, receiver
                 newest[pair] = max(newest.get(pair, sent), sent)
         alive = one.alive.reshape(of.arenas, of.robots)
@@ -222,7 +222,7 @@ def test_of_independent_losses_age_is_what_the_renewals_say(lost):
     for tick in range(1, 3 * periods):
         arrived = np.flatnonzero(rng.random(arenas) >= lost) if tick % 3 == 1 else np.arange(0)
         none = np.zeros(len(arrived), np.int64)
-        told = links_heard(none, none + 1, none + (tick - 1) * 100, arena=arrived)
+        told = links_received(none, none + 1, none + (tick - 1) * 100, arena=arrived)
         seen.append(truth(of, tick, finished=told))
     mean_s = np.mean(ages(of, seen)[100:])
     # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.

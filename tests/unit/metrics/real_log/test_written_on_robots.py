@@ -9,7 +9,7 @@ from swarmwire.agent.on_robot.assembly import robot_facts
 from swarmwire.agent.on_robot.log import TickRow, new_log
 from swarmwire.agent.on_robot.plan import Plan, SpeedLimits
 from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
-from swarmwire.agent.radios.radio import HeardPacket, SentPacket
+from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
@@ -54,14 +54,16 @@ def by_robots(folder):
         begin_s = told.steps.time_s[0]
         for at_s, sequence, size in zip(told.sent.time_s, told.sent.sequence, told.sent.size_bytes, strict=True):
             log.sent(SentPacket(UTC_NS + to_ns(at_s - begin_s), int(sequence), BROADCAST, int(size), 7, "sent"))
-        heard = told.heard
-        for row in range(len(heard.sequence)):
-            at_ns = UTC_NS + to_ns(heard.time_s[row] - begin_s)
-            sender, latency_ns = static.robot_names.index(heard.sender[row]), to_ns(heard.latency_s[row])
-            log.heard(
-                HeardPacket(at_ns, sender, int(heard.sequence[row]), BROADCAST, 14, 7, latency_ns, None, given=True)
+        received = told.received
+        for row in range(len(received.sequence)):
+            at_ns = UTC_NS + to_ns(received.time_s[row] - begin_s)
+            sender, latency_ns = static.robot_names.index(received.sender[row]), to_ns(received.latency_s[row])
+            log.received(
+                ReceivedPacket(
+                    at_ns, sender, int(received.sequence[row]), BROADCAST, 14, 7, latency_ns, None, given=True
+                )
             )
-            if row == len(heard.sequence) // 2:
+            if row == len(received.sequence) // 2:
                 log.flush()
         log.end({"ended": "stopped", "ticks": len(flock().truths)})
     return folder
@@ -76,8 +78,8 @@ def test_what_robots_write_is_read_back(folders):
     assert steps.state[0] == 'say "a, b"'
     assert steps.value[0] == 1.5
     np.testing.assert_allclose(steps.pose[:, 0], [truth.pose[2, 0] for truth in flock().truths])
-    assert np.isnan(logs.robots[2].heard.distance_m).all()
-    assert set(logs.robots[2].heard.to.tolist()) == {""}
+    assert np.isnan(logs.robots[2].received.distance_m).all()
+    assert set(logs.robots[2].received.to.tolist()) == {""}
     assert logs.robots[0].about.agent_sha256 != ""
     assert logs.robots[0].ended == "stopped"
 

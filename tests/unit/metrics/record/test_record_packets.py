@@ -27,16 +27,16 @@ def packets(folder):
 
 def test_a_row_holds_all_that_is_known_of_a_link(tmp_path):
     of = static(4)
-    heard = links([0, 2], [1, 3], [7, 8], TICK_NS, to=[-1, 3], rssi_dbm=np.array([-61.5, np.nan]))
+    received = links([0, 2], [1, 3], [7, 8], TICK_NS, to=[-1, 3], rssi_dbm=np.array([-61.5, np.nan]))
     never = links(3, -1, 9, TICK_NS, fate=Fate.QUEUE_FULL, receivers=3, tag=0x0001)
-    seen = [truth(of, 0), truth(of, 1), truth(of, 2, finished=heard), truth(of, 3, finished=never)]
+    seen = [truth(of, 0), truth(of, 1), truth(of, 2, finished=received), truth(of, 3, finished=never)]
     recorded = record(tmp_path, of, seen, packets=1.0, topics={1: "Beacon"})
     assert recorded["packets"] == {"rows": 3, "dropped": 0, "share": 1.0}
     table = packets(tmp_path).drop("distance_m")
     times = (TICK_NS - 1, TICK_NS, TICK_NS + 1000)
     assert table.rows() == [
-        (0, 0, 1, 1, None, 7, *times, "heard", -61.5, 10, "0x1a2b", None),
-        (0, 2, 3, 1, 3, 8, *times, "heard", None, 10, "0x1a2b", None),
+        (0, 0, 1, 1, None, 7, *times, "received", -61.5, 10, "0x1a2b", None),
+        (0, 2, 3, 1, 3, 8, *times, "received", None, 10, "0x1a2b", None),
         (0, 3, None, 3, None, 9, *times, "queue_full", None, 10, "Beacon", None),
     ]
 

@@ -73,9 +73,9 @@ def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
 
 def test_the_radios_counts_are_those_of_the_tick_and_null_without_a_radio(tmp_path):
     of = static(3, arenas=2)
-    counted = tally({Fate.HEARD: 2, Fate.LOST: 1, Fate.OUT_OF_RANGE: 4}, {Fate.HEARD: 3}, sent=7)
+    counted = tally({Fate.RECEIVED: 2, Fate.LOST: 1, Fate.OUT_OF_RANGE: 4}, {Fate.RECEIVED: 3}, sent=7)
     record(tmp_path, of, [truth(of, 0), truth(of, 1, tally=counted)])
-    table = pl.read_parquet(tmp_path / "ticks.parquet").select("sent", "heard", "in_range")
+    table = pl.read_parquet(tmp_path / "ticks.parquet").select("sent", "received", "in_range")
     assert table.rows() == [(None,) * 3, (None,) * 3, (7, 2, 3), (7, 3, 3)]
 
 
@@ -98,9 +98,9 @@ def test_a_slow_run_writes_a_part_every_two_seconds(tmp_path):
 
 
 def test_a_metric_named_like_a_column_is_refused(tmp_path):
-    class Heard(Order):
-        name = "heard"
+    class ReceivedPackets(Order):
+        name = "received"
 
-    metrics = Metrics([Heard()])
-    with pytest.raises(BadInput, check=lambda error: error.key == "metrics.heard"):
+    metrics = Metrics([ReceivedPackets()])
+    with pytest.raises(BadInput, check=lambda error: error.key == "metrics.received"):
         TickRecorder(tmp_path, metrics, StillClock()).begin(static(2))

@@ -45,14 +45,14 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
     for arena, radio in enumerate(folder.summary["radio"]):
         robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
         assert robots["robot"].to_list() == list(OF.robot_names)
-        for name in ("heard", "blocked", "lost"):
+        for name in ("received", "blocked", "lost"):
             assert robots[f"as_sender_{name}"].sum() == robots[f"as_receiver_{name}"].sum() == radio["fates"][name]
             assert reached.filter(pl.col("fate") == name)["packets"].sum() == radio["fates"][name]
         assert robots["as_sender_out_of_range"].sum() == radio["fates"]["out_of_range"]
         as_sender = robots.select(pl.sum_horizontal(f"as_sender_{fate.name.lower()}" for fate in Fate)).to_series()
         assert as_sender.to_list() == robots["intended"].to_list()
-        assert folder.radio_distances(arena)["heard"].sum() == radio["fates"]["heard"]
-        np.testing.assert_allclose(robots["throughput_bps"], robots["heard_bytes"] * 8 / 2.0)
+        assert folder.radio_distances(arena)["received"].sum() == radio["fates"]["received"]
+        np.testing.assert_allclose(robots["throughput_bps"], robots["received_bytes"] * 8 / 2.0)
         np.testing.assert_allclose(robots["airtime"], robots["airtime_s"] / 2.0)
     assert (len(folder.radio_robots()), folder.radio_robots()["packets_on_air"].min() > 0) == (10, True)
 
@@ -62,7 +62,7 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
     [
         ("radio_robots", ["as_sender_lost", "as_receiver_lost"]),
         ("radio_links", ["packets"]),
-        ("radio_distances", ["heard", "intended"]),
+        ("radio_distances", ["received", "intended"]),
     ],
 )
 def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
@@ -76,11 +76,11 @@ def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, co
 @pytest.mark.parametrize(
     ("table", "change", "state", "text"),
     [
-        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr .*heard / intended"),
+        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr .*received / intended"),
         ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr .*String.*Float64"),
         ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m .*null"),
         ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\)"),
-        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_heard"), State.DIFFERS, "0 heard"),
+        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_received"), State.DIFFERS, "0 received"),
         ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets .*10 rows"),
         ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender .*4"),
         ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena .*1"),
@@ -102,12 +102,12 @@ def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
     assert states(folder)["radio_links"] == State.DAMAGED
 
 
-def test_the_ratio_is_heard_over_intended_in_bins_side_by_side(folder):
+def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):
     table = folder.radio_distances(1)
     assert table["from_m"][0] == 0.0
     np.testing.assert_allclose(table["from_m"][1:], table["to_m"][:-1])
     some = table.filter(pl.col("intended") > 0)
-    np.testing.assert_allclose(some["pdr"], some["heard"] / some["intended"])
+    np.testing.assert_allclose(some["pdr"], some["received"] / some["intended"])
     assert table.filter(pl.col("intended") == 0)["pdr"].null_count() == len(table) - len(some) > 0
 
 

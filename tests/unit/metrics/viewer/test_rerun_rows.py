@@ -6,7 +6,7 @@ import pytest
 from swarmwire.metrics.viewer.rows import ROW_BYTES, RerunRows
 
 
-class Sent:
+class SentPackets:
     """A recording that notes what it is sent."""
 
     def __init__(self):
@@ -41,7 +41,7 @@ def refused(values):
     ],
 )
 def test_what_waits_is_counted_in_all_fields_whatever_holds_them(fields, least, most):
-    rows = RerunRows(Sent())
+    rows = RerunRows(SentPackets())
     for tick in range(3):
         rows.begin_tick(tick, tick)
         rows.add("entity", Columns, **fields)
@@ -50,7 +50,7 @@ def test_what_waits_is_counted_in_all_fields_whatever_holds_them(fields, least, 
 
 def test_an_entity_that_fails_takes_no_other_with_it_and_is_told():
     pytest.importorskip("rerun", reason="needs the extra [view]")
-    rec = Sent()
+    rec = SentPackets()
     rows = RerunRows(rec)
     for tick in range(2):
         rows.begin_tick(tick, tick)

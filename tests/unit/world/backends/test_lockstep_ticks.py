@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.packets import Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep
-from tests.support.agent.hosts import GIVES, heard_from, plain, senses
+from tests.support.agent.hosts import GIVES, plain, received_from, senses
 from tests.support.world.locksteps import (
     FLOCK,
     GROUPS,
@@ -31,7 +31,7 @@ from tests.support.world.locksteps import (
 def test_a_tick_is_complete_once_all_have_answered() -> None:
     lockstep = playing()
     for tick in range(3):
-        out = dict(lockstep.open_tick(tick, all_senses(tick), Heard.none(GIVES)))
+        out = dict(lockstep.open_tick(tick, all_senses(tick), ReceivedPackets.none(GIVES)))
         assert list(out) == ["a", "b"]
         assert {frames.decode(data).tick for data in out.values()} == {tick}
         for name in ("a", "b"):
@@ -47,7 +47,7 @@ def test_answers_in_any_order_give_the_same() -> None:
     taken: list[Any] = []
     for order in (["a", "b"], ["b", "a"]):
         lockstep = playing()
-        out = dict(lockstep.open_tick(0, all_senses(), Heard.none(GIVES)))
+        out = dict(lockstep.open_tick(0, all_senses(), ReceivedPackets.none(GIVES)))
         for name in order:
             lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
         got = lockstep.take()
@@ -77,7 +77,7 @@ def test_answers_in_any_order_give_the_same() -> None:
 )
 def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
     lockstep = playing()
-    lockstep.open_tick(4, all_senses(), Heard.none(GIVES))
+    lockstep.open_tick(4, all_senses(), ReceivedPackets.none(GIVES))
     lockstep.answer("b", sound("b"))
     before = state(lockstep)
     lockstep.answer(runner, data)
@@ -89,7 +89,7 @@ def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, d
 
 def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
     lockstep, generator, data = playing(), np.random.default_rng(3), sound()
-    lockstep.open_tick(4, all_senses(), Heard.none(GIVES))
+    lockstep.open_tick(4, all_senses(), ReceivedPackets.none(GIVES))
     before = state(lockstep)
     for _ in range(1000):
         spoiled = bytearray(data)
@@ -103,7 +103,7 @@ def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
 def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
     lockstep = playing()
     some = {"flock": senses(0, [1, 4]), "lone": senses(0, [7])}
-    out = dict(lockstep.open_tick(0, some, Heard.none(GIVES)))
+    out = dict(lockstep.open_tick(0, some, ReceivedPackets.none(GIVES)))
     assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
     lockstep.answer("b", encode_actions(0, actions([4, 7])))
     lockstep.answer("a", encode_actions(0, actions([1])))
@@ -113,7 +113,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
 
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
     lockstep = playing()
-    out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, Heard.none(GIVES)))
+    out = dict(lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, ReceivedPackets.none(GIVES)))
     found, *_ = decode_tick(frames.decode(out["a"]), GIVES, GROUPS)
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
@@ -126,7 +126,7 @@ def test_each_runner_gets_the_outcomes_of_its_own_robots_in_their_order():
     ready(joined(lockstep, "a", "b", "c"), "a", "b", "c")
     told = Outcomes(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
     got: dict[str, list[list[int]]] = {}
-    for name, frame in lockstep.open_tick(0, all_senses(), Heard.none(GIVES), told):
+    for name, frame in lockstep.open_tick(0, all_senses(), ReceivedPackets.none(GIVES), told):
         _, _, its = decode_tick(frames.decode(frame), GIVES, GROUPS)
         got[name] = [its.row.tolist(), its.id.tolist(), its.result.tolist()]
     assert got == {"a": [[1, 1, 3], [2, 3, 1], [1, 2, 4]], "b": [[0, 2], [9, 0], [0, 3]], "c": [[], [], []]}
@@ -134,7 +134,7 @@ def test_each_runner_gets_the_outcomes_of_its_own_robots_in_their_order():
 
 def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for() -> None:
     lockstep = ready(joined(Lockstep(parts({0: 0, 1: 0, 4: 0, 5: 0, 2: 1, 6: 1, 3: 1, 7: 1})), "a", "b"), "a", "b")
-    frames_out = lockstep.open_tick(0, {"flock": senses(0, FLOCK)}, Heard.none(GIVES))
+    frames_out = lockstep.open_tick(0, {"flock": senses(0, FLOCK)}, ReceivedPackets.none(GIVES))
     assert [runner for runner, _ in frames_out] == ["a"]
     assert lockstep.waiting == 1
     lockstep.answer("b", encode_actions(0, actions([])))
@@ -142,7 +142,7 @@ def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for(
     lockstep.answer("a", encode_actions(0, actions(FLOCK)))
     assert lockstep.waiting == 0
     assert sorted(lockstep.take().rows.tolist()) == FLOCK
-    assert lockstep.open_tick(1, {}, Heard.none(GIVES)) == []
+    assert lockstep.open_tick(1, {}, ReceivedPackets.none(GIVES)) == []
     assert lockstep.waiting == 0
     assert len(lockstep.take().rows) == 0
 
@@ -160,12 +160,12 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     acting_groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
     whole = {name: senses(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
     senders = data.draw(st.lists(st.integers(0, 7), max_size=6))
-    sent = Sent(
+    sent = SentPackets(
         np.array(senders, np.int64), np.full(len(senders), -1), Payloads.of([bytes([s] * (s + 1)) for s in senders])
     )
-    heard = heard_from(sent, data.draw(st.lists(st.integers(0, 7), unique=True).map(sorted)))
+    received = received_from(sent, data.draw(st.lists(st.integers(0, 7), unique=True).map(sorted)))
 
-    out = lockstep.open_tick(2, whole, heard)
+    out = lockstep.open_tick(2, whole, received)
     assert [name for name, _ in out] == names
     seen: dict[int, Any] = {}
     packets: list[Any] = []
@@ -187,7 +187,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
         packets += listed(got)
         answers.append((name, encode_actions(2, actions(rows))))
     assert packets == sorted(packets, key=lambda p: owners[p[0]])
-    assert sorted(packets) == sorted(listed(heard))
+    assert sorted(packets) == sorted(listed(received))
     expected = {
         row: (name, [part.fields[f][at].tolist() for f in part.fields])
         for name, part in whole.items()
@@ -201,7 +201,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     assert plain(lockstep.take()) == plain(actions(sorted(expected)))
 
 
-def listed(heard: Heard) -> list[Any]:
-    columns = [heard.receiver, heard.sender, heard.sequence, heard.heard_at_ns, *heard.given.values()]
-    payloads = [heard.payloads.row(int(p)) for p in heard.payload]
+def listed(received: ReceivedPackets) -> list[Any]:
+    columns = [received.receiver, received.sender, received.sequence, received.received_at_ns, *received.given.values()]
+    payloads = [received.payloads.row(int(p)) for p in received.payload]
     return list(zip(*(column.tolist() for column in columns), payloads, strict=True))

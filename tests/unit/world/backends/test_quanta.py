@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.interfaces import Put
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.subtick import Quanta
@@ -16,19 +16,19 @@ from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 
-PACKET = Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"\0\0"]))
+PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"\0\0"]))
 
 
-def heard(at_ns: int, payload: bytes = b"\0\0") -> Heard:
+def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
     """One packet of robot 0 to robot 1."""
     given = {name: np.zeros(1) for name in GIVES}
     one = np.zeros(1, np.int64)
-    return Heard(one + 1, one, one, one + at_ns, given, one, Payloads.of([payload]))
+    return ReceivedPackets(one + 1, one, one, one + at_ns, given, one, Payloads.of([payload]))
 
 
 @dataclass
 class Air:
-    """An air that notes what is asked of it, and lets packets be heard at set times."""
+    """An air that notes what is asked of it, and lets packets be received at set times."""
 
     due_ns: list[int] = field(default_factory=list[int])
     payload: bytes = b"\0\0"
@@ -39,11 +39,11 @@ class Air:
         assert put.at_ns >= (self.times_ns or [0])[-1]
         self.puts.append(put)
 
-    def advance(self, until_ns: int) -> tuple[Heard, Outcomes]:
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
         self.times_ns.append(until_ns)
         if self.due_ns and self.due_ns[0] <= until_ns:
-            return heard(self.due_ns.pop(0), self.payload), NO_OUTCOMES
-        return Heard.none(GIVES), NO_OUTCOMES
+            return received(self.due_ns.pop(0), self.payload), NO_OUTCOMES
+        return ReceivedPackets.none(GIVES), NO_OUTCOMES
 
 
 @dataclass
@@ -60,9 +60,9 @@ class Exchange:
         self.sends_ns = [at_ns for at_ns in self.sends_ns if at_ns > self.clock.time_ns]
         return [Put(at_ns, None, PACKET) for at_ns in came]
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         self.clock.time_ns += self.work_ns
-        self.handed.append((tick, at_ns, int(heard.heard_at_ns[0])))
+        self.handed.append((tick, at_ns, int(received.received_at_ns[0])))
 
 
 def quanta_of(clock: FakeClock, factor: float = 1.0, quantum_s: float = 0.010) -> tuple[Pace, Quanta]:
@@ -149,7 +149,7 @@ def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out
     backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, quanta)
     backend.start()
     air = Air(due_ns=[25 * MS], payload=Word(number=1.0).encode())
-    backend.act_in_time(0, one_group(0, [0, 1]), Heard.none(GIVES), NO_OUTCOMES, air)
+    backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(GIVES), NO_OUTCOMES, air)
     of_step, echo = air.puts
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
     assert (echo.at_ns, echo.tick, echo.sent.sender.tolist()) == (30 * MS, None, [1])
@@ -157,5 +157,5 @@ def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out
     assert told.quantum_s == 0.010
     assert told.delivery is not None
     assert told.delivery.count == 1
-    assert backend.act(1, one_group(1, [0, 1]), Heard.none(GIVES)).sent.sender.tolist() == [0, 1]
+    assert backend.act(1, one_group(1, [0, 1]), ReceivedPackets.none(GIVES)).sent.sender.tolist() == [0, 1]
     backend.close()

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, LedChanges, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
@@ -15,7 +15,7 @@ from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, enc
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss, RunnerHealth
-from tests.support.agent.hosts import GIVES, assignment, group, heard_from, one_group
+from tests.support.agent.hosts import GIVES, assignment, group, one_group, received_from
 from tests.support.clocks import FakeClock
 
 ROWS = [0, 1, 2, 3]
@@ -35,15 +35,17 @@ def playing(on_loss: OnLoss = "stop", timeout_s: float = 30.0) -> RealTime:
     return runners
 
 
-def opened(runners: RealTime, tick: int, heard: Heard | None = None, rows: list[int] = ROWS) -> list[str]:
-    out = runners.open_tick(tick, tick * TICK_NS, one_group(tick, rows), Heard.none(GIVES) if heard is None else heard)
+def opened(runners: RealTime, tick: int, received: ReceivedPackets | None = None, rows: list[int] = ROWS) -> list[str]:
+    out = runners.open_tick(
+        tick, tick * TICK_NS, one_group(tick, rows), ReceivedPackets.none(GIVES) if received is None else received
+    )
     return [name for name, _ in out]
 
 
 def said(runner: str, tick: int, speed: float, drive: bool = True) -> bytes:
     """An answer that commands `speed` and sends a packet from each robot that tells the tick."""
     rows = np.array(OWN[runner], np.int64)
-    sent = Sent(rows, np.full(len(rows), BROADCAST), Payloads.of([bytes([0, 0, tick])] * len(rows)))
+    sent = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.of([bytes([0, 0, tick])] * len(rows)))
     n = len(rows)
     return encode_actions(
         tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), np.zeros(n), sent)
@@ -166,12 +168,12 @@ def test_what_is_malformed_changes_nothing(data: bytes) -> None:
     assert runners.counts() == {"malformed_frames": 1}
 
 
-def test_frames_that_were_passed_over_are_dropped_with_what_was_heard_in_them() -> None:
+def test_frames_that_were_passed_over_are_dropped_with_what_was_received_in_them() -> None:
     runners = playing()
-    sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"xyz"]))
-    opened(runners, 0, heard_from(sent, [0, 2, 3]))  # two packets to a, one to b
-    opened(runners, 1, heard_from(sent, [0]))
-    opened(runners, 2, heard_from(sent, [2]))
+    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"xyz"]))
+    opened(runners, 0, received_from(sent, [0, 2, 3]))  # two packets to a, one to b
+    opened(runners, 1, received_from(sent, [0]))
+    opened(runners, 2, received_from(sent, [2]))
     runners.answer("a", said("a", 2, 1.0))
     assert (runners.frames_dropped, runners.packets_dropped) == (2, 3)
     assert not runners.late.any()
@@ -183,7 +185,7 @@ def test_outcomes_in_frames_that_were_passed_over_are_counted() -> None:
     runners = playing()
     told = Outcomes(np.array([0, 0, 2]), np.array([0, 1, 0]), np.array([0, 1, 0]))
     for tick in range(2):
-        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), Heard.none(GIVES), told)
+        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), ReceivedPackets.none(GIVES), told)
     assert runners.outcomes_dropped == 0
     owned = sum(row in OWN["a"] for row in told.row.tolist())
     runners.answer("a", said("a", 1, 1.0))
@@ -294,19 +296,19 @@ def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it
     clock, pause_ns = FakeClock(), 3600 * NS_PER_S
     pace = Pace(clock, 10, 1.0, lambda _: None)
     runners = playing("dead", timeout_s=1.0)
-    runners.open_tick(0, pace.begin(), one_group(0, ROWS), Heard.none(GIVES))
+    runners.open_tick(0, pace.begin(), one_group(0, ROWS), ReceivedPackets.none(GIVES))
     pace.hold(0)
     assert taken(runners) == ({}, [])
     clock.time_ns += pause_ns
     pace.begin_anew(1, 1.0, pause_ns)
-    runners.open_tick(1, pace.begin(), one_group(1, ROWS), Heard.none(GIVES))
+    runners.open_tick(1, pace.begin(), one_group(1, ROWS), ReceivedPackets.none(GIVES))
     assert not runners.losses
     for name in OWN:
         runners.answer(name, said(name, 0, 1.0))
     assert taken(runners) == (dict.fromkeys(ROWS, 1.0), [0] * 4)
     assert not runners.watchdog_stops.any()
     clock.time_ns += 2 * NS_PER_S  # not a pause: a loop that lags
-    runners.open_tick(2, pace.begin(), one_group(2, ROWS), Heard.none(GIVES))
+    runners.open_tick(2, pace.begin(), one_group(2, ROWS), ReceivedPackets.none(GIVES))
     assert [loss.reason for loss in runners.losses] == ["no answer for 1 s"] * 2
 
 
@@ -318,28 +320,28 @@ def in_quanta() -> RealTime:
     return runners
 
 
-def word(*senders: int) -> Sent:
-    return Sent(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of([bytes(3)] * len(senders)))
+def word(*senders: int) -> SentPackets:
+    return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of([bytes(3)] * len(senders)))
 
 
-def test_in_quanta_each_ready_runner_gets_what_its_robots_heard_and_numbers_tell_what_it_missed() -> None:
+def test_in_quanta_each_ready_runner_gets_what_its_robots_received_and_numbers_tell_what_it_missed() -> None:
     runners = in_quanta()
     opened(runners, 0)
     told = Outcomes(np.array([3]), np.array([0]), np.array([1]))
     for number in range(2):
-        out = dict(runners.hand_over(0, 5_000_000, heard_from(word(1), [0, 2]), told))
+        out = dict(runners.hand_over(0, 5_000_000, received_from(word(1), [0, 2]), told))
         assert list(out) == ["a", "b"]
-        at_ns, got, heard, outcomes = decode_packets(frames.decode(out["a"]), GIVES)
-        assert (at_ns, got, heard.receiver.tolist(), len(outcomes)) == (5_000_000, number, [0, 2], 0)
+        at_ns, got, received, outcomes = decode_packets(frames.decode(out["a"]), GIVES)
+        assert (at_ns, got, received.receiver.tolist(), len(outcomes)) == (5_000_000, number, [0, 2], 0)
         _, _, nothing, outcomes = decode_packets(frames.decode(out["b"]), GIVES)
         assert (len(nothing), outcomes.row.tolist()) == (0, [3])
-    assert runners.hand_over(0, 6_000_000, Heard.none(GIVES), Outcomes(*np.empty((3, 0), np.int64))) == []
+    assert runners.hand_over(0, 6_000_000, ReceivedPackets.none(GIVES), Outcomes(*np.empty((3, 0), np.int64))) == []
 
 
 def test_in_quanta_packets_of_robots_without_a_runner_are_counted_as_dropped() -> None:
     runners = RealTime([assignment(group("unused:A", own)) for own in OWN.values()], 0.5, 30.0, "wait", quantum=True)
     join(runners, "a")
-    assert [name for name, _ in runners.hand_over(0, 0, heard_from(word(0), [1, 2, 3]), NO_OUTCOMES)] == ["a"]
+    assert [name for name, _ in runners.hand_over(0, 0, received_from(word(0), [1, 2, 3]), NO_OUTCOMES)] == ["a"]
     assert runners.packets_dropped == 2
 
 
@@ -376,6 +378,6 @@ def test_numbers_of_frames_begin_anew_with_a_new_runner() -> None:
     for _ in range(2):
         join(runners, "a")
         opened(runners, 0)
-        (_, data), *_ = runners.hand_over(0, 0, heard_from(word(1), [0]), NO_OUTCOMES)
+        (_, data), *_ = runners.hand_over(0, 0, received_from(word(1), [0]), NO_OUTCOMES)
         assert decode_packets(frames.decode(data), GIVES)[1] == 0
         runners.gone("a", "its link is gone")

@@ -22,13 +22,13 @@ def session(tmp_path) -> Generator[zenoh.Session]:
 
 def filled(session: zenoh.Session, limits: Limits, *puts: tuple[str, bytes]) -> RunnerInbox:
     """An inbox that was told all of this, in this order."""
-    inbox, heard = RunnerInbox(limits), list[zenoh.Sample]()
-    subscriber = session.declare_subscriber("answer/*", heard.append)
+    inbox, received = RunnerInbox(limits), list[zenoh.Sample]()
+    subscriber = session.declare_subscriber("answer/*", received.append)
     for runner, payload in puts:
         session.put(f"answer/{runner}", payload, congestion_control=zenoh.CongestionControl.BLOCK)
-    until(lambda: len(heard) == len(puts))
+    until(lambda: len(received) == len(puts))
     subscriber.undeclare()
-    for sample in heard:
+    for sample in received:
         inbox.put(sample)
     return inbox
 

@@ -6,7 +6,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Heard
+from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
@@ -15,7 +15,7 @@ from swarmwire.world.backends.join_policy import Terms
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
-from tests.support.agent.hosts import GIVES, heard_from
+from tests.support.agent.hosts import GIVES, received_from
 from tests.support.world.locksteps import (
     FLOCK,
     GROUPS,
@@ -51,8 +51,8 @@ def comes(roster: Lockstep | RealTime, runner: str, *names: str) -> Memory:
     return decode_memory(frames.decode(given["memory"]), KEPT)
 
 
-def opened(lockstep: Lockstep, tick: int, heard: Heard | None = None) -> dict[str, list[int]]:
-    out = lockstep.open_tick(tick, all_senses(tick), Heard.none(GIVES) if heard is None else heard)
+def opened(lockstep: Lockstep, tick: int, received: ReceivedPackets | None = None) -> dict[str, list[int]]:
+    out = lockstep.open_tick(tick, all_senses(tick), ReceivedPackets.none(GIVES) if received is None else received)
     return {name: rows_of(data) for name, data in out}
 
 
@@ -115,8 +115,8 @@ def test_who_is_lost_within_a_tick_does_not_act_in_it(on_loss: Any, answered: bo
 def test_what_robots_without_an_agent_hear_is_counted() -> None:
     roster = lockstep("stand")
     comes(roster, "a", "flock-0", "flock-1", "scouts-2")
-    heard = heard_from(actions([0]).sent, [1, 4, 5])
-    opened(roster, 0, heard)
+    received = received_from(actions([0]).sent, [1, 4, 5])
+    opened(roster, 0, received)
     assert roster.counts() == {"packets_without_agent": 2}
 
 
@@ -125,11 +125,11 @@ def test_what_robots_hear_while_their_next_runner_is_waited_for_is_not_lost() ->
     opened(roster, 0)
     roster.answer("a", encode_actions(0, actions([*FLOCK, *SCOUTS, 3, 7])))
     roster.gone("a", "its link is gone")
-    assert opened(roster, 1, heard_from(actions([0]).sent, [1, 4, 5])) == {}
+    assert opened(roster, 1, received_from(actions([0]).sent, [1, 4, 5])) == {}
     joined(roster, "b")
     [(_, frame)] = roster.answer("b", frames.encode("ready", -1, {}))
-    _, heard, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
-    assert heard.receiver.tolist() == [1, 4, 5]
+    _, received, _ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    assert received.receiver.tolist() == [1, 4, 5]
     assert "packets_without_agent" not in roster.counts()
 
 
@@ -212,22 +212,24 @@ def commands(roster: RealTime) -> dict[int, float]:
 def test_in_real_time_too_and_no_watchdog_counts_robots_that_nobody_asks(on_loss: Any) -> None:
     roster = real_time(on_loss)
     for tick in range(3):
-        roster.open_tick(tick, tick * TICK_NS, all_senses(tick), Heard.none(GIVES))
+        roster.open_tick(tick, tick * TICK_NS, all_senses(tick), ReceivedPackets.none(GIVES))
         assert commands(roster) == {}
     comes(roster, "a", "flock-1", "flock-5")
-    [(name, frame)] = roster.open_tick(3, 3 * TICK_NS, all_senses(3), Heard.none(GIVES))
+    [(name, frame)] = roster.open_tick(3, 3 * TICK_NS, all_senses(3), ReceivedPackets.none(GIVES))
     assert (name, rows_of(frame)) == ("a", [1, 5])
     rows = np.array([1, 5])
     moving = Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2))
     kept = {"flock": GroupMemory(rows, {"x": np.array([7, 8])})}
     roster.answer("a", encode_actions(3, moving, memory=kept))
     assert commands(roster) == {1: 0.5, 5: 0.5}
-    roster.open_tick(4, 4 * TICK_NS, all_senses(4), Heard.none(GIVES))
+    roster.open_tick(4, 4 * TICK_NS, all_senses(4), ReceivedPackets.none(GIVES))
     roster.answer("a", LEAVE)
     assert commands(roster) == ({1: 0.0, 5: 0.0} if on_loss == "stand" else {})
     for tick in range(5, 20):
-        assert roster.open_tick(tick, tick * TICK_NS, all_senses(tick), Heard.none(GIVES)) == []
+        assert roster.open_tick(tick, tick * TICK_NS, all_senses(tick), ReceivedPackets.none(GIVES)) == []
         assert commands(roster) == {}
     assert not roster.watchdog_stops.any()
     assert comes(roster, "b", "flock-5")["flock"].columns["x"].tolist() == [8]
-    assert [name for name, _ in roster.open_tick(20, 20 * TICK_NS, all_senses(20), Heard.none(GIVES))] == ["b"]
+    assert [name for name, _ in roster.open_tick(20, 20 * TICK_NS, all_senses(20), ReceivedPackets.none(GIVES))] == [
+        "b"
+    ]

@@ -7,13 +7,13 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Heard, Outcomes, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
 from swarmwire.world.subtick import Quanta
-from tests.support.agent.hosts import GIVES, heard_from
+from tests.support.agent.hosts import GIVES, received_from
 from tests.support.clocks import FakeClock
 from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions
 
@@ -29,17 +29,17 @@ class Inner:
     def start(self) -> None:
         self.given.append("started")
 
-    def act(self, tick, senses, heard, outcomes=NO_OUTCOMES) -> Actions:
-        self.given.append((tick, senses, heard, outcomes))
+    def act(self, tick, senses, received, outcomes=NO_OUTCOMES) -> Actions:
+        self.given.append((tick, senses, received, outcomes))
         rows = np.array([0, 1])
-        sent = Sent(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
+        sent = SentPackets(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
         return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
 
-    def receive(self, heard, outcomes) -> None:
-        self.given.append(("received", heard, outcomes))
+    def receive(self, received, outcomes) -> None:
+        self.given.append(("received", received, outcomes))
 
-    def hear(self, tick, at_ns) -> Sent:
-        return Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
+    def on_receive(self, tick, at_ns) -> SentPackets:
+        return SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
 
     def counts(self) -> dict[str, int]:
         return {"inner": 1}
@@ -54,11 +54,11 @@ class Air:
     def __init__(self) -> None:
         self.published: list[Any] = []
 
-    def publish(self, tick, heard, outcomes) -> None:
-        self.published.append((tick, heard, outcomes))
+    def publish(self, tick, received, outcomes) -> None:
+        self.published.append((tick, received, outcomes))
 
-    def take(self) -> Sent:
-        return Sent(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
+    def take(self) -> SentPackets:
+        return SentPackets(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
 
     def counts(self) -> dict[str, int]:
         return {"late": 2, "odd": 0, "packets_to_robots": 9}
@@ -81,11 +81,13 @@ class Around:
     def show(self) -> None:
         self.shown += 1
 
-    def act(self, tick: int, alive: list[int], heard: Heard | None = None, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, alive: list[int], received: ReceivedPackets | None = None, outcomes: Outcomes = NO_OUTCOMES
+    ) -> Actions:
         rows = np.array(alive, np.int64)
         fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
         senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
-        return self.backend.act(tick, senses, Heard.none(GIVES) if heard is None else heard, outcomes)
+        return self.backend.act(tick, senses, ReceivedPackets.none(GIVES) if received is None else received, outcomes)
 
 
 def commands(actions: Actions) -> dict[int, tuple[float, float]]:
@@ -138,12 +140,12 @@ def test_readings_that_were_handed_over_are_never_written_to_again() -> None:
 
 def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_packets() -> None:
     around = Around()
-    sent = Sent(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+    sent = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
     outcomes = Outcomes(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
-    actions = around.act(0, [2, 3, 4], heard_from(sent, [1, 2, 4]), outcomes)
-    _, senses, heard, _ = around.inner.given[-1]
+    actions = around.act(0, [2, 3, 4], received_from(sent, [1, 2, 4]), outcomes)
+    _, senses, received, _ = around.inner.given[-1]
     assert list(senses) == ["a"]
-    assert len(heard) == 3  # a host takes what is for its robots
+    assert len(received) == 3  # a host takes what is for its robots
     assert around.air is not None
     ((tick, outside, told),) = around.air.published
     assert tick == 0
@@ -161,7 +163,7 @@ def test_without_a_radio_nothing_but_commands_is_taken() -> None:
 def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:
     around = Around()
     around.gateway.drive = {0: (0.1, 0.0)}
-    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, Heard.none(GIVES))
+    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, ReceivedPackets.none(GIVES))
     assert not around.gateway.published
     assert commands(actions)[2] == (0.1, 0.0)
 
@@ -217,10 +219,10 @@ class QuietAir:
         if len(put.sent):
             self.sent.append((put.tick, put.sent.payloads.row(0)))
 
-    def advance(self, until_ns) -> tuple[Heard, Outcomes]:
+    def advance(self, until_ns) -> tuple[ReceivedPackets, Outcomes]:
         due, self.told = not self.told and until_ns >= TICK_NS // 2, self.told or until_ns >= TICK_NS // 2
-        sent = Sent(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
-        return heard_from(sent, [0, 3] if due else []), NO_OUTCOMES
+        sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+        return received_from(sent, [0, 3] if due else []), NO_OUTCOMES
 
 
 def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
@@ -229,10 +231,10 @@ def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
     senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
     around.gateway.drive = {1: (0.05, -0.7)}
-    actions = around.backend.act_in_time(0, senses, Heard.none(GIVES), NO_OUTCOMES, air)
+    actions = around.backend.act_in_time(0, senses, ReceivedPackets.none(GIVES), NO_OUTCOMES, air)
     assert around.air is not None
-    heard = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
-    assert heard == [[3]]
+    received = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
+    assert received == [[3]]
     assert [given[1].receiver.tolist() for given in around.inner.given if given[0] == "received"] == [[], [0, 3]]
     assert air.sent[:2] == [(0, b"inner"), (None, b"outer")]
     assert (None, b"echo") in air.sent

@@ -1,4 +1,4 @@
-"""What all robots sense and heard, cut into one part for each runner."""
+"""What all robots sense and received, cut into one part for each runner."""
 
 import itertools
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
@@ -45,26 +45,26 @@ def acting(part: Senses) -> IntArray:
     return np.concatenate([np.empty(0, np.int64), *(group.rows for group in part.values())])
 
 
-def split_heard(heard: Heard, owner: IntArray, slots: int) -> list[Heard]:
-    """What the robots of each of `slots` parts heard, each with its payloads, once; `owner` is (rows,)."""
-    if not len(heard):
-        return [heard] * slots
-    by_slot = np.argsort(owner[heard.receiver], kind="stable")
-    slot_of = owner[heard.receiver[by_slot]]
-    sorted_heard = heard.select(by_slot)
-    packets = len(heard.payloads)
-    wanted, place = np.unique(slot_of * packets + sorted_heard.payload, return_inverse=True)
-    payloads = heard.payloads.rows(wanted % packets)
+def split_received(received: ReceivedPackets, owner: IntArray, slots: int) -> list[ReceivedPackets]:
+    """What the robots of each of `slots` parts received, each with its payloads, once; `owner` is (rows,)."""
+    if not len(received):
+        return [received] * slots
+    by_slot = np.argsort(owner[received.receiver], kind="stable")
+    slot_of = owner[received.receiver[by_slot]]
+    sorted_received = received.select(by_slot)
+    packets = len(received.payloads)
+    wanted, place = np.unique(slot_of * packets + sorted_received.payload, return_inverse=True)
+    payloads = received.payloads.rows(wanted % packets)
     first_row = np.searchsorted(slot_of, np.arange(slots + 1)).tolist()
     first_payload = np.searchsorted(wanted // packets, np.arange(slots + 1)).tolist()
     place = place.reshape(-1)
     return [
-        Heard(
-            sorted_heard.receiver[a:b],
-            sorted_heard.sender[a:b],
-            sorted_heard.sequence[a:b],
-            sorted_heard.heard_at_ns[a:b],
-            {name: column[a:b] for name, column in sorted_heard.given.items()},
+        ReceivedPackets(
+            sorted_received.receiver[a:b],
+            sorted_received.sender[a:b],
+            sorted_received.sequence[a:b],
+            sorted_received.received_at_ns[a:b],
+            {name: column[a:b] for name, column in sorted_received.given.items()},
             place[a:b] - p,
             payloads.span(p, q),
         )
@@ -103,7 +103,7 @@ class _Open(NamedTuple):
 
     tick: int
     senses: Senses
-    heard: Heard
+    received: ReceivedPackets
     outcomes: Outcomes
 
 
@@ -115,12 +115,12 @@ class Lockstep(Roster[_Slot]):
         self._open: _Open | None = None
 
     def open_tick(
-        self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES
     ) -> list[tuple[str, bytes]]:
         """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
-        self._tick, self._open = tick, _Open(tick, senses, heard, outcomes)
+        self._tick, self._open = tick, _Open(tick, senses, received, outcomes)
         parts = split_senses(senses, self._slots.owner, self._slots.assignments)
-        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        packets = split_received(received, self._slots.owner, len(self._slots))
         told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
@@ -154,7 +154,7 @@ class Lockstep(Roster[_Slot]):
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         if self._open is None or self._on_loss in GOES_ON:
             return ()
-        tick, senses, heard, outcomes = self._open
+        tick, senses, received, outcomes = self._open
         own = np.full(len(self._slots.owner), NOBODY)
         own[slot.all_rows] = 0
         (part,) = split_senses(senses, own, [slot.assignment])
@@ -162,7 +162,7 @@ class Lockstep(Roster[_Slot]):
         if not part:
             return ()
         slot.move("is asked")
-        return (encode_tick(tick, part, split_heard(heard, own, 1)[0], split_outcomes(outcomes, own, 1)[0]),)
+        return (encode_tick(tick, part, split_received(received, own, 1)[0], split_outcomes(outcomes, own, 1)[0]),)
 
     def _free(self, slot: _Slot, runner: str, what: What, reason: str) -> None:
         super()._free(slot, runner, what, reason)
@@ -170,8 +170,8 @@ class Lockstep(Roster[_Slot]):
             slot.memory = slot.before
         slot.actions, slot.idle = None, True
 
-    def _to_nobody(self, heard: Heard, outcomes: Outcomes) -> None:
-        for name, some in (("packets_without_agent", heard), ("outcomes_without_agent", outcomes)):
+    def _to_nobody(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
+        for name, some in (("packets_without_agent", received), ("outcomes_without_agent", outcomes)):
             if len(some):
                 self._counts[name] += len(some)
 

@@ -99,10 +99,10 @@ class Pace:
         """Wall time."""
         return self._clock.now_ns()
 
-    def handed_over(self, heard_at_ns: IntArray) -> None:
+    def handed_over(self, received_at_ns: IntArray) -> None:
         """Packets were handed over just now that the modelled radio had at these simulated times, (k,)."""
-        if len(heard_at_ns) and self._first_ns is not None:
-            after_ns = (heard_at_ns - self._first_tick_ns) / self.factor
+        if len(received_at_ns) and self._first_ns is not None:
+            after_ns = (received_at_ns - self._first_tick_ns) / self.factor
             self.delivery.add(self._clock.now_ns() - self._first_ns - after_ns.astype(np.int64))
 
     def simulated_ns(self, wall_ns: int) -> int:

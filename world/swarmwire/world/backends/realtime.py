@@ -13,7 +13,7 @@ air with those of that tick, so they are sent at that tick's start plus their ro
 With a quantum packets cross also between these: `packets` frames go out, and "sent" frames come, whenever there are
 any. Then `puts` gives, many times in a tick, what came to be sent, and when; `take` has none left.
 
-    quantum   hand_over     a frame "packets" to each ready runner some of whose robots heard something
+    quantum   hand_over     a frame "packets" to each ready runner some of whose robots received something
               "sent"        its packets go to the air at once
               "actions"     as above, but its packets wait for their robots' turn only
 
@@ -32,13 +32,13 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.interfaces import Put
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Slot, rows_of
 from swarmwire.world.backends.join_policy import USUAL, Terms
-from swarmwire.world.backends.lockstep import acting, split_heard, split_outcomes, split_senses
+from swarmwire.world.backends.lockstep import acting, split_outcomes, split_received, split_senses
 from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, RunnerHealth, What
 
 ANSWERED = -1
@@ -49,7 +49,7 @@ class _Asked(NamedTuple):
 
     tick: int
     rows: IntArray  # (n,) in the order of the answer
-    packets: int  # heard, that it carried
+    packets: int  # received, that it carried
     outcomes: int  # of packets sent
     at_ns: int  # wall time, pauses left out
 
@@ -67,7 +67,7 @@ class RealTime(Roster[_Slot]):
         watchdog_stops: (rows,) times that the watchdog stopped a robot.
         frames_dropped: frames to runners that were never answered though a later one was, or that were still out when
             their runner was lost: dropped by the network, or passed over by a runner that had a newer one.
-        packets_dropped: packets in them, or for robots without a runner: heard by a radio, never by an agent.
+        packets_dropped: packets in them, or for robots without a runner: received by a radio, never by an agent.
         outcomes_dropped: outcomes in them, or for such robots: known to a radio, never to its agent.
         now_ns: wall time at which what is answered arrived; set by whoever hands it in.
     """
@@ -111,13 +111,13 @@ class RealTime(Roster[_Slot]):
         )
 
     def open_tick(
-        self, tick: int, now_ns: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES
+        self, tick: int, now_ns: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES
     ) -> list[tuple[str, bytes]]:
         """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
         parts = split_senses(senses, self._slots.owner, self._slots.assignments)
-        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        packets = split_received(received, self._slots.owner, len(self._slots))
         told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
@@ -136,9 +136,11 @@ class RealTime(Roster[_Slot]):
                 self.outcomes_dropped += len(its)
         return out
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> list[tuple[str, bytes]]:
+    def hand_over(
+        self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes
+    ) -> list[tuple[str, bytes]]:
         """Frames to runners that are ready, at `at_ns` of simulated time, with what robots were told since the last."""
-        packets = split_heard(heard, self._slots.owner, len(self._slots))
+        packets = split_received(received, self._slots.owner, len(self._slots))
         told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, own, its in zip(self._slots, packets, told, strict=True):
@@ -164,7 +166,7 @@ class RealTime(Roster[_Slot]):
         self._stop(np.flatnonzero(overdue))
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
-        sent, notes = Sent.joined([put.sent for put in self.puts()]), self._latest_notes()
+        sent, notes = SentPackets.joined([put.sent for put in self.puts()]), self._latest_notes()
         leds, own, told = LedChanges.joined(self._leds), Actuations.joined(self._own), Values.joined(self._values)
         actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.backends.inbox import Item, RunnerInbox
 from swarmwire.world.backends.join_policy import USUAL, Door, Terms
@@ -31,7 +31,7 @@ class RealTimeReport:
     late_answers: dict[str, int] = field(default_factory=dict[str, int])  # after their own tick, by robot
     watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # by robot
     frames_dropped: int = 0  # to runners, never acted on: middleware loss
-    packets_dropped: int = 0  # in these frames: heard by the radio, never by the agent
+    packets_dropped: int = 0  # in these frames: received by the radio, never by the agent
     outcomes_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
     quantum_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
     delivery: Delays | None = None  # packets: when they were handed over against when the modelled radio had them
@@ -58,34 +58,36 @@ class PacedBackend:
         self._puts: list[Put] = []
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
-        self._pace.handed_over(heard.heard_at_ns)
-        actions = self._backend.act(tick, senses, heard, outcomes)
+        self._pace.handed_over(received.received_at_ns)
+        actions = self._backend.act(tick, senses, received, outcomes)
         self._pace.hold(tick)
         return actions
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """The same, with packets handed over when they are due."""
         assert self._quanta
         self._pace.begin()
-        self._pace.handed_over(heard.heard_at_ns)
-        self._backend.receive(heard, outcomes)
-        actions = self._backend.act(tick, senses, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        self._pace.handed_over(received.received_at_ns)
+        self._backend.receive(received, outcomes)
+        actions = self._backend.act(tick, senses, ReceivedPackets.none(tuple(received.given)), NO_OUTCOMES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._quanta.pass_tick(tick, air, self)
-        return replace(actions, sent=Sent.none())
+        return replace(actions, sent=SentPackets.none())
 
     def take_in(self) -> list[Put]:
         """What agents sent since the last call."""
         puts, self._puts = self._puts, []
         return puts
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Let agents that read between ticks read."""
-        self._backend.receive(heard, outcomes)
-        sent = self._backend.hear(tick, at_ns)
+        self._backend.receive(received, outcomes)
+        sent = self._backend.on_receive(tick, at_ns)
         if len(sent):
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
@@ -120,22 +122,24 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         if quanta:
             self._inbox = RunnerInbox(roster.limits, clock.now_ns)
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """A frame to every runner; what has come when the tick is over."""
-        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, heard, outcomes))
-        self._pace.handed_over(heard.heard_at_ns)
+        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, received, outcomes))
+        self._pace.handed_over(received.received_at_ns)
         self._pace.hold(tick)
         self._take_in()
         return self._roster.take()
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """The same, with frames also between ticks, as packets come and are due."""
         assert self._quanta
         now_ns = self._pace.begin()
-        self.hand_over(tick, tick_start_ns(tick, self._rate_hz), heard, outcomes)
-        self._pace.handed_over(heard.heard_at_ns)
+        self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, outcomes)
+        self._pace.handed_over(received.received_at_ns)
         self._quanta.exchange(tick, air, self)  # first what became due since the last tick's end
-        self._send(self._roster.open_tick(tick, now_ns, senses, Heard.none(), NO_OUTCOMES))
+        self._send(self._roster.open_tick(tick, now_ns, senses, ReceivedPackets.none(), NO_OUTCOMES))
         self._quanta.pass_tick(tick, air, self)
         return self._roster.take()
 
@@ -144,9 +148,9 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         self._take_in()
         return self._roster.puts()
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """A frame to every runner that this concerns."""
-        self._send(self._roster.hand_over(tick, at_ns, heard, outcomes))
+        self._send(self._roster.hand_over(tick, at_ns, received, outcomes))
 
     def report(self) -> RealTimeReport:
         """How far loop and runners kept up."""

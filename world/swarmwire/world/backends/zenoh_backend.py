@@ -14,7 +14,7 @@ from zenoh.handlers import Callback
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
@@ -116,7 +116,7 @@ class ZenohBackend(ABC, Generic[R]):
         self._patience_s = self._timeout_s
 
     @abstractmethod
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What every robot does in this tick."""
 
     def counts(self) -> dict[str, int]:
@@ -289,7 +289,7 @@ class ZenohBackend(ABC, Generic[R]):
     def _shut(self, flooding: set[str]) -> None:
         """Hear each runner on its own, but for these: what they send is dropped where no Python sees it.
 
-        An answer that comes while this is under way may be heard twice, which is counted; none is missed.
+        An answer that comes while this is under way may be received twice, which is counted; none is missed.
         """
         if self._session is None:
             return
@@ -331,8 +331,8 @@ class LockstepBackend(ZenohBackend[Lockstep]):
     ) -> None:
         super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """One frame to every runner, one answer from each."""
-        self._send(self._roster.open_tick(tick, senses, heard, outcomes))
+        self._send(self._roster.open_tick(tick, senses, received, outcomes))
         self._wait()
         return self._roster.take()

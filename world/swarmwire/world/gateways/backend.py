@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Heard, Outcomes, Sent
+from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, LedChanges, Senses
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
@@ -69,7 +69,7 @@ class GatewayGroup:
 # --- The backend of a run some of whose robots answer as real ones: foreign programs drive them, and nobody waits for
 # those.
 #
-#     a tick begins     poses, readings and packets heard go out
+#     a tick begins     poses, readings and packets received go out
 #     it is over        by the wall clock: commands and packets that have come by then are taken
 #
 # So what is commanded while a tick goes on is done from its start, like the answers of runners in real time.
@@ -84,11 +84,11 @@ CARRIED = ("packets_to_robots", "packets_from_robots")  # which is no fault
 class RobotsAir(Protocol):
     """The world's air as robots behind gateways have it; `AirBridge` is one."""
 
-    def publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
-        """Hand out what these robots heard, and learn of packets that they sent."""
+    def publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+        """Hand out what these robots received, and learn of packets that they sent."""
         ...
 
-    def take(self) -> Sent:
+    def take(self) -> SentPackets:
         """The packets that they sent since it was asked last."""
         ...
 
@@ -98,7 +98,7 @@ class RobotsAir(Protocol):
 
 
 class GatewayBackend:
-    """The robots of some groups behind gateways, all others played by another backend, in one arena and in real time."""
+    """The robots of some groups behind gateways, all others behind another backend, in one arena and real time."""
 
     def __init__(
         self,
@@ -123,25 +123,27 @@ class GatewayBackend:
         self._rows = np.sort(np.concatenate([group.rows for group in groups]))
         self.start, self.close = inner.start, inner.close
 
-    def act(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
         """What agents here decided, and what foreign programs told the other robots in this tick."""
-        others = self._begin(tick, senses, heard, outcomes)
-        actions = self._inner.act(tick, others, heard, outcomes)
+        others = self._begin(tick, senses, received, outcomes)
+        actions = self._inner.act(tick, others, received, outcomes)
         self._pace.hold(tick)
         self._catch_up(tick)
         told = Actions.joined([actions, *(group.take() for group in self._groups)])
-        return replace(told, sent=Sent.joined([told.sent, self._air.take()])) if self._air else told
+        return replace(told, sent=SentPackets.joined([told.sent, self._air.take()])) if self._air else told
 
-    def act_in_time(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes, air: AirTime) -> Actions:
+    def act_in_time(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+    ) -> Actions:
         """The same, with packets taken when they come and handed over when they are due."""
         assert self._quanta
-        others = self._begin(tick, senses, heard, outcomes)
-        self._inner.receive(heard, outcomes)
-        actions = self._inner.act(tick, others, Heard.none(tuple(heard.given)), NO_OUTCOMES)
+        others = self._begin(tick, senses, received, outcomes)
+        self._inner.receive(received, outcomes)
+        actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_OUTCOMES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._quanta.pass_tick(tick, air, self)
         self._catch_up(tick)
-        still = replace(actions, sent=Sent.none())
+        still = replace(actions, sent=SentPackets.none())
         return Actions.joined([still, *(group.take() for group in self._groups)])
 
     def take_in(self) -> list[Put]:
@@ -149,11 +151,11 @@ class GatewayBackend:
         puts, self._puts = self._puts, []
         return [*puts, Put(self._pace.now_ns(), None, self._air.take())] if self._air else puts
 
-    def hand_over(self, tick: int, at_ns: int, heard: Heard, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         """Tell robots behind gateways, and let agents here that read between ticks read."""
-        self._publish(tick, heard, outcomes)
-        self._inner.receive(heard, outcomes)
-        sent = self._inner.hear(tick, at_ns)
+        self._publish(tick, received, outcomes)
+        self._inner.receive(received, outcomes)
+        sent = self._inner.on_receive(tick, at_ns)
         if len(sent):
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
@@ -171,19 +173,21 @@ class GatewayBackend:
         """How far the loop kept up."""
         return report_of(self._pace, self._quanta)
 
-    def _begin(self, tick: int, senses: Senses, heard: Heard, outcomes: Outcomes) -> Senses:
+    def _begin(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Senses:
         """A tick begins: all goes out; what the others sense."""
         self._pace.begin()
         self._show()
         for group in self._groups:
             group.publish(tick_start_ns(tick, self._rate_hz), senses)
-        self._publish(tick, heard, outcomes)
-        self._pace.handed_over(heard.heard_at_ns)
+        self._publish(tick, received, outcomes)
+        self._pace.handed_over(received.received_at_ns)
         return {name: of for name, of in senses.items() if name not in self._names}
 
-    def _publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
+    def _publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
         if self._air:
-            self._air.publish(tick, heard.select(self._own(heard.receiver)), outcomes.select(self._own(outcomes.row)))
+            self._air.publish(
+                tick, received.select(self._own(received.receiver)), outcomes.select(self._own(outcomes.row))
+            )
 
     def _catch_up(self, tick: int) -> None:
         """Where the loop lags by more than a tick, the schedule begins anew."""

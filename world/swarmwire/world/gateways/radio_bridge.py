@@ -12,7 +12,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import Heard, Outcomes, Sent
+from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, encode_air
@@ -33,7 +33,7 @@ class LentAir:
     robots: tuple[str, ...]  # all of the arena, by index
     rate_hz: int
     max_payload_bytes: int
-    gives: tuple[str, ...]  # columns of `Heard.given`
+    gives: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # what of an agent's needs it meets
 
     def terms(self, row: int) -> AirTerms:
@@ -78,7 +78,9 @@ class AirBridge:
         """Take part in the network; returns the endpoints to call. BadInput if one is taken, or a file will not do."""
         session = self._session = open_swarm(self._network, self._access, small=False)
         self._publishers = {
-            row: session.declare_publisher(self._keys.air_heard(name), congestion_control=zenoh.CongestionControl.DROP)
+            row: session.declare_publisher(
+                self._keys.air_received(name), congestion_control=zenoh.CongestionControl.DROP
+            )
             for name, row in self._rows.items()
         }
         self._declared = (
@@ -87,11 +89,11 @@ class AirBridge:
         )
         return endpoints_of(session, self._network)
 
-    def publish(self, tick: int, heard: Heard, outcomes: Outcomes) -> None:
-        """A frame to each robot that heard something or learns of its packets; rows of others are left out."""
-        concerned = {*np.unique(heard.receiver).tolist(), *np.unique(outcomes.row).tolist()}
+    def publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+        """A frame to each robot that received something or learns of its packets; rows of others are left out."""
+        concerned = {*np.unique(received.receiver).tolist(), *np.unique(outcomes.row).tolist()}
         for row in sorted(concerned & self._publishers.keys()):
-            its = heard.select(np.flatnonzero(heard.receiver == row)).compacted()
+            its = received.select(np.flatnonzero(received.receiver == row)).compacted()
             told = outcomes.select(np.flatnonzero(outcomes.row == row))
             try:
                 self._publishers[row].put(encode_air(tick, row, its, told))
@@ -100,11 +102,11 @@ class AirBridge:
             else:
                 self._counted["packets_to_robots"] += len(its)
 
-    def take(self) -> Sent:
+    def take(self) -> SentPackets:
         """Packets that the robots sent since the last call; those of robots that died are for the air to end."""
         parts = [sent for row, frame in self._inbox.take() if (sent := self._sent(row, frame)) is not None]
         self._counted["packets_from_robots"] += sum(map(len, parts))
-        return Sent.joined(parts)
+        return SentPackets.joined(parts)
 
     def counts(self) -> dict[str, int]:
         """Packets carried, and what came that was of no use, by name, where there is any."""
@@ -142,7 +144,7 @@ class AirBridge:
             else:
                 query.reply(key, self._air.terms(row).encode())
 
-    def _sent(self, row: int, data: bytes) -> Sent | None:
+    def _sent(self, row: int, data: bytes) -> SentPackets | None:
         try:
             frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
             if frame.kind != "actions":

@@ -15,7 +15,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 
 def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -> BoolArray:
-    """Who of the senders (k,) is at most `width` places from the index (k,) of the robot that heard it."""
+    """Who of the senders (k,) is at most `width` places from the index (k,) of the robot that received it."""
     apart = np.mod(sender - index, count)
     return np.minimum(apart, count - apart) <= width
 
@@ -42,7 +42,7 @@ def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
 # --- Particle: what a robot of a particle swarm remembers, and how what it senses and hears changes that.
 
 
-DARK = -1.0  # below any light: nothing seen, or heard of, yet
+DARK = -1.0  # below any light: nothing seen, or received of, yet
 
 
 class Particle(State):
@@ -53,7 +53,7 @@ class Particle(State):
     own_readings: IntColumn = column(0)  # of which the own brightness is the mean
     own_x: FloatColumn = column(0.0)
     own_y: FloatColumn = column(0.0)
-    best_brightness: FloatColumn = column(DARK)  # of the neighbours, as heard
+    best_brightness: FloatColumn = column(DARK)  # of the neighbours, as received
     best_x: FloatColumn = column(0.0)
     best_y: FloatColumn = column(0.0)
     velocity_x: FloatColumn = column(0.0)  # m per update
@@ -63,12 +63,12 @@ class Particle(State):
 
 
 class Bests(NamedTuple):
-    """Bests that were heard, (k,) each."""
+    """Bests that were received, (k,) each."""
 
-    row: IntArray  # of the robot that heard it
+    row: IntArray  # of the robot that received it
     sender: IntArray  # index in the arena
     brightness: FloatArray
-    x: FloatArray  # from the robot that heard it, in m, along the axes of the compass
+    x: FloatArray  # from the robot that received it, in m, along the axes of the compass
     y: FloatArray
 
     def of(self, which: BoolArray) -> "Bests":
@@ -103,7 +103,7 @@ def look(state: Particle, brightness: FloatArray, again_m: float) -> None:
 
 
 def listen(state: Particle, bests: Bests) -> None:
-    """Of all that was heard, keep the brightest of each row; as bright as the one known, it is fresher."""
+    """Of all that was received, keep the brightest of each row; as bright as the one known, it is fresher."""
     order = np.lexsort((bests.brightness, bests.row))
     last = order[np.flatnonzero(np.diff(bests.row[order], append=-1))]  # of each row
     last = last[bests.brightness[last] >= state.best_brightness[bests.row[last]]]
@@ -125,18 +125,19 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         v <- w v + a U (own best - x) + b U (neighbours' best - x),    |v| <= speed x time between updates
 
     with U uniform in [0, 1), drawn anew for each term and axis. Own best is where the robot itself saw the brightest
-    light; neighbours' best is the brightest place that it has heard of or seen. Between two updates it heads for x + v.
+    light; neighbours' best is the brightest place that it has received of or seen. Between two updates it heads for x +
+    v.
 
-    Neighbours are those who are heard: all with a radio that reaches all, else those in its range; with
-    `ring_count` only those next to it on a ring of indices, if they are heard. What a neighbour told counts for good,
-    also when it is gone; with `keeps_heard = false` up to the next update, which is how a particle swarm in a computer
-    asks its neighbourhood.
+    Neighbours are those who are received: all with a radio that reaches all, else those in its range; with
+    `ring_count` only those next to it on a ring of indices, if they are received. What a neighbour told counts for
+    good, also when it is gone; with `keeps_received = false` up to the next update, which is how a particle swarm in a
+    computer asks its neighbourhood.
 
     By itself the own best is the brightest reading, so a lucky one is believed for ever. With `again_m`
     the own best is measured again, and the mean of all its readings counts, as in Pugh's code for noisy fitness (new
     mean = ((k - 1) mean + reading) / k at the k-th). A robot can measure only where it stands: so a reading counts as
     one of the own best whenever the robot is that near to it, on its way out, when it comes back and while it rests
-    there. What was told is corrected by telling anew, for those who do not keep what they heard.
+    there. What was told is corrected by telling anew, for those who do not keep what they received.
 
     How a robot knows its motion, speaks of places and moves is its subclasses' part.
     """
@@ -147,9 +148,9 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     own_weight: float = 1.4962  # a: pull of the own best
     neighbour_weight: float = 1.4962  # b: pull of the neighbours' best
     speed_mps: float = 0.1  # straight ahead
-    keeps_heard: bool = True  # whether what neighbours told counts for longer than until the next update
+    keeps_received: bool = True  # whether what neighbours told counts for longer than until the next update
     again_m: float = 0.0  # a reading so near to the own best is one more of it; 0: the brightest reading counts
-    ring_count: int = 0  # robots on the ring; 0: no ring, all who are heard are neighbours
+    ring_count: int = 0  # robots on the ring; 0: no ring, all who are received are neighbours
     ring_index: PerRobot[int] = per_robot(0)  # of the robot in the arena: its place on the ring
     ring_width: int = 1  # neighbours on each side
 
@@ -169,7 +170,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
 
     @abstractmethod
     def told(self, robots: Robots) -> Bests:
-        """Every best that was heard."""
+        """Every best that was received."""
 
     @abstractmethod
     def head_for_target(self, robots: Robots, state: P) -> None:
@@ -205,7 +206,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         state.velocity_y[now] = state.target_y[now] = (y * bounded)[now]
         robots.note("to its own best", now & ~brighter)
         robots.note("to the neighbours' best", now & brighter)
-        if not self.keeps_heard:
+        if not self.keeps_received:
             state.best_brightness[now] = DARK
 
     def _velocity(

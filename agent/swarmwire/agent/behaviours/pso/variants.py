@@ -45,11 +45,11 @@ class ParticlesByPlaces(ParticleSwarm[PositionedParticle]):
         robots.radio.send(BestPlace, rows=rows, brightness=state.own_brightness, x_m=x, y_m=y)
 
     def told(self, robots: Robots) -> Bests:
-        """Places of those that were heard, seen from here."""
-        heard = robots.radio.heard(BestPlace)
+        """Places of those that were received, seen from here."""
+        received = robots.radio.received(BestPlace)
         here = robots.positioning
-        x, y = heard.message.x_m - here.x_m[heard.row], heard.message.y_m - here.y_m[heard.row]
-        return Bests(heard.row, heard.sender, heard.message.brightness, x, y)
+        x, y = received.message.x_m - here.x_m[received.row], received.message.y_m - here.y_m[received.row]
+        return Bests(received.row, received.sender, received.message.brightness, x, y)
 
 
 # --- Particles on wheels: to the target, and away from what is near.
@@ -118,8 +118,9 @@ class WheeledParticle(Particle):
 class PsoSearch(ParticlesOnWheels[WheeledParticle]):
     """Particle swarm search by what a robot itself senses: wheels, compass, and a radio that tells range and bearing.
 
-    Neighbours are those whose broadcast is heard; a best comes as a vector from its sender, and the receiver adds where
-    it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along the compass' heading.
+    Neighbours are those whose broadcast is received; a best comes as a vector from its sender, and the receiver adds
+    where it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along the compass'
+    heading.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "odometry", "radio.range", "radio.bearing")
@@ -137,11 +138,11 @@ class PsoSearch(ParticlesOnWheels[WheeledParticle]):
         robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
 
     def told(self, robots: Robots) -> Bests:
-        """Bests of those that were heard, seen from here."""
-        heard = robots.radio.heard(BestVector)
-        place = heard.range_m * along(heard.bearing_rad + robots.compass.heading_rad[heard.row])
-        place += Vectors(heard.message.x_m, heard.message.y_m)
-        return Bests(heard.row, heard.sender, heard.message.brightness, place.x, place.y)
+        """Bests of those that were received, seen from here."""
+        received = robots.radio.received(BestVector)
+        place = received.range_m * along(received.bearing_rad + robots.compass.heading_rad[received.row])
+        place += Vectors(received.message.x_m, received.message.y_m)
+        return Bests(received.row, received.sender, received.message.brightness, place.x, place.y)
 
 
 # --- Particle swarm search by global positions, for a body with `positioning`.

@@ -95,7 +95,7 @@ class Epuck2Driver(Driver):
         self._odometer = Odometer()
         self._readings = Readings(body, options.calibration, self._odometer)
         self._gives = _given(body, self._options)
-        self._heard_ns: int | None = None  # when the newest reading came
+        self._received_ns: int | None = None  # when the newest reading came
         self._told_sensors: AnyArray = np.zeros(1, SENSORS)
         self._anew = True  # the next reading is the first one of a connection
         self._calibrate = self._options.calibrate
@@ -133,7 +133,7 @@ class Epuck2Driver(Driver):
         link = self._connected()
         if not self._exchange(link, self._options.answer_s):
             self._counts["late_answers"] += 1
-            silent_s = to_s(self.clock.now_ns() - (self._heard_ns or 0))
+            silent_s = to_s(self.clock.now_ns() - (self._received_ns or 0))
             if silent_s > self._options.silent_s:
                 self._counts["silences"] += 1
                 raise self._lose(DriverLost(f"the e-puck2 at {self.address} has been silent for {silent_s:.1f} s"))
@@ -214,12 +214,12 @@ class Epuck2Driver(Driver):
             return
         told = np.frombuffer(payload, SENSORS)
         now_ns, steps = self.clock.now_ns(), (int(told["steps"][0, 0]), int(told["steps"][0, 1]))
-        if self._anew and self._heard_ns is not None:
-            if not self._odometer.resume(*steps, to_s(now_ns - self._heard_ns)):
+        if self._anew and self._received_ns is not None:
+            if not self._odometer.resume(*steps, to_s(now_ns - self._received_ns)):
                 self._counts["odometry_began_anew"] += 1
         else:
             self._odometer.read(*steps)
-        self._told_sensors, self._heard_ns, self._anew = told, now_ns, False
+        self._told_sensors, self._received_ns, self._anew = told, now_ns, False
 
     def _connected(self) -> Link:
         if self._link is None:

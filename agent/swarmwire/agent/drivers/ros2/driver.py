@@ -75,7 +75,7 @@ LOOK_NS = NS_PER_S // 100  # how often it is looked whether a base is there
 class Ros2Driver(Driver):
     """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is that one's endpoint.
 
-    Until scanner, odometry and IMU, as far as the agent asks for them, were heard once, the base stays at rest,
+    Until scanner, odometry and IMU, as far as the agent asks for them, were received once, the base stays at rest,
     whatever it is told.
     """
 

@@ -26,7 +26,7 @@ class Feed:
         self.garbage = 0
         self._reader, self._messages, self._clock = reader, messages, clock
         self._waiting: deque[tuple[int, bytes]] = deque(maxlen=reader.keeps)
-        self._heard_ns: int | None = None  # when the newest message that could be read came
+        self._received_ns: int | None = None  # when the newest message that could be read came
 
     def take(self, payload: bytes) -> None:
         """A payload came."""
@@ -35,12 +35,12 @@ class Feed:
     @property
     def is_blind(self) -> bool:
         """Whether nothing could be read since the connection was made, on a topic that a base tells all the time."""
-        return self._reader.is_steady and self._heard_ns is None
+        return self._reader.is_steady and self._received_ns is None
 
     def begin(self) -> None:
-        """A new connection: what came before does not count as heard."""
+        """A new connection: what came before does not count as received."""
         self._waiting.clear()
-        self._heard_ns = None
+        self._received_ns = None
 
     def look(self) -> Fields:
         """The newest readings."""
@@ -48,7 +48,7 @@ class Feed:
             came_ns, payload = self._waiting.popleft()
             try:
                 self._reader.read(self._messages.decode(self._reader.kind, payload))
-                self._heard_ns = came_ns
+                self._received_ns = came_ns
             except BadFrame:
                 self.garbage += 1
         return self._reader.fields
@@ -57,7 +57,7 @@ class Feed:
         """For how long nothing came that could be read, since `since_ns` at most; 0 if that is no fault."""
         if not self._reader.is_steady:
             return 0
-        return now_ns - (since_ns if self._heard_ns is None else self._heard_ns)
+        return now_ns - (since_ns if self._received_ns is None else self._received_ns)
 
 
 # --- Keys of a base's topics, as bridges or rmw_zenoh have them, and a driver's part in the ROS graph.

@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Finished
@@ -24,7 +24,7 @@ class Contention:
 
     packets: int
     delivery_ratio: float  # receptions / (packets x other nodes)
-    mean_delay_s: float | None  # from handing over to hearing; None if nothing was heard
+    mean_delay_s: float | None  # from handing over to hearing; None if nothing was received
     access_failure_share: float  # packets given up for want of a free channel
 
 
@@ -46,22 +46,22 @@ def contention(
     keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
     air = Air(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
     payloads = Payloads.of([bytes(payload_bytes)] * rows)
-    sent = Sent(np.arange(rows), np.full(rows, BROADCAST), payloads)
+    sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(warm_up_s * rate_hz), round((warm_up_s + measured_s) * rate_hz)
     air.hold(np.zeros((rows, 3)), np.ones(rows, np.bool_))
     counted = (last - first) * rows
-    heard = delay_ns = gave_up = 0
+    received = delay_ns = gave_up = 0
     for tick in range(last + round(LATE_S * rate_hz) + 1):
         at_ns = tick_start_ns(tick, rate_hz)
         finished = air.advance(at_ns).finished
         due = (finished.sequence >= first) & (finished.sequence < last)
-        reached = due & (finished.fate == Fate.HEARD)
-        heard += int(finished.receivers[reached].sum())
+        reached = due & (finished.fate == Fate.RECEIVED)
+        received += int(finished.receivers[reached].sum())
         delay_ns += int((finished.final_at_ns - finished.sent_at_ns)[reached].sum())
         gave_up += _packets(finished, due & (finished.fate == Fate.CHANNEL_BUSY))
         air.send(at_ns, tick, sent)
-    mean_delay_s = delay_ns / heard / NS_PER_S if heard else None
-    return Contention(counted, heard / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
+    mean_delay_s = delay_ns / received / NS_PER_S if received else None
+    return Contention(counted, received / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
 
 
 def _packets(finished: Finished, which: BoolArray) -> int:

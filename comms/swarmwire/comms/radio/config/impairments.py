@@ -172,7 +172,7 @@ class Gives:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns of `Heard.given`."""
+        """Names of the columns of `ReceivedPackets.given`."""
         return tuple(column for _, column, given in self._all() if given is not None)
 
     @property

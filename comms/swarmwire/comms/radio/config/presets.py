@@ -263,7 +263,7 @@ OTHER_MEDIA: dict[str, Preset] = {
         },
         "spherical spreading with absorption and the noise of 5 m/s of wind, without echoes, layers and Doppler shift; "
         "of two frames as strong the first survives, other frames being noise to it; which overlap is decided by when "
-        "they were sent, whatever the distance: only what is heard is late",
+        "they were sent, whatever the distance: only what is received is late",
     ),
 }
 

@@ -112,7 +112,7 @@ class Radio:
     )
     propagation_mps: float | None = parameter(
         None,
-        help="speed of the wave, for sound and the like: packets are heard later with distance, though they are on "
+        help="speed of the wave, for sound and the like: packets are received later with distance, though they are on "
         "air everywhere at once, and fading goes by this wave's length; without it that of light, and no delay",
         unit="m/s",
         at_least=1,

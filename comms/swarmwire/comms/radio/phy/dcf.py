@@ -51,7 +51,7 @@ def _change(rules, state, queue, r, now_ns):
     if reception.is_busy:
         counted = (now_ns - me.free_from_ns - rules.difs_ns) // rules.slot_ns
         me.slots = max(me.slots - max(counted, 0), 0)
-        # Who sends at this very moment cannot have heard the other.
+        # Who sends at this very moment cannot have received the other.
         if me.stage == BACKING_OFF and due_ns(queue, SEND, r) > now_ns:
             cancel(queue, SEND, r)
     else:

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.stage import Medium
 from swarmwire.comms.truth import NOBODY
 
-HEARD = int(Fate.HEARD)
+RECEIVED = int(Fate.RECEIVED)
 LEFT_OUT, WEAK, STRONG = range(3)
 
 
@@ -26,7 +26,7 @@ class Levels(NamedTuple):
     """What power makes of a link."""
 
     listed_dbm: float  # listed from this mean on
-    heard_mw: float  # a frame that arrives with less, on a link that is not listed, is never heard
+    received_mw: float  # a frame that arrives with less, on a link that is not listed, is never received
     least_dbm: float  # with a lower mean it does not disturb either
 
 
@@ -35,8 +35,8 @@ def links_by_sender(
 ) -> tuple[Table, LinkPlaces]:
     """The links of pairs, both ways, after those kept, and where they are.
 
-    `send_dbm` and `receive_dbi` (rows,) hold under events, too; `fate` (2, k) are HEARD where nothing closes the link
-    of pair i from a to b, and back.
+    `send_dbm` and `receive_dbi` (rows,) hold under events, too; `fate` (2, k) are RECEIVED where nothing closes the
+    link of pair i from a to b, and back.
     """
     k, rows = len(pairs.a), len(send_dbm)
     kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((rows, 3), np.int64)
@@ -68,8 +68,8 @@ def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receiv
             back_mw = from_db(-back_db[i]) * gain[i]
         there_mw *= send[s] * receive[r]
         back_mw *= send[r] * receive[s]
-        there = _kind(send_dbm[s] + receive_dbi[r] - there_db[i], there_mw, fate[0, i] == HEARD, levels)
-        back = _kind(send_dbm[r] + receive_dbi[s] - back_db[i], back_mw, fate[1, i] == HEARD, levels)
+        there = _kind(send_dbm[s] + receive_dbi[r] - there_db[i], there_mw, fate[0, i] == RECEIVED, levels)
+        back = _kind(send_dbm[r] + receive_dbi[s] - back_db[i], back_mw, fate[1, i] == RECEIVED, levels)
         kind[0, i], kind[1, i], power_mw[0, i], power_mw[1, i] = there, back, there_mw, back_mw
         counts[s, np.uint64(there & 3)] += 1
         counts[r, np.uint64(back & 3)] += 1
@@ -78,7 +78,7 @@ def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receiv
 @borrowing()
 def _kind(mean_dbm, power_mw, is_open, levels):
     is_listed = mean_dbm >= levels.listed_dbm
-    is_strong = is_listed | (is_open & (power_mw >= levels.heard_mw))
+    is_strong = is_listed | (is_open & (power_mw >= levels.received_mw))
     is_weak = is_open & (mean_dbm >= levels.least_dbm) & (not is_strong)
     return STRONG * is_strong + WEAK * is_weak + 4 * is_listed
 
@@ -96,7 +96,7 @@ def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
             receiver[i],
             kind[i] >= 4,
             fate[i],
-            HEARD,
+            RECEIVED,
         )
 
 
@@ -179,8 +179,8 @@ def _ranges(first: IntArray, counts: IntArray) -> IntArray:
 
 
 def _fates(now: Disruption, sender: IntArray, receiver: IntArray, blocked: IntArray) -> ByteArray:
-    """HEARD for links that are open, else what ends each packet on them, (k,)."""
-    fate = np.full(len(sender), int(Fate.HEARD), np.uint8)
+    """RECEIVED for links that are open, else what ends each packet on them, (k,)."""
+    fate = np.full(len(sender), int(Fate.RECEIVED), np.uint8)
     if now.anything:
         fate[now.apart(sender, receiver)] = Fate.PARTITIONED
         fate[~now.radio_on[receiver]] = Fate.BLACKOUT

@@ -21,7 +21,7 @@ from swarmwire.comms.radio.stages.stage import Medium
 from swarmwire.comms.radio.traces import LinkTraces
 
 ANSWER_LOSS, ANSWER_TRACE = purpose("fixed loss of an acknowledgement"), purpose("trace of an acknowledgement")
-HEARD, LOST, BURST = int(Fate.HEARD), int(Fate.LOST), int(Fate.BURST)
+RECEIVED, LOST, BURST = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.BURST)
 
 
 class Traced(NamedTuple):
@@ -61,7 +61,7 @@ def takes_none(losses):
 
 @borrowing()
 def taken_by(losses, key, robots, link, s, r, sequence, attempt, is_answer, at_ns):
-    """The fate that a loss gives to a frame from s to r, indices in the arena, or HEARD.
+    """The fate that a loss gives to a frame from s to r, indices in the arena, or RECEIVED.
 
     Draws are keyed by (sender, receiver, sequence), and attempt; an acknowledgement has draws of its own, and no burst
     takes it. `link` is that of the robot rows, as `BurstStates` counts them; the frame went on air at `at_ns`.
@@ -75,7 +75,7 @@ def taken_by(losses, key, robots, link, s, r, sequence, attempt, is_answer, at_n
             return LOST
     if losses.has_bursts and not is_answer and takes(losses.bursts, link, key, s, r, sequence, attempt, at_ns):
         return BURST
-    return HEARD
+    return RECEIVED
 
 
 @borrowing()

@@ -21,7 +21,7 @@ from swarmwire.comms.radio.phy.state import (
 )
 from swarmwire.comms.truth import NOBODY
 
-HEARD, CHANNEL_BUSY = int(Fate.HEARD), int(Fate.CHANNEL_BUSY)
+RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
 IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)
 
 
@@ -59,7 +59,7 @@ def send(rules, state, queue, told, r, now_ns):
         tx_queue.begin(rules, state, queue, r, now_ns)
         return
     packet = state.packet[me.packet]
-    if me.attempt > 0 and state.off[r] != HEARD:  # it was on air before: that is what becomes of it
+    if me.attempt > 0 and state.off[r] != RECEIVED:  # it was on air before: that is what becomes of it
         state.reception[r].is_deaf = 0
         results.settle(state, told, r, now_ns)
         tx_queue.pause(rules, state, queue, r, packet.pause_ns, now_ns)
@@ -67,7 +67,7 @@ def send(rules, state, queue, told, r, now_ns):
     packet.on_air_at_ns = now_ns
     me.stage = SENDING
     packet.fate = state.off[r]
-    if packet.fate == HEARD:
+    if packet.fate == RECEIVED:
         _take_links(state, r)
     else:
         me.first_link = me.weak_link = me.stop_link = 0
@@ -87,7 +87,7 @@ def sent(rules, losses, state, queue, told, r, now_ns):
     if me.packet == NOBODY:
         return  # it died meanwhile, and what it sent has been told
     packet = state.packet[me.packet]
-    if packet.fate != HEARD:
+    if packet.fate != RECEIVED:
         results.refuse(state, told, me.packet, packet.fate, packet.on_air_at_ns)
         tx_queue.pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
@@ -121,9 +121,9 @@ def fail(rules, state, queue, told, r, now_ns):
 
 @borrowing()
 def answer(rules, state, queue, r, now_ns):
-    """The robot acknowledges what it heard, unless it is about to send."""
+    """The robot acknowledges what it received, unless it is about to send."""
     me = state.robot[r]
-    if me.on_air != SILENT or me.stage == TURNING or state.off[r] != HEARD:
+    if me.on_air != SILENT or me.stage == TURNING or state.off[r] != RECEIVED:
         return
     _take_links(state, r)
     me.on_air = ACKNOWLEDGEMENT
@@ -139,11 +139,11 @@ def _take_links(state, r):
 
 @borrowing()
 def _acknowledged(rules, state, queue, told, r, now_ns):
-    """An acknowledgement ends: its sender's packet is over, if it was heard there."""
+    """An acknowledgement ends: its sender's packet is over, if it was received there."""
     me = state.robot[r]
     for i in range(me.first_link, me.weak_link):
         receiver = np.int64(state.link[i].receiver)
-        if receiver != me.answers_to or state.link[i].now != HEARD:
+        if receiver != me.answers_to or state.link[i].now != RECEIVED:
             continue
         it = state.robot[receiver]
         if it.stage == AWAITING and state.packet[it.packet].to == r:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Outcomes, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, Outcomes, SentPackets
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
@@ -23,7 +23,7 @@ from swarmwire.comms.radio.phy.losses import NOT_TRACED, Losses, MeasuredLinks, 
 from swarmwire.comms.radio.phy.packets import PacketsHeld, learned, sent_in_vain
 from swarmwire.comms.radio.phy.params import levels_of, rules_of
 from swarmwire.comms.radio.phy.propagation import Surroundings, surroundings_of
-from swarmwire.comms.radio.phy.results import HEARD, Told, room_for, taken_out
+from swarmwire.comms.radio.phy.results import RECEIVED, Told, room_for, taken_out
 from swarmwire.comms.radio.phy.state import NOTHING, SILENT, State, Table, receptions_of_nothing, robots_at_rest
 from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.comms.radio.stages.chain import chain_after_reception
@@ -52,11 +52,11 @@ class Reports:
         row = (
             parts[0] if len(parts) == 1 else Told._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
         )
-        # An addressed packet may have been heard in an earlier call, and only now be done at its sender.
+        # An addressed packet may have been received in an earlier call, and only now be done at its sender.
         used = (packet["is_done"] > 0) & (packet["is_departed"] == 0)
         used[row.packet] = True
         index, local = np.flatnonzero(used), np.cumsum(used) - 1
-        was_on_air, on_air_at_ns = packet["fate"] == HEARD, packet["on_air_at_ns"].copy()
+        was_on_air, on_air_at_ns = packet["fate"] == RECEIVED, packet["on_air_at_ns"].copy()
         on_air_at_ns[row.packet] = row.on_air_at_ns
         packets = queued.select(index)._replace(
             on_air_at_ns=on_air_at_ns[index],
@@ -90,7 +90,7 @@ class Reports:
     def _would_reach(self, packets: Transmissions, lives: Lives) -> IntArray:
         """How many receivers in range packets would have that never went on air, (packets,)."""
         found = np.zeros(len(packets.sender), np.int64)
-        tried = np.flatnonzero((packets.fate != HEARD) & (packets.fate != Fate.TOO_LARGE))
+        tried = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
         if not len(tried):
             return found
         at, receiver = self._links.reached(packets.sender[tried])
@@ -169,7 +169,7 @@ class SignalWay(Way):
         self._links.tune(self._around(), levels_of(radio, self._rules))
         self._refresh()
 
-    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
         if self._rules.acknowledged:
             self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))

@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.phy.state import NOT_LEARNED, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
@@ -23,7 +23,7 @@ def learned(packet: Table, outcome_id: IntArray) -> Outcomes:
     return Outcomes(packet["sender"][index], outcome_id[index], packet["result"][index])
 
 
-def sent_in_vain(sent: Sent, max_payload_bytes: int) -> Outcomes:
+def sent_in_vain(sent: SentPackets, max_payload_bytes: int) -> Outcomes:
     """Of packets to robots that are not there, what senders learn who ask: nobody answers."""
     index = np.flatnonzero((sent.to == NOWHERE) & (sent.outcome_ids != UNTOLD))
     if not len(index):
@@ -70,7 +70,7 @@ class PacketsHeld:
         return order, np.searchsorted(sender[order], np.arange(rows + 1))
 
     def forget_done(self) -> None:
-        """Packets that are done are gone; those whose one receiver heard them are meant for nobody any more."""
+        """Packets that are done are gone; those whose one receiver received them are meant for nobody any more."""
         settled = self.table["is_settled"] > 0
         kept = np.flatnonzero(self.table["is_done"] == 0)
         self.table["is_departed"] |= settled

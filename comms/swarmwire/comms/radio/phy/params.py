@@ -109,6 +109,6 @@ def rules_of(radio: Radio, robots: int) -> Rules:
 
 def levels_of(radio: Radio, rules: Rules) -> Levels:
     """What power makes of a link."""
-    heard_mw = max(rules.least_mw, rules.least_sinr * rules.noise_mw)
+    received_mw = max(rules.least_mw, rules.least_sinr * rules.noise_mw)
     disturbs = radio.access_or_default.method != "none"
-    return Levels(sensitivity_of(radio), heard_mw, cut_off_dbm(radio) if disturbs else np.inf)
+    return Levels(sensitivity_of(radio), received_mw, cut_off_dbm(radio) if disturbs else np.inf)

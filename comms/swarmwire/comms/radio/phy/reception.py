@@ -71,7 +71,7 @@ def _table(receiver, sinr):
 
 
 RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowledgement")
-HEARD, TOO_WEAK, COLLIDED, JAMMED = int(Fate.HEARD), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
+RECEIVED, TOO_WEAK, COLLIDED, JAMMED = int(Fate.RECEIVED), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 
 
 @borrowing()
@@ -87,7 +87,7 @@ def outcome(rules, losses, state, s, i, log_right):
     is_answer = me.on_air == ACKNOWLEDGEMENT
     if is_answer:
         if not _is_answer(state, s, receiver):
-            return HEARD  # it is nothing to others
+            return RECEIVED  # it is nothing to others
         it = state.robot[receiver]
         sequence, attempt, reception = state.packet[it.packet].sequence, it.attempt, ACKNOWLEDGED
     else:
@@ -154,13 +154,13 @@ def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
     robot, reception, link = state.robot, state.reception, state.link
     if rules.method == ALONE:
         for i in range(me.first_link, me.weak_link):
-            link[i].now = RECEIVING if link[i].fate == HEARD else link[i].fate
+            link[i].now = RECEIVING if link[i].fate == RECEIVED else link[i].fate
         return
     turn_away(state, s)
     dcf.sense(rules, state, queue, s, now_ns)
     first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
     for i in range(first, weak):
-        if link[i].fate != HEARD:
+        if link[i].fate != RECEIVED:
             link[i].now = link[i].fate
             continue
         r = np.int64(link[i].receiver)
@@ -192,7 +192,7 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
     is_sure = takes_none(losses) and me.on_air == DATA
     first, weak, stop = np.uint64(me.first_link), np.uint64(me.weak_link), np.uint64(me.stop_link)
     for i in range(first, weak):
-        if link[i].fate != HEARD:
+        if link[i].fate != RECEIVED:
             continue
         r = np.int64(link[i].receiver)
         it = reception[np.uint64(r)]
@@ -201,10 +201,10 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
         if (it.locked_to == s) & (it.link == np.int64(i)):
             let_go(it)
             if is_sure and it.log_success == 0.0:
-                link[i].now = HEARD
+                link[i].now = RECEIVED
             else:
                 link[i].now = outcome(rules, losses, state, s, np.int64(i), it.log_success)
-            robot[r].trust_from_ns = 0 if link[i].now == HEARD else now_ns + rules.distrust_ns
+            robot[r].trust_from_ns = 0 if link[i].now == RECEIVED else now_ns + rules.distrust_ns
         dcf.sense(rules, state, queue, r, now_ns)
     for i in range(weak, stop):
         r = np.int64(link[i].receiver)

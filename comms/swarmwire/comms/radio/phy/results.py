@@ -45,7 +45,7 @@ def taken_out(room: Told) -> Told:
 # --- Telling: what became of a packet, at its sender's radio or at each receiver.
 
 
-HEARD, BLOCKED, BLACKOUT = int(Fate.HEARD), int(Fate.BLOCKED), int(Fate.BLACKOUT)
+RECEIVED, BLOCKED, BLACKOUT = int(Fate.RECEIVED), int(Fate.BLOCKED), int(Fate.BLACKOUT)
 
 
 @borrowing()
@@ -74,7 +74,7 @@ def give_up_older(state, told, r, newest, now_ns):
 
 @borrowing()
 def report(rules, state, queue, told, r, now_ns):
-    """Tell what became of a frame: at each robot in range, and at those out of range that heard it."""
+    """Tell what became of a frame: at each robot in range, and at those out of range that received it."""
     me = state.robot[r]
     packet = state.packet[me.packet]
     me.last_fate, me.last_in_range, me.last_mw = NOBODY, 0, 0.0
@@ -84,14 +84,14 @@ def report(rules, state, queue, told, r, now_ns):
         return
     for i in range(me.first_link, me.weak_link):
         receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].now), link[i].power_mw
-        if to != receiver or not (link[i].is_listed or fate == HEARD):
+        if to != receiver or not (link[i].is_listed or fate == RECEIVED):
             continue
         in_range = 0 if fate == BLOCKED else 1
         me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
-        if fate == HEARD:
+        if fate == RECEIVED:
             if not packet.is_settled:
                 packet.is_settled = 1
-                _tell(state, told, index, receiver, HEARD, 1, now_ns, hold, power_mw)
+                _tell(state, told, index, receiver, RECEIVED, 1, now_ns, hold, power_mw)
             if rules.acknowledged:
                 state.robot[receiver].answers_to = r
                 schedule(queue, ANSWER, receiver, now_ns + rules.short_space_ns)
@@ -108,7 +108,7 @@ def _tell_all(state, told, r, now_ns):
         told.packet[at], told.receiver[at], told.fate[at] = me.packet, one.receiver, fate
         told.in_range[at], told.final_at_ns[at], told.hold[at] = fate != BLOCKED, now_ns, me.hold
         told.on_air_at_ns[at], told.power_mw[at] = on_air_at_ns, one.power_mw
-        at += np.uint64(one.is_listed | (fate == HEARD))
+        at += np.uint64(one.is_listed | (fate == RECEIVED))
     told.count[0] = at
 
 

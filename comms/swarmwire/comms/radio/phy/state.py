@@ -16,7 +16,7 @@ NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = ran
 KEPT_ALL, KEPT_NEWEST = -1, -2
 # What a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
-RECEIVING = 255  # of a link, beside the fates: the frame on air may still be heard
+RECEIVING = 255  # of a link, beside the fates: the frame on air may still be received
 LONG_AGO_NS = -(10**15)
 NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
 
@@ -88,11 +88,11 @@ PACKET = _rows(
         ("pause_ns", _I),  # silence of its sender after it
         ("refused", _I),  # 0, or the fate that its size gives it
         ("is_entered", _I),
-        ("is_settled", _I),  # its one receiver heard it
+        ("is_settled", _I),  # its one receiver received it
         ("is_done", _I),
         ("is_departed", _I),  # it was reported before, and is not done yet
         ("on_air_at_ns", _I),  # of the latest attempt
-        ("fate", _I),  # that it had at the sender's radio, or HEARD: it was on air
+        ("fate", _I),  # that it had at the sender's radio, or RECEIVED: it was on air
         ("result", _I),  # SendResult, once it is done: what its sender knows
     ]
 )
@@ -103,7 +103,7 @@ LINK = _rows(
         ("power_mw", _F),  # at the receiver, with fading
         ("receiver", np.int32),  # robot row
         ("is_listed", np.bool_),  # mean power reaches the sensitivity
-        ("fate", np.uint8),  # HEARD: open; else what ends every packet here
+        ("fate", np.uint8),  # RECEIVED: open; else what ends every packet here
         ("now", np.uint8),  # of the frame on air: RECEIVING or a fate
     ]
 )
@@ -140,7 +140,7 @@ class State(NamedTuple):
     hold: int  # which poses these are
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
-    off: IntArray  # (rows,) HEARD: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
+    off: IntArray  # (rows,) RECEIVED: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
     jam: Jam
 
 

@@ -148,11 +148,11 @@ def stop(state, queue, told, r, now_ns, fate):
 
 
 def fate_of_sending(held: Disruption) -> IntArray:
-    """What becomes of what each robot should send, (rows,): HEARD if its radio is on."""
+    """What becomes of what each robot should send, (rows,): RECEIVED if its radio is on."""
     if not held.anyone_out:
-        return np.full(len(held.alive), int(Fate.HEARD))
+        return np.full(len(held.alive), int(Fate.RECEIVED))
     off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
-    return np.where(held.alive, np.where(held.radio_on, int(Fate.HEARD), off), int(Fate.SENDER_DEAD))
+    return np.where(held.alive, np.where(held.radio_on, int(Fate.RECEIVED), off), int(Fate.SENDER_DEAD))
 
 
 @borrowing(from_python=True)

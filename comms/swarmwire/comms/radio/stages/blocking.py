@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 
@@ -49,7 +49,7 @@ def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     for i in range(len(ends)):
         # From the lower row to the higher: both directions of a link then agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        if fate[i] != HEARD:
+        if fate[i] != RECEIVED:
             continue
         ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
         if wraps:
@@ -103,7 +103,7 @@ def behind_bodies(x, y, radius_m, cells, robots, sender, receiver, fate):
     ends = np.zeros(len(sender), np.bool_)
     most_radius_m = radius_m.max()
     for i in range(len(ends)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             ends[i] = bodies_between(x, y, radius_m, most_radius_m, cells, robots, sender[i], receiver[i]) > 0
     return ends
 
@@ -130,7 +130,7 @@ class Disrupted(Stage):
         now, receiver = self._disruption, links.receiver
         if not now.anything:
             return
-        under_way = links.fate == HEARD
+        under_way = links.fate == RECEIVED
         for ends, fate in (
             (now.apart(links.sender, receiver), Fate.PARTITIONED),
             (~now.radio_on[receiver], Fate.BLACKOUT),

@@ -13,7 +13,7 @@ from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal_quantile, uniform
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
-from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.measurements import to_sender_m
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 
@@ -76,7 +76,7 @@ DELAY = purpose("delay")
 
 
 class Latency(Stage):
-    """`heard_at = off_air_at + latency + U[0, jitter)`, in integer ns."""
+    """`received_at = off_air_at + latency + U[0, jitter)`, in integer ns."""
 
     name = "latency"
     keys = ("latency_s", "jitter_s")
@@ -91,7 +91,7 @@ class Latency(Stage):
         self._keys, self._robots = medium.keys, medium.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are heard become final later."""
+        """Links that are received become final later."""
         late_ns = delay_ns(
             self._keys,
             self._robots,
@@ -107,13 +107,13 @@ class Latency(Stage):
 
 @njit(cache=True)
 def delay_ns(keys, robots, sender, receiver, sequence, fate, latency_ns, jitter_ns):
-    """What `heard_at` adds, in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
+    """What `received_at` adds, in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
 
     0 for links that ended.
     """
     late_ns = np.zeros(len(sender), np.int64)
     for i in range(len(late_ns)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             late_ns[i] = latency_ns
             if jitter_ns > 0:
                 key = keys[sender[i] // robots]
@@ -129,7 +129,7 @@ DELAYS = purpose("delays")
 
 
 class VaryingDelay(Stage):
-    """`heard_at` is later by a quantile of the distribution."""
+    """`received_at` is later by a quantile of the distribution."""
 
     name = "varying_delay"
     keys = ("delays",)
@@ -144,7 +144,7 @@ class VaryingDelay(Stage):
         self._law, self._keys, self._robots = delay_law(medium.radio.delays), medium.keys, medium.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are heard become final later."""
+        """Links that are received become final later."""
         late_ns = drawn_ns(
             self._law, self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate
         )
@@ -153,10 +153,10 @@ class VaryingDelay(Stage):
 
 @njit(cache=True)
 def drawn_ns(law, keys, robots, sender, receiver, sequence, fate):
-    """What `heard_at` adds, in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
+    """What `received_at` adds, in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
     late_ns = np.zeros(len(sender), np.int64)
     for i in range(len(late_ns)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             s, r = sender[i], receiver[i]
             late_ns[i] = varying_delay_ns(law, uniform(keys[s // robots], s % robots, r % robots, sequence[i], DELAYS))
     return late_ns
@@ -166,7 +166,7 @@ def drawn_ns(law, keys, robots, sender, receiver, sequence, fate):
 
 
 class PropagationDelay(Stage):
-    """`heard_at` is later by distance / speed, with the distance between the centres when the packet went on air."""
+    """`received_at` is later by distance / speed, with the distance between the centres when the packet went on air."""
 
     name = "propagation_delay"
     keys = ("propagation_mps",)
@@ -181,17 +181,17 @@ class PropagationDelay(Stage):
         self._speed_mps, self._wrap_m = speed_mps, wrap_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are heard become final later."""
+        """Links that are received become final later."""
         late_ns = travel_ns(pose, links.sender, links.receiver, links.fate, self._speed_mps, self._wrap_m)
         np.add(links.final_at_ns, late_ns, out=links.final_at_ns)
 
 
 @njit(cache=True)
 def travel_ns(pose, sender, receiver, fate, speed_mps, wrap_m):
-    """What `heard_at` adds, in whole ns (rounded down), (k,); 0 for links that ended."""
+    """What `received_at` adds, in whole ns (rounded down), (k,); 0 for links that ended."""
     late_ns = np.zeros(len(sender), np.int64)
     for i in range(len(late_ns)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             dx, dy = to_sender_m(pose, sender[i], receiver[i], wrap_m)
             late_ns[i] = np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
     return late_ns

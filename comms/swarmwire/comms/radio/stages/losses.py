@@ -10,7 +10,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 from swarmwire.comms.radio.traces import LinkTrace
@@ -47,7 +47,7 @@ def lost(keys, robots, sender, receiver, sequence, fate, loss):
     """Which of the links under way are lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(ends)):
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             key = keys[sender[i] // robots]
             ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], LOSS) < loss
     return ends
@@ -82,7 +82,7 @@ class BurstLoss(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links end that a burst takes; they were in range. A link's packets come in the order of their time."""
-        index = np.flatnonzero(links.fate == HEARD)
+        index = np.flatnonzero(links.fate == RECEIVED)
         index = index[np.argsort(links.final_at_ns[index], kind="stable")]
         sender, receiver, at_ns = links.sender[index], links.receiver[index], links.final_at_ns[index]
         ends = self._states.lost(sender, receiver, links.sequence[index], at_ns)
@@ -121,13 +121,13 @@ class Replay(Stage):
         self._only_delays = medium.radio.is_signal
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links end that are lost, or that nobody measured; those that are heard become final later."""
+        """Links end that are lost, or that nobody measured; those that are received become final later."""
         sender, receiver = links.sender % self._robots, links.receiver % self._robots
         if not self._only_delays:
             self._end(links, sender, receiver)
         if self._traces.delay_s is not None:
             delay_s = np.nan_to_num(self._traces.delay_s.at(sender, receiver, links.final_at_ns))
-            late_ns = np.where(links.fate == HEARD, np.round(delay_s * NS_PER_S), 0.0)
+            late_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
             np.add(links.final_at_ns, late_ns.astype(np.int64), out=links.final_at_ns)
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
@@ -136,7 +136,7 @@ class Replay(Stage):
         return np.minimum(self._ratio(a, b, links.final_at_ns), self._ratio(b, a, links.final_at_ns))
 
     def _end(self, links: Links, sender: IntArray, receiver: IntArray) -> None:
-        under_way, at_ns = links.fate == HEARD, links.final_at_ns
+        under_way, at_ns = links.fate == RECEIVED, links.final_at_ns
         if self._others_end:
             ends = under_way & ~self._traces.known(sender, receiver, at_ns)
             links.fate[ends] = Fate.OUT_OF_RANGE
@@ -160,7 +160,7 @@ def trace_lost(keys, robots, sender, receiver, sequence, fate, ratio):
     """Which of the links under way are lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(ends)):
-        if fate[i] == HEARD and ratio[i] < 1.0:
+        if fate[i] == RECEIVED and ratio[i] < 1.0:
             key = keys[sender[i] // robots]
             ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], TRACE) >= ratio[i]
     return ends

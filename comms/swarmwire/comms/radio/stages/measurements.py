@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 
 
@@ -76,7 +76,7 @@ def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_
     out_m = np.zeros(len(sender))
     for i in range(len(out_m)):
         s, r = sender[i], receiver[i]
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             dx, dy = to_sender_m(pose, s, r, wrap_m)
             out_m[i] = np.sqrt(dx * dx + dy * dy)
             if noise_m > 0.0:
@@ -117,7 +117,7 @@ def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, no
     out_rad = np.zeros(len(sender))
     for i in range(len(out_rad)):
         s, r = sender[i], receiver[i]
-        if fate[i] == HEARD:
+        if fate[i] == RECEIVED:
             dx, dy = to_sender_m(pose, s, r, wrap_m)
             bearing = np.arctan2(dy, dx) - pose[r, 2]
             if noise_rad > 0.0:
@@ -162,7 +162,7 @@ class GivenRssi(Stage):
         noise_db = error_db(
             self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, self._noise_db
         )
-        links.given[:, self._column] = np.where(links.fate == HEARD, links.rssi_dbm, 0.0) + noise_db
+        links.given[:, self._column] = np.where(links.fate == RECEIVED, links.rssi_dbm, 0.0) + noise_db
 
 
 @njit(cache=True)
@@ -170,7 +170,7 @@ def error_db(keys, robots, sender, receiver, sequence, fate, noise_db):
     """The error noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; in dB, (k,)."""
     out_db = np.zeros(len(sender))
     for i in range(len(out_db)):
-        if fate[i] == HEARD and noise_db > 0.0:
+        if fate[i] == RECEIVED and noise_db > 0.0:
             s, r = sender[i], receiver[i]
             out_db[i] = noise_db * normal(keys[s // robots], s % robots, r % robots, sequence[i], RSSI_NOISE)
     return out_db

@@ -51,8 +51,8 @@ class Stage(ABC):
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Give a fate to links that end here, or change what becomes of the others; in place.
 
-        Only links with fate HEARD are still under way. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in m, heading.
-        A stage before reception that ends a link also sets its `in_range` to 0.
+        Only links with fate RECEIVED are still under way. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in m,
+        heading. A stage before reception that ends a link also sets its `in_range` to 0.
         """
 
     def go_on_from(self, before: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages remember nothing

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import HEARD, Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.model import Decided, Way
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import Medium
@@ -51,7 +51,7 @@ class Channel:
         if lives.any_dead:
             meant = lives.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[meant], receiver[meant]
-        refused, in_range = packets.fate != HEARD, np.zeros(len(packets.sender), np.int64)
+        refused, in_range = packets.fate != RECEIVED, np.zeros(len(packets.sender), np.int64)
         if refused.any():
             never = refused[packet]
             in_range = self._would_reach(packets, packet[never], receiver[never], pose)
@@ -128,7 +128,7 @@ class DiskWay(Way):
         self._senders.tune(radio)
         self._channel.tune(at_ns, replace(self._medium, radio=radio))
 
-    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets: when they will go on air, or be refused, is known at once."""
         return self._senders.accept(sent_at_ns, sent, others_alive, epoch)
 

@@ -6,12 +6,12 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.packets import Fate, Sent
+from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import Intake, Transmissions
 
-ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.HEARD), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
+ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 
 
 @njit(cache=True)
@@ -153,7 +153,7 @@ class Senders:
         """The radio has other numbers for packets to come."""
         self._radio = radio
 
-    def accept(self, sent_at_ns: IntArray, sent: Sent, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """The packets as the radios take them up, sorted by sender; also kept in `queued`.
 
         `sent_at_ns` (rows,) is when each robot hands its packets over, `others_alive` (rows,) are the receivers that a

@@ -41,7 +41,7 @@ def fit_command(
     is for a radio that has a model or a range of its own.
 
     Robots' networks tell no strengths: of their logs range, losses and latencies are fitted, and the delivery of
-    each link is told. Every row is a packet that arrived; what was sent and not heard was lost.
+    each link is told. Every row is a packet that arrived; what was sent and not received was lost.
     """
     from rich.console import Console
 

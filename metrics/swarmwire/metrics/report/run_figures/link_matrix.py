@@ -37,7 +37,9 @@ def link_matrix(static: Static, pdr: FloatArray) -> Any:
     for group in static.groups[1:]:
         for line in (axes.axhline, axes.axvline):
             line(group.start - 0.5, color=PAPER, lw=1.2)
-    axes.set_title("percent heard, by sender (rows) and receiver", loc="left", fontsize=SMALL_PT + 1, color=SOFT, pad=4)
+    axes.set_title(
+        "percent received, by sender (rows) and receiver", loc="left", fontsize=SMALL_PT + 1, color=SOFT, pad=4
+    )
     below = figure.add_axes(((COLUMN_IN - 1.7) / COLUMN_IN, 0.26 / height_in, 1.5 / COLUMN_IN, _BAR_IN / height_in))
     bar = figure.colorbar(shown, cax=below, orientation="horizontal", ticks=[0.0, 0.5, 1.0], format="{x:.0%}")
     bar.outline.set_visible(False)

@@ -41,7 +41,7 @@ def _latencies(radio: dict[str, Any], arenas: int) -> Table:
     )
     of = ", of the first arena" if arenas > 1 else ""
     return Table(
-        ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets heard{of}."
+        ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets received{of}."
     )
 
 

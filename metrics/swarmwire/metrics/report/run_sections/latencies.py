@@ -17,16 +17,16 @@ def latencies(run: RunData) -> Figure | str:
     packets = run.packets(COLUMNS)
     if isinstance(packets, str):
         return f"Latencies of single packets: {packets}"
-    heard = packets.filter(packets["fate"].cast(str) == FATE_NAMES[Fate.HEARD])
-    if not len(heard):
-        return "Latencies: no packet was heard."
-    receiver, _, sent_ns, final_ns = (heard[name] for name in COLUMNS)
+    received = packets.filter(packets["fate"].cast(str) == FATE_NAMES[Fate.RECEIVED])
+    if not len(received):
+        return "Latencies: no packet was received."
+    receiver, _, sent_ns, final_ns = (received[name] for name in COLUMNS)
     sent = sent_ns.to_numpy()
     final = final_ns.to_numpy()
     acts = acts_at_ns(final, receiver.to_numpy(), run.static)
     figure = latency_histogram((final - sent) / NS_PER_S, (acts - sent) / NS_PER_S)
     caption = (
-        "Latency of packets that were heard: from sending to hearing, and to the first tick at which the receiver "
+        "Latency of packets that were received: from sending to hearing, and to the first tick at which the receiver "
         "acts. Lines are p50, p90 (dashed) and p99 (dotted)."
     )
     recorded = run.record("packets").get("share", 1.0)
@@ -36,7 +36,7 @@ def latencies(run: RunData) -> Figure | str:
 
 
 def acts_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> IntArray:
-    """When the receivers (k,) could act on what they heard at these times (k,), in ns: at the next tick of theirs."""
+    """When the receivers (k,) could act on what they received at times (k,), in ns: at their next tick."""
     tick = -(-final_at_ns * static.rate_hz // NS_PER_S)
     every = static.act_every_ticks[receiver]
     return -(-tick // every) * every * NS_PER_S // static.rate_hz

@@ -26,12 +26,14 @@ def links(run: RunData) -> Figure | str:
     found = _counted(run)
     if isinstance(found, str):
         return f"Delivery by link: {found}"
-    heard, in_range = of_links(found, run.static.robots)
+    received, in_range = of_links(found, run.static.robots)
     if not in_range.any():
         return "Delivery by link: nobody was in range of anybody."
-    pdr = np.divide(heard, in_range, out=np.full(heard.shape, np.nan), where=in_range > 0)
+    pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MAX_SQUARES:
-        caption = "Delivery ratio of each link: heard, of the packets on air while the receiver was in range and sight."
+        caption = (
+            "Delivery ratio of each link: received, of the packets on air while the receiver was in range and sight."
+        )
         return Figure(NAME, as_svg(link_matrix(run.static, pdr), NAME), caption)
     told = pdr[in_range >= MIN_PACKETS]
     if not len(told):
@@ -58,14 +60,14 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
 
 
 def of_links(table: "pl.DataFrame", robots: int) -> tuple[IntArray, IntArray]:
-    """Of packets by sender, receiver and fate: those heard, and those with the receiver in range, (n, n) each.
+    """Of packets by sender, receiver and fate: those received, and those with the receiver in range, (n, n) each.
 
     In range is as in the radio's account: whatever became of the packet, unless an obstacle was in the way.
     """
     fate = table["fate"].cast(str).to_numpy()
     place = table["sender"].to_numpy(), table["receiver"].to_numpy()
     packets = table["packets"].to_numpy()
-    heard, in_range = (np.zeros((robots, robots), np.int64) for _ in range(2))
-    np.add.at(heard, place, np.where(fate == FATE_NAMES[Fate.HEARD], packets, 0))
+    received, in_range = (np.zeros((robots, robots), np.int64) for _ in range(2))
+    np.add.at(received, place, np.where(fate == FATE_NAMES[Fate.RECEIVED], packets, 0))
     np.add.at(in_range, place, np.where(fate != FATE_NAMES[Fate.BLOCKED], packets, 0))
-    return heard, in_range
+    return received, in_range

@@ -36,7 +36,7 @@ def _again(run: RunData) -> str:
 
 def _account(radio: dict[str, Any], arenas: int) -> str:
     sent, intended, in_range, pdr = (radio.get(key) for key in ("sent", "intended", "in_range", "pdr"))
-    heard = f"; {share(pdr)} of these heard it" if isinstance(pdr, float) else ""
+    received = f"; {share(pdr)} of these received it" if isinstance(pdr, float) else ""
     where = "In the first arena " if arenas > 1 else ""
-    reached = f"meant for {intended:,} receivers, of which {in_range:,} were in range{heard}"
+    reached = f"meant for {intended:,} receivers, of which {in_range:,} were in range{received}"
     return f"{where}{sent:,} packets were sent, {reached}."

@@ -30,7 +30,7 @@ SECOND = (  # small, where they have a value that changes
 _WHOLE = ("components",)
 _MAX_LANES = 8
 _MAX_EVENTS = 200
-_TITLES = {DELIVERY: "delivery: heard / in range, last second"}
+_TITLES = {DELIVERY: "delivery: received / in range, last second"}
 
 
 def what_happened(run: RunData) -> Section:

@@ -119,7 +119,7 @@ def _hash(run: RunData) -> list[str]:
     if run.summary is None:
         return []
     of = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
-    same = "equal exactly where two runs moved and heard the same"
+    same = "equal exactly where two runs moved and received the same"
     return [f"{of}: `{run.summary['trajectory_sha256'][0]}`; {same}."]
 
 

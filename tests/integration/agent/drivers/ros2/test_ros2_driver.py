@@ -47,7 +47,7 @@ def tell_everything(base: RosBase) -> None:
     base.tell("illuminance_1", independent.Illuminance(independent.header(), 5000.0, 0.0))
 
 
-def heard_all(fields) -> bool:
+def received_all(fields) -> bool:
     return (
         np.isfinite(fields["scan.range_m"]).all()
         and fields["odometry.left_m"][0] > 0.0
@@ -61,7 +61,7 @@ def test_what_a_base_tells_is_sensed_in_the_units_and_signs_of_senses(transport)
     with base_and_driver(transport) as (base, driver):
         assert driver.gives == ALL
         tell_everything(base)
-        fields = until(lambda: driver.sense(ALL), heard_all)
+        fields = until(lambda: driver.sense(ALL), received_all)
     assert fields.keys() == {
         *("scan.range_m", "proximity.value", "odometry.left_m", "odometry.right_m", "imu.forward_mps2"),
         *(
@@ -93,7 +93,7 @@ def test_what_a_base_tells_is_sensed_in_the_units_and_signs_of_senses(transport)
 
 
 @TRANSPORTS
-def test_only_what_was_asked_for_is_told_and_lost_until_it_is_heard(transport):
+def test_only_what_was_asked_for_is_told_and_lost_until_it_is_received(transport):
     with base_and_driver(transport) as (_, driver):
         assert driver.sense(frozenset({"compass"})).keys() == {"compass.heading_rad"}
         lost = driver.sense(ALL)
@@ -115,9 +115,9 @@ def test_commands_arrive_and_again_and_again_until_a_stop_from_another_thread(tr
         thread.start()
         thread.join()
         until(base.command, lambda told: told == (0.0, 0.0))
-        count = len(base.heard)
+        count = len(base.received)
         driver.close()
-        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.heard[count - 1 :])
+        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.received[count - 1 :])
 
 
 def test_each_message_to_rmw_has_an_attachment_that_zenoh_itself_reads():
@@ -179,7 +179,7 @@ def test_a_base_that_sees_nothing_yet_stays_at_rest(transport):
         until(lambda: driver.sense(frozenset({"scan"})), lambda fields: np.isfinite(fields["scan.range_m"]).all())
         driver.act(Command(0.1))
         until(base.command, lambda told: told[0] == 0.1)
-        assert {told.linear.x for told in base.heard} == {0.0, 0.1}
+        assert {told.linear.x for told in base.received} == {0.0, 0.1}
         assert driver.counts()["held_back"] == 1
 
 
@@ -220,7 +220,7 @@ def test_a_base_that_was_cut_off_is_lost_and_comes_back_with_motors_at_rest(tran
             driver.open()
             assert again.command() == (0.0, 0.0)
             tell_everything(again)
-            until(lambda: driver.sense(ALL), heard_all)
+            until(lambda: driver.sense(ALL), received_all)
             assert driver.counts()["reconnections"] == 1
         finally:
             driver.close()
@@ -267,7 +267,7 @@ def test_a_command_that_is_not_finite_is_a_stop():
         driver.act(Command(nan, 0.5))
         until(lambda: driver.counts().get("not_finite", 0))
         base.command()
-        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.heard)
+        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.received)
 
 
 def test_topics_and_namespace_are_of_the_users_choice():

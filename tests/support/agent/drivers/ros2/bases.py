@@ -40,14 +40,14 @@ class RosBase:
     """One base named flock_1 behind a bridge, or of rmw_zenoh.
 
     Attributes:
-        heard: the commands that it got, in order.
+        received: the commands that it got, in order.
         attached: what came with them.
     """
 
     def __init__(self, transport: str, stamped: bool = False, endpoint: str = "tcp/127.0.0.1:0") -> None:
         self.transport, self.stamped = transport, stamped
         self.session, self.address = open_router(endpoint)
-        self.heard: list[independent.Twist] = []
+        self.received: list[independent.Twist] = []
         self.attached: list[bytes | None] = []
         self.came = threading.Semaphore(0)
         kind = f"geometry_msgs/msg/Twist{'Stamped' if stamped else ''}"
@@ -70,7 +70,7 @@ class RosBase:
     def command(self) -> tuple[float, float]:
         """The next command: linear and angular."""
         assert self.came.acquire(timeout=20.0)
-        told = self.heard[-1]
+        told = self.received[-1]
         return told.linear.x, told.angular.z
 
     def close(self) -> None:
@@ -80,7 +80,7 @@ class RosBase:
         payload = sample.payload.to_bytes()
         kind = independent.TwistStamped if self.stamped else independent.Twist
         message = kind.deserialize(payload)
-        self.heard.append(message.twist if self.stamped else message)
+        self.received.append(message.twist if self.stamped else message)
         self.attached.append(sample.attachment and sample.attachment.to_bytes())
         self.came.release()
 

@@ -35,7 +35,7 @@ class StepClock:
         self._wakes.release()
 
 
-class Sent:
+class SentPackets:
     def __init__(self) -> None:
         self.clock, self.commands = StepClock(), []
         self.commander = Commander(self.commands.append, self.clock)
@@ -54,14 +54,14 @@ class Sent:
 
 
 def test_it_begins_with_a_stop_which_goes_out_some_times_and_no_more():
-    sent = Sent()
+    sent = SentPackets()
     assert sent.commands == [STOP]
     assert sent.steps(10) == [STOP] * STOPS
     sent.end()
 
 
 def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
-    sent = Sent()
+    sent = SentPackets()
     sent.commander.tell(DRIVE)
     assert sent.commands[-1] == DRIVE
     before_ns = sent.clock.time_ns
@@ -71,7 +71,7 @@ def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
 
 
 def test_after_a_stop_from_any_thread_no_command_goes_out_again():
-    sent = Sent()
+    sent = SentPackets()
     sent.commander.tell(DRIVE)
     sent.steps(3)
     thread = threading.Thread(target=sent.commander.tell, args=(STOP,))
@@ -85,7 +85,7 @@ def test_after_a_stop_from_any_thread_no_command_goes_out_again():
 
 
 def test_the_end_is_a_stop_and_after_it_nothing_goes_out():
-    sent = Sent()
+    sent = SentPackets()
     sent.commander.tell(DRIVE)
     sent.end()
     assert sent.commands[-1] == STOP

@@ -48,22 +48,22 @@ def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
     assert 50 < len(edges) < len(a) - 50
 
 
-def test_the_mean_strength_is_that_of_packets_heard():
+def test_the_mean_strength_is_that_of_packets_received():
     pose = scattered(ROBOTS)
     told = run(make_air(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
-    heard = told.finished("fate") == 0
-    sender, receiver = told.finished("sender")[heard], told.finished("receiver")[heard]
+    received = told.finished("fate") == 0
+    sender, receiver = told.finished("sender")[received], told.finished("receiver")[received]
     mean_dbm = coverage_of(SHADED, OBSTACLES).mean_dbm(pose[sender, :2], pose[receiver, :2])
     assert len(sender) > 200
     assert mean_dbm is not None
     # The air's links have their shadowing in single precision.
-    off_db = np.abs(told.finished("rssi_dbm")[heard] - mean_dbm)
+    off_db = np.abs(told.finished("rssi_dbm")[received] - mean_dbm)
     assert np.median(off_db) < 1e-4
     assert off_db.max() < 0.1
 
 
 @pytest.mark.parametrize("fading", [None, Fading("rayleigh"), Fading("rician", k=3.0), Fading("nakagami", m=0.7)])
-def test_delivery_is_the_share_of_lone_packets_that_are_heard(fading: Fading | None):
+def test_delivery_is_the_share_of_lone_packets_that_are_received(fading: Fading | None):
     """A pair in each of a thousand arenas, whose fading is their own, where about half of the packets get through."""
     radio, x_m = replace(WEAK, fading=fading), np.linspace(-2.0, 2.9, 500)
     end = np.stack([x_m, np.zeros(500)], axis=1)
@@ -72,7 +72,7 @@ def test_delivery_is_the_share_of_lone_packets_that_are_heard(fading: Fading | N
     expected, pose = float(delivery[halfway]), at((-2.9, 0.0), (x_m[halfway], 0.0))
     air = make_air(radio, 2, range(1000))
     told = run(air, np.tile(pose, (1000, 1)), lambda _: packets(range(0, 2000, 2)), 1, 1)
-    share = len(told.heard("receiver")) / 1000
+    share = len(told.received("receiver")) / 1000
     assert 0.3 < expected < 0.7
     # The coverage's own sample of gains, twice as many, has an error, too.
     assert abs(share - expected) < 4.4 * np.sqrt(1.5 * expected * (1.0 - expected) / 1000)

@@ -63,10 +63,10 @@ def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
     radio = replace(preset(name), shadowing=None, send_offset="tick")
     range_m = range_of(radio)
     assert range_m is not None
-    for share, heard in ((0.5, True), (1.3, False)):
+    for share, received in ((0.5, True), (1.3, False)):
         # One sends: two modems that call at once would not hear each other.
         told = run(make_air(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
-        assert told.fates() == ({"HEARD": 1} if heard else {"OUT_OF_RANGE": 1})
+        assert told.fates() == ({"RECEIVED": 1} if received else {"OUT_OF_RANGE": 1})
 
 
 def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
@@ -103,14 +103,14 @@ def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
 
 
 @pytest.mark.parametrize("model", ["disk", "log-distance"])
-def test_what_is_slow_is_heard_later_with_distance(model: str):
+def test_what_is_slow_is_received_later_with_distance(model: str):
     """150 m at 1500 m/s take 100 ms, 75 m half of it; of the disk and of signals."""
     place = at((0, 0), (75, 0), (150, 0))
     radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
     for speed_mps, later_ns in ((None, [0, 0]), (1500.0, [50_000_000, 100_000_000])):
         slow = replace(radio, propagation_mps=speed_mps)
         told = run(make_air(slow, 3), place, lambda _: packets([0]), 1, 3)
-        assert (told.heard("heard_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
+        assert (told.received("received_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
 
 
 def test_fading_of_sound_goes_by_its_own_wavelength():
@@ -128,7 +128,7 @@ def test_fading_of_sound_goes_by_its_own_wavelength():
 
 
 def test_advertisements_collide_as_in_pure_aloha():
-    """9 others, each on air 376 us in 10 ms: heard if none starts 376 us before or after; 800 packets x 9."""
+    """9 others, each on air 376 us in 10 ms: received if none starts 376 us before or after; 800 packets x 9."""
     found = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
     assert found.packets == 800
     assert found.delivery_ratio == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)

@@ -64,7 +64,7 @@ def test_fates_add_up_to_intended_receivers(radio: Radio, arenas: int, robots: i
 
 @given(radios(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
 def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int, seed: int):
-    """Heard packets, listed links and the tally tell the same story; no receiver has two fates."""
+    """Received packets, listed links and the tally tell the same story; no receiver has two fates."""
     told = random_run(radio, arenas, robots, seed, 2)
     for one in told.news:
         listed = np.zeros_like(one.tally.fates)
@@ -72,8 +72,8 @@ def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int
         but_far = [fate for fate in Fate if fate != Fate.OUT_OF_RANGE]
         np.testing.assert_array_equal(listed[:, but_far], one.tally.fates[:, but_far])
         assert not listed[:, Fate.OUT_OF_RANGE].any()
-        assert len(one.heard) == listed[:, Fate.HEARD].sum()
-        assert (one.tally.in_range >= listed[:, Fate.HEARD]).all()
+        assert len(one.received) == listed[:, Fate.RECEIVED].sum()
+        assert (one.tally.in_range >= listed[:, Fate.RECEIVED]).all()
     columns = np.column_stack([told.on_air(name) for name in ("arena", "sender", "sequence", "receiver")])
     assert len(np.unique(columns, axis=0)) == len(columns)
 
@@ -140,13 +140,13 @@ def test_a_full_queue_counts_whom_it_kept_waiting():
     """Five frames of 90 ms, room for one: three are refused, each with its two receivers in range."""
     radio = replace(with_access("aloha"), bit_rate_bps=2400, queue_limit=1)
     told = run(make_air(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
-    assert told.fates() == {"HEARD": 4, "QUEUE_FULL": 6}
+    assert told.fates() == {"RECEIVED": 4, "QUEUE_FULL": 6}
     assert told.tally.in_range.tolist() == [10]
 
 
 def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
     pose = at((-1, -2), (-1, 2), (-2.8, -2))
-    for asked, fates in ((True, {"HEARD": 4, "BLOCKED": 2}), (False, {"HEARD": 6})):
+    for asked, fates in ((True, {"RECEIVED": 4, "BLOCKED": 2}), (False, {"RECEIVED": 6})):
         radio = replace(with_access("none"), line_of_sight=asked)
         told = run(make_air(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
         assert told.fates() == fates
@@ -202,8 +202,8 @@ def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
     told.news.append(air.advance(5 * TICK_NS))
     told.last = air.end()
     refused = {
-        0: {"HEARD": 1, "OUT_OF_RANGE": 1, "QUEUE_FULL": 4},
-        9: {"HEARD": 3, "OUT_OF_RANGE": 2, "RECEIVER_DEAD": 1},
+        0: {"RECEIVED": 1, "OUT_OF_RANGE": 1, "QUEUE_FULL": 4},
+        9: {"RECEIVED": 3, "OUT_OF_RANGE": 2, "RECEIVER_DEAD": 1},
     }
     assert told.fates() == refused[queue_limit]
     assert told.tally.intended.tolist() == [6]
@@ -219,7 +219,7 @@ def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
     held.alive[0] = False
     air.disrupt(held)
     told.news += [air.advance(TICK_NS), air.advance(5 * TICK_NS)]
-    assert told.fates() == {"HEARD": 2, "SENDER_DEAD": 1}
+    assert told.fates() == {"RECEIVED": 2, "SENDER_DEAD": 1}
     assert told.tally.in_range.tolist() == [3]
 
 
@@ -233,5 +233,5 @@ def test_ranges_are_those_at_which_frames_went_on_air():
         air.hold(at((0, 0), (x_m, 0)), alive)
         air.send(tick * TICK_NS, tick, packets([sender], size=size))
     told.news.append(air.advance(4 * TICK_NS))
-    assert [len(one.heard.receiver) for one in told.news] == [0, 0, 2, 1]
+    assert [len(one.received.receiver) for one in told.news] == [0, 0, 2, 1]
     assert told.given("range_m").tolist() == pytest.approx([2.0, 1.0, 4.0])  # by receiver

@@ -1,4 +1,7 @@
-"""Over signals, how time, world or backend are divided changes nothing; each fate is computed once more from its draws."""
+"""Over signals, how time, world or backend are divided changes nothing.
+
+Each fate is computed once more from its draws.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +11,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.draws import derive_key, purpose, uniform
-from swarmwire.comms.packets import BROADCAST, Fate, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, Fate, SendResult, SentPackets
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.losses import passing_share
 from swarmwire.comms.radio.phy.params import rules_of
@@ -20,19 +23,19 @@ ROBOTS = 8
 
 
 def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
-    """Everything heard and every other fate in one arena."""
+    """Everything received and every other fate in one arena."""
     rows: list[tuple[object, ...]] = []
     for one in told.news:
-        h, f = one.heard, one.finished
+        h, f = one.received, one.finished
         for i in np.flatnonzero(h.receiver // ROBOTS == arena):
             given = tuple(column[i] for column in h.given.values())
-            rows.append((h.receiver[i] % ROBOTS, h.sender[i], h.sequence[i], h.heard_at_ns[i], *given))
+            rows.append((h.receiver[i] % ROBOTS, h.sender[i], h.sequence[i], h.received_at_ns[i], *given))
         columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
         rows += [tuple(column[i] for column in columns) for i in np.flatnonzero(f.arena == arena)]
     return sorted(rows)
 
 
-def traffic(arenas: int) -> Sent:
+def traffic(arenas: int) -> SentPackets:
     """Each robot sends two broadcasts and one packet to its neighbour."""
     sender = np.repeat(np.arange(arenas * ROBOTS), 3)
     to = np.where(np.arange(len(sender)) % 3 == 2, (sender + 1) % ROBOTS, BROADCAST)
@@ -70,7 +73,7 @@ def test_an_arena_alone_gives_the_same_as_beside_others(method: str):
 def test_the_order_among_senders_is_indifferent():
     pose, sent = scattered(ROBOTS) * [20.0, 20.0, 1.0], traffic(1)
     index = np.arange(len(sent)).reshape(ROBOTS, 3)[::-1].ravel()
-    mixed = Sent(sent.sender[index], sent.to[index], sent.payloads.rows(index))
+    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
     radio = drawing("csma-802154")
     runs = [run(make_air(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
     assert story(runs[0]) == story(runs[1])
@@ -97,8 +100,8 @@ def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
     pose = np.zeros((22, 3))
     pose[1:, 0] = -far_m
     pose[1, 0] = near_m
-    heard = {
-        (senders, cut_off_db): heard_from_1_at_0(
+    received = {
+        (senders, cut_off_db): received_from_1_at_0(
             run(
                 make_air(replace(radio, cut_off_db=cut_off_db), 22),
                 pose,
@@ -108,13 +111,13 @@ def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
         )
         for senders, cut_off_db in ((2, 10.0), (22, 8.0), (22, 10.0))
     }
-    assert heard[2, 10.0] == heard[22, 8.0] > 20
-    assert heard[22, 10.0] < 10
+    assert received[2, 10.0] == received[22, 8.0] > 20
+    assert received[22, 10.0] < 10
 
 
-def heard_from_1_at_0(told: Run) -> int:
-    """How many packets robot 0 heard from robot 1."""
-    return sum(int(np.sum((one.heard.receiver == 0) & (one.heard.sender == 1))) for one in told.news)
+def received_from_1_at_0(told: Run) -> int:
+    """How many packets robot 0 received from robot 1."""
+    return sum(int(np.sum((one.received.receiver == 0) & (one.received.sender == 1))) for one in told.news)
 
 
 SEEDS = (3, 8)
@@ -143,13 +146,13 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
     likely = lone_deliveries(rules_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
     is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
     assert 0 < np.count_nonzero(is_right) < len(is_right)
-    heard = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
+    received = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
     expected = zip(arena[is_right].tolist(), sender[is_right].tolist(), sequence[is_right].tolist(), strict=True)
-    assert sorted(heard) == sorted(expected)
+    assert sorted(received) == sorted(expected)
 
 
 def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
-    """A packet is sent up to three times, until an answer to it is right; it is heard if one of its frames is."""
+    """A packet is sent up to three times, until an answer to it is right; it is received if one of its frames is."""
     radio = with_access("csma-802154")
     radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
     rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
@@ -159,11 +162,11 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
     right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
-    heard = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
-    assert heard == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
+    received = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
+    assert received == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
     acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(SendResult.ACKNOWLEDGED))
     assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
-    assert 20 < len(acknowledged) < len(heard) < 2 * ticks - 20
+    assert 20 < len(acknowledged) < len(received) < 2 * ticks - 20
 
 
 @pytest.mark.parametrize("loss", [0.3, 1.0])
@@ -171,14 +174,14 @@ def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     radio = replace(with_access("none"), send_offset="tick", loss=loss)
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
     told = run(make_air(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
-    fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.HEARD)
+    fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.RECEIVED)
     assert on_air(told, "fate").tolist() == fate.tolist()
 
 
-def asking(senders: list[int]) -> Callable[[int], Sent]:
+def asking(senders: list[int]) -> Callable[[int], SentPackets]:
     """A packet in each tick from each of these to robot 1 of its arena, whose outcome it asks for, by the tick."""
     sent = packets(senders, 1)
-    return lambda tick: Sent(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
+    return lambda tick: SentPackets(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
 
 
 def learned(told: Run) -> list[tuple[int, int, int]]:
@@ -196,7 +199,7 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
     for attempt in range(attempts):
         if uniform(key, 0, 1, sequence, purpose("fixed loss") + attempt) < loss:
             continue
-        fate = Fate.HEARD
+        fate = Fate.RECEIVED
         if uniform(key, 1, 0, sequence, purpose("fixed loss of an acknowledgement") + attempt) >= loss:
             return fate, SendResult.ACKNOWLEDGED
     return fate, SendResult.NO_ACKNOWLEDGEMENT
@@ -220,7 +223,7 @@ def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
     radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
     fates = run(make_air(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
-    assert set(fates) == {"HEARD", "BURST"}
+    assert set(fates) == {"RECEIVED", "BURST"}
     assert min(fates.values()) > 50
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import Fate, Sent
+from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
 from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
 from swarmwire.comms.radio.medium import Air
@@ -27,7 +27,7 @@ def jammers(*rows: dict[str, Any]) -> Jammers:
     return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
 
 
-def ran(air: Air, pose: FloatArray, sent: Sent, now: Jammers, ticks: int = 20, quiet_ticks: int = 3) -> Run:
+def ran(air: Air, pose: FloatArray, sent: SentPackets, now: Jammers, ticks: int = 20, quiet_ticks: int = 3) -> Run:
     """The same is sent in each tick, while these jammers stand."""
     told, held = Run(air), Disruption.none(len(pose))
     held.jammers = now
@@ -42,8 +42,8 @@ def ran(air: Air, pose: FloatArray, sent: Sent, now: Jammers, ticks: int = 20, q
     return told
 
 
-def heard(told: Run) -> list[tuple[int, ...]]:
-    return list(zip(*(told.heard(name).tolist() for name in ("receiver", "sender", "sequence")), strict=True))
+def received(told: Run) -> list[tuple[int, ...]]:
+    return list(zip(*(told.received(name).tolist() for name in ("receiver", "sender", "sequence")), strict=True))
 
 
 # Senders that collide now and then, around a receiver that hears some of them barely.
@@ -59,10 +59,10 @@ def test_a_jammer_is_noise_of_the_same_power(rise_db: float):
     power_dbm = NOISE_DBM + NEAR_LOSS_DB + 10 * np.log10(rise - 1)
     jammed = ran(make_air(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": power_dbm}))
     noisy = ran(make_air(replace(radio, noise=Noise(5e6, rise_db)), 6), CROWD, TO_FIRST, Jammers.none())
-    assert heard(jammed) == heard(noisy)
+    assert received(jammed) == received(noisy)
     clear = ran(make_air(radio, 6), CROWD, TO_FIRST, Jammers.none()).fates()
     assert jammed.fates()["JAMMED"] > 0
-    assert jammed.fates()["HEARD"] < clear["HEARD"]
+    assert jammed.fates()["RECEIVED"] < clear["RECEIVED"]
 
 
 def test_what_was_not_lost_to_the_jammer_has_the_fate_that_it_has_without():
@@ -70,8 +70,8 @@ def test_what_was_not_lost_to_the_jammer_has_the_fate_that_it_has_without():
     radio = replace(with_access("aloha"), send_offset="uniform")
     jammed = ran(make_air(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": NOISE_DBM + NEAR_LOSS_DB}))
     clear = ran(make_air(radio, 6), CROWD, TO_FIRST, Jammers.none())
-    assert set(heard(jammed)) < set(heard(clear))
-    drowned = len(heard(clear)) - len(heard(jammed))
+    assert set(received(jammed)) < set(received(clear))
+    drowned = len(received(clear)) - len(received(jammed))
     assert jammed.fates()["JAMMED"] == pytest.approx(drowned, rel=0.1)
 
 
@@ -79,7 +79,7 @@ def test_a_jammer_too_weak_to_matter_changes_nothing():
     radio = replace(with_access("csma-802154"), send_offset="uniform", shadowing=Shadowing())
     pose = scattered(12) * [20.0, 20.0, 1.0]
     weak = jammers({"power_dbm": -100.0, "x_m": 500.0, "on_ns": 10**6, "period_ns": 3 * 10**6})
-    assert heard(ran(make_air(radio, 12), pose, everybody(12)(0), weak)) == heard(
+    assert received(ran(make_air(radio, 12), pose, everybody(12)(0), weak)) == received(
         ran(make_air(radio, 12), pose, everybody(12)(0), Jammers.none())
     )
 
@@ -94,7 +94,7 @@ def test_frames_are_drowned_just_where_they_overlap_with_a_strong_jammer():
     in_period_ns = (on_air_ns - 7 * 10**6) % (50 * 10**6)
     overlaps = (in_period_ns < 20 * 10**6) | (in_period_ns + end_ns - on_air_ns > 50 * 10**6)
     assert set(fate[overlaps].tolist()) == {int(Fate.JAMMED)}
-    assert set(fate[~overlaps].tolist()) == {int(Fate.HEARD)}
+    assert set(fate[~overlaps].tolist()) == {int(Fate.RECEIVED)}
     begins_clear = overlaps & (in_period_ns >= 20 * 10**6)
     assert begins_clear.sum() > 3, "some frames are drowned on the way"
 
@@ -119,7 +119,7 @@ def test_pieces_of_time_do_not_matter():
             for at_ns in range(tick * 10**8 + piece_ns, (tick + 1) * 10**8, piece_ns):
                 told.news.append(air.advance(at_ns))
         told.news.append(air.advance(4 * 10**8))
-        stories.append((sorted(heard(told)), np.sort(told.on_air("on_air_at_ns")).tolist()))
+        stories.append((sorted(received(told)), np.sort(told.on_air("on_air_at_ns")).tolist()))
     assert len(stories[0][0]) > 5
     assert stories[0] == stories[1] == stories[2]
 
@@ -133,7 +133,7 @@ def test_who_listens_first_finds_the_air_busy():
     assert always.fates() == {"IN_FLIGHT": 10}
     gaps = jammers({"on_ns": 60 * 10**6, "period_ns": 10**8})
     told = ran(make_air(dcf, 2), at((0, 0), (5, 0)), packets([0]), gaps)
-    assert told.fates() == {"HEARD": 20}
+    assert told.fates() == {"RECEIVED": 20}
     assert (told.on_air("on_air_at_ns") % 10**8 >= 60 * 10**6).all()
 
 
@@ -143,9 +143,11 @@ def test_one_that_is_carried_goes_along_spares_its_carrier_and_drowns_those_near
     for carrier, spared in ((0, {0, 2, 3}), (2, {0, 1, 2})):
         told = ran(make_air(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
         alone = ran(make_air(radio, 4), pose, packets([0, 1, 2, 3]), Jammers.none())
-        assert {receiver for receiver, _, _ in heard(told)} <= spared
+        assert {receiver for receiver, _, _ in received(told)} <= spared
         assert told.fates()["JAMMED"] > 0
-        assert {one for one in heard(told) if one[0] == carrier} == {one for one in heard(alone) if one[0] == carrier}
+        assert {one for one in received(told) if one[0] == carrier} == {
+            one for one in received(alone) if one[0] == carrier
+        }
 
 
 @pytest.mark.parametrize("change", [{"walls": Walls(60.0)}, {"line_of_sight": True}])
@@ -153,9 +155,9 @@ def test_what_keeps_signals_off_keeps_jammers_off(change: dict[str, Any]):
     radio, pose = with_access("aloha"), at((0, 0), (1, 0))
     wall = [Obstacle("box", 1.5, 0.0, size_m=(0.2, 4.0))]
     beyond = jammers({"x_m": 2.0})
-    assert "HEARD" not in ran(make_air(radio, 2, obstacles=[wall]), pose, packets([0]), beyond).fates()
+    assert "RECEIVED" not in ran(make_air(radio, 2, obstacles=[wall]), pose, packets([0]), beyond).fates()
     assert ran(make_air(replace(radio, **change), 2, obstacles=[wall]), pose, packets([0]), beyond).fates() == {
-        "HEARD": 20
+        "RECEIVED": 20
     }
 
 
@@ -180,7 +182,7 @@ def test_an_arena_with_jammers_is_the_same_alone_and_among_others(method: str):
         others = [{"arena": other, "x_m": 5.0} for other in range(len(seeds)) if other != at_row]
         air, rows = make_air(radio, 8, seeds), 8 * len(seeds)
         told = ran(air, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *own), ticks=6)
-        return [(r % 8, s, n) for r, s, n in heard(told) if r // 8 == at_row]
+        return [(r % 8, s, n) for r, s, n in received(told) if r // 8 == at_row]
 
     alone = arena(0, [5])
     assert alone

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, Sent
+from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
@@ -28,7 +28,7 @@ class Asking:
         self._sent = np.zeros(rows, np.int64)
         self.asked: list[tuple[int, int]] = []
 
-    def __call__(self, sent: Sent) -> Sent:
+    def __call__(self, sent: SentPackets) -> SentPackets:
         ids = np.full(len(sent), UNTOLD)
         for k, (sender, to) in enumerate(zip(sent.sender.tolist(), sent.to.tolist(), strict=True)):
             if to != BROADCAST:
@@ -48,7 +48,7 @@ def listed(outcomes: Outcomes) -> list[tuple[int, int, str]]:
     return list(zip(outcomes.row.tolist(), outcomes.id.tolist(), names, strict=True))
 
 
-def results(radio: Radio, pose: FloatArray, sent: Sent, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
+def results(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
     ask = Asking(len(pose))
     of = run(make_air(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
     return [result for one in told(of) for _, _, result in listed(one)]
@@ -70,7 +70,7 @@ def radios(draw: st.DrawFn) -> Radio:
     )
 
 
-def mixed(rng: np.random.Generator, rows: int, robots: int) -> Sent:
+def mixed(rng: np.random.Generator, rows: int, robots: int) -> SentPackets:
     """Some robots send some packets: to one, to all, or to nobody."""
     k = int(rng.integers(0, 3 * rows))
     sender, kind = rng.integers(0, rows, k), rng.random(k)
@@ -103,7 +103,7 @@ def test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight(
         assert listed(one) == sorted(listed(one), key=lambda row: row[:2])
         for row, id_, result in listed(one):
             if result == "ACKNOWLEDGED":
-                assert fate[row, id_] == {Fate.HEARD}
+                assert fate[row, id_] == {Fate.RECEIVED}
             if result == "QUEUE_FULL":
                 assert fate[row, id_] == {QUEUE_FULL}
             if result == "TOO_LARGE":
@@ -138,7 +138,7 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
     radio = replace(with_access("csma-802154"), send_offset="tick", max_payload_bytes=5000, loss=1.0)
     pose, both = at((0, 0), (1, 0), (0.5, 1)), packets([0, 2], [1, BROADCAST], [10, 5000])
     ask = Asking(3)
-    of = run(make_air(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else Sent.none(), 120, 3)
+    of = run(make_air(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else SentPackets.none(), 120, 3)
     busy = {id_ for one in told(of) for _, id_, result in listed(one) if result == "CHANNEL_BUSY"}
     own = of.finished("sender") == 0
     fates = dict(zip(of.finished("sequence")[own].tolist(), of.finished("fate")[own].tolist(), strict=True))
@@ -147,15 +147,15 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_a_packet_that_was_heard_but_whose_acknowledgement_was_lost_is_not_acknowledged(method: str):
+def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_acknowledged(method: str):
     radio = with_access(method)
     radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, most_retries=0))
     ask = Asking(2)
     of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
-    heard, acknowledged = len(of.heard("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
+    received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
     assert sum(len(one) for one in told(of)) == 300
     # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
-    assert abs(heard - 150) < 35
+    assert abs(received - 150) < 35
     assert abs(acknowledged - 75) < 30
 
 
@@ -188,7 +188,7 @@ def test_a_packet_to_nobody_takes_a_number_and_is_not_acknowledged(method: str):
     radio = Radio(range_m=2.0) if method == "disk" else with_access(method)
     ask = Asking(2)
     of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
-    assert of.heard("sequence").tolist() == [1, 4]
+    assert of.received("sequence").tolist() == [1, 4]
     assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([2], [2])
     lost = [(0, id_, "NO_ACKNOWLEDGEMENT") for id_ in (0, 2, 3, 5)]
     learned = sorted([*lost, (0, 1, "ACKNOWLEDGED"), (0, 4, "ACKNOWLEDGED")]) if method in ACKNOWLEDGING else []
@@ -213,7 +213,7 @@ def test_the_dead_learn_nothing_and_a_radio_that_is_off_is_not_answered():
                 of.air.disrupt(disrupted(np.array(alive), np.array(radio_on)))
             of.news.append(of.air.advance(tick * 10**8))
             of.air.hold(NEAR, np.array(alive) if tick else np.ones(2, bool))
-            of.air.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else Sent.none()))
+            of.air.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
         assert [result for one in told(of) for _, _, result in listed(one)] == expected
 
 

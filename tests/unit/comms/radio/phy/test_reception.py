@@ -24,19 +24,19 @@ def test_delivery_of_802154_over_distance_is_that_of_its_formula(distance_m: flo
     snr = 10 ** ((-46.6777 - 30 * np.log10(distance_m) + 106.987) / 10)
     expected = (1 - oqpsk_bit_errors(snr)) ** (8 * 37)
     tolerance = max(0.02, 4 * (expected * (1 - expected) / 2000) ** 0.5)
-    assert told.fates().get("HEARD", 0) / 2000 == pytest.approx(expected, abs=tolerance)
+    assert told.fates().get("RECEIVED", 0) / 2000 == pytest.approx(expected, abs=tolerance)
 
 
 def test_more_distance_never_helps_on_average():
     """The same draws decide at each distance, so not even by chance."""
-    heard = [
+    received = [
         run(make_air(with_access("none"), 2), at((0, 0), (d, 0)), lambda _: packets([0] * 20, size=20), 10, 2)
         .fates()
-        .get("HEARD", 0)
+        .get("RECEIVED", 0)
         for d in np.linspace(80, 140, 13)
     ]
-    assert heard == sorted(heard, reverse=True)
-    assert heard[0] > heard[-1]
+    assert received == sorted(received, reverse=True)
+    assert received[0] > received[-1]
 
 
 def test_strength_is_equal_both_ways_to_the_last_bit():
@@ -54,12 +54,12 @@ def test_strength_is_equal_both_ways_to_the_last_bit():
 
 
 @pytest.mark.parametrize("far_first", [True, False])
-def test_of_two_frames_at_once_the_near_one_is_heard_as_in_ns_3(far_first: bool):
+def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bool):
     """ns-3's lr-wpan-collision-test: senders 1 m and 30 m away, one frame received, whoever has the lower row."""
     senders = ((30, 0), (-1, 0)) if far_first else ((-1, 0), (30, 0))
     told = run(make_air(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
-    assert told.fates() == {"HEARD": 1, "COLLIDED": 1}
-    assert told.heard("sender").tolist() == [int(far_first)]
+    assert told.fates() == {"RECEIVED": 1, "COLLIDED": 1}
+    assert told.received("sender").tolist() == [int(far_first)]
 
 
 def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():
@@ -72,19 +72,19 @@ def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():
 def test_who_sends_hears_nothing():
     told = run(make_air(with_access("aloha"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
-    assert run(make_air(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"HEARD": 2}
+    assert run(make_air(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"RECEIVED": 2}
 
 
 def test_carrier_sense_lets_one_after_the_other_send():
     """Three robots hand over two packets each at once, 20 times; of DCF, the first ones collide for certain."""
-    heard = {}
+    received = {}
     for method in METHODS[1:]:
         pose, sent = at((0, 0), (1, 0), (0.5, 1)), packets([0, 1, 2] * 2)
         told = run(make_air(with_access(method), 3), pose, lambda _, sent=sent: sent, 20, 1)
-        heard[method] = told.fates().get("HEARD", 0) / 240
-    assert heard["aloha"] == 0.0
-    assert heard["csma-802154"] > 0.5
-    assert 0.3 < heard["dcf"] <= 0.5
+        received[method] = told.fates().get("RECEIVED", 0) / 240
+    assert received["aloha"] == 0.0
+    assert received["csma-802154"] > 0.5
+    assert 0.3 < received["dcf"] <= 0.5
 
 
 @pytest.mark.parametrize("load", [0.25, 0.5, 1.0])
@@ -105,8 +105,8 @@ def test_throughput_of_aloha_is_that_of_abramson(load: float):
     angle = np.linspace(0, 2 * np.pi, senders, endpoint=False)
     pose = np.vstack([np.column_stack([10 * np.cos(angle), 10 * np.sin(angle), angle]), [[0.0, 0.0, 0.0]]])
     told = run(make_air(radio, senders + 1), pose, lambda _: packets(range(senders), senders), ticks, 1)
-    heard = told.fates().get("HEARD", 0) / (senders * ticks)
-    assert heard == pytest.approx(np.exp(-2 * load), abs=0.03)
+    received = told.fates().get("RECEIVED", 0) / (senders * ticks)
+    assert received == pytest.approx(np.exp(-2 * load), abs=0.03)
 
 
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])
@@ -117,8 +117,8 @@ def test_acknowledged_packets_are_sent_again(method: str):
         radio = with_access(method)
         radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, acknowledged=acknowledged))
         told = run(make_air(radio, 2), pose, lambda _: sent, 60, 3)
-        assert least <= told.fates()["HEARD"] / 300 <= most
-        assert told.fates()["HEARD"] + told.fates().get("LOST", 0) == 300
+        assert least <= told.fates()["RECEIVED"] / 300 <= most
+        assert told.fates()["RECEIVED"] + told.fates().get("LOST", 0) == 300
 
 
 def test_a_lone_broadcast_of_802154_goes_on_air_after_whole_backoffs():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Fate, SendResult, Sent
+from swarmwire.comms.packets import Fate, SendResult, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, Disruption
 from tests.support.comms.radio.phy.radios import with_access
@@ -30,7 +30,7 @@ def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks
         air.hold(at((0, 0), (metres, 0)), now.alive)
         if tick < sends:
             one = packets([0], 1, 100)
-            air.send(tick * TICK_NS, tick, Sent(one.sender, one.to, one.payloads, np.array([tick])))
+            air.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
     out.last = air.end()
     return out
 
@@ -46,11 +46,11 @@ def results(out: Run) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("end", ["alive", "radio_on"])
-def test_a_packet_that_was_heard_is_not_refused_as_well_when_its_sender_ends(end: str):
+def test_a_packet_that_was_received_is_not_refused_as_well_when_its_sender_ends(end: str):
     """Robot 0 is deaf to the acknowledgement, tries again, and dies, or its radio goes off."""
     out = told(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
-    assert out.fates() == {"HEARD": 1}
-    assert departures(out) == [(0, int(Fate.HEARD))]
+    assert out.fates() == {"RECEIVED": 1}
+    assert departures(out) == [(0, int(Fate.RECEIVED))]
     assert out.tally.in_range.tolist() == [1]
 
 
@@ -62,7 +62,7 @@ def test_a_packet_that_was_lost_on_air_is_lost_though_its_sender_dies_before_the
 def test_a_packet_that_was_on_air_out_of_reach_stays_so_when_the_radio_goes_off():
     out = told(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
     assert out.fates() == {"OUT_OF_RANGE": 1}
-    assert departures(out) == [(0, int(Fate.HEARD))]
+    assert departures(out) == [(0, int(Fate.RECEIVED))]
 
 
 def test_at_low_bit_rates_the_sender_waits_as_long_as_an_acknowledgement_takes():
@@ -73,7 +73,7 @@ def test_at_low_bit_rates_the_sender_waits_as_long_as_an_acknowledgement_takes()
 def test_a_robot_that_was_revived_is_not_told_of_a_packet_from_before():
     """A frame of 234 ms; the robot is dead in one tick of it."""
     out = told(replace(SLOW, bit_rate_bps=4_000), lambda tick: {"alive": [tick != 1, True]})
-    assert out.fates() == {"HEARD": 1}
+    assert out.fates() == {"RECEIVED": 1}
     assert results(out) == []
 
 

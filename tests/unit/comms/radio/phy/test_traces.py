@@ -15,7 +15,7 @@ from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.measured import TRIO, numbers_heard, trace_of
+from tests.support.comms.radio.measured import TRIO, numbers_received, trace_of
 from tests.support.comms.radio.phy.radios import METHODS, with_access
 from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
 from tests.support.comms.radio.traffic import random_traffic
@@ -46,7 +46,7 @@ def test_a_strength_stands_in_for_the_model_each_way_and_for_as_long_as_it_holds
         assert strengths(told, 0, 1) == [-60.0, -60.0, -70.0]
         assert strengths(told, 1, 0) == [-75.5] * 3
         assert strengths(told, 2, 0) == [-50.0] * 2
-        assert told.fates() == {"HEARD": 8, "OUT_OF_RANGE": 10}
+        assert told.fates() == {"RECEIVED": 8, "OUT_OF_RANGE": 10}
         assert told.tally.in_range.sum() == 8
 
 
@@ -58,19 +58,19 @@ def test_links_without_a_strength_are_as_the_model_has_them():
         assert strengths(mixed, *link) == strengths(bare, *link)
     assert strengths(bare, 0, 1) == strengths(bare, 1, 0)
     far = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2, pose=FAR)
-    assert far.fates() == {"HEARD": 2, "OUT_OF_RANGE": 10}
+    assert far.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 10}
 
 
 def test_a_strength_is_too_weak_where_the_receiver_says_so():
     told = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -130), (0, 1, 0, -60)])), "none", 4)
-    assert (numbers_heard(told, 0, 1), numbers_heard(told, 1, 0)) == ([], [0, 1, 2, 3])
+    assert (numbers_received(told, 0, 1), numbers_received(told, 1, 0)) == ([], [0, 1, 2, 3])
 
 
 def test_what_was_measured_holds_shadows_and_obstacles_and_fades_on_top():
     traces = LinkTraces(rssi_dbm=trace_of("rssi_dbm", BOTH))
     between = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.1)]
     blocked = make_air(replace(ALONE, line_of_sight=True, trace=Trace("a.csv")), TRIO, [0], [between], traces)
-    assert run(blocked, NEAR, everybody(TRIO), 1, 1).fates() == {"HEARD": 6}
+    assert run(blocked, NEAR, everybody(TRIO), 1, 1).fates() == {"RECEIVED": 6}
     shaded = replayed(traces, "none", 1, replace(ALONE, shadowing=Shadowing(8.0, 1.0)))
     assert set(np.round(shaded.finished("rssi_dbm"), 6)) == {-60.0}
     fading = replace(ALONE, fading=Fading())
@@ -90,20 +90,20 @@ def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_mod
     for sender in range(TRIO):
         air = make_air(replace(ALONE, trace=Trace("a.csv", "model")), TRIO, traces=traces)
         told = run(air, NEAR, lambda _, sender=sender: packets([sender]), 3, 1)
-        passing |= {(sender, r) for r in told.heard("receiver").tolist()}
+        passing |= {(sender, r) for r in told.received("receiver").tolist()}
     assert passing == {(0, 2), (1, 0), (2, 0)}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_ratio_is_the_share_that_is_heard_whatever_the_access(method: str):
+def test_a_ratio_is_the_share_that_is_received_whatever_the_access(method: str):
     """Of lone packets, so that nothing else takes any."""
     ratio = LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 0, 1, 0.6), (0, 0, 2, 1.0)]))
     air = make_air(replace(with_access(method), trace=Trace("a.csv")), TRIO, range(4), traces=ratio)
     told = run(air, np.tile(NEAR, (4, 1)), lambda _: packets(range(0, 12, 3)), 300, 2)
-    shares = [len(numbers_heard(told, 0, r)) / 300 for r in range(12)]
+    shares = [len(numbers_received(told, 0, r)) / 300 for r in range(12)]
     assert shares[2::3] == [1.0] * 4
     assert abs(np.mean(shares[1::3]) - 0.6) < 4.4 * np.sqrt(0.6 * 0.4 / 1200)
-    assert set(told.fates()) == {"HEARD", "LOST"}
+    assert set(told.fates()) == {"RECEIVED", "LOST"}
 
 
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])
@@ -112,16 +112,18 @@ def test_what_a_ratio_takes_is_sent_again_and_so_is_what_takes_acknowledgements(
     radio = replace(with_access(method), trace=Trace("a.csv"))
     air = make_air(radio, TRIO, range(3), traces=LinkTraces(delivery_ratio=trace_of("delivery_ratio", lossy)))
     told = run(air, np.tile(NEAR, (3, 1)), lambda _: packets([0, 3, 6], to=1), 100, 2)
-    assert 0.9 < len(told.heard("sequence")) / 300 <= 1.0
-    late_ns = told.heard("heard_at_ns") - told.heard("sequence") * TICK_NS
+    assert 0.9 < len(told.received("sequence")) / 300 <= 1.0
+    late_ns = told.received("received_at_ns") - told.received("sequence") * TICK_NS
     assert (late_ns > 2 * late_ns.min()).sum() > 50
 
 
 def test_a_delay_comes_after_reception():
     without = run(make_air(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
     told = replayed(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1)
-    first = (without.heard("sender") == 0) & (without.heard("receiver") == 1)
-    assert told.heard("heard_at_ns").tolist() == (without.heard("heard_at_ns")[first] + 250_000_000).tolist()
+    first = (without.received("sender") == 0) & (without.received("receiver") == 1)
+    assert (
+        told.received("received_at_ns").tolist() == (without.received("received_at_ns")[first] + 250_000_000).tolist()
+    )
 
 
 def test_the_graph_has_the_pairs_that_strength_and_ratio_join_both_ways():

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Sent
+from swarmwire.comms.packets import SentPackets
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, OwnAntenna, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
@@ -22,7 +22,9 @@ Change = Callable[[Air, Disruption], None]
 FEW = scattered(8) * [20.0, 20.0, 1.0]
 
 
-def ran(air: Air, pose: FloatArray, sent: Callable[[int], Sent], changes: dict[int, Change], ticks: int = 16) -> Run:
+def ran(
+    air: Air, pose: FloatArray, sent: Callable[[int], SentPackets], changes: dict[int, Change], ticks: int = 16
+) -> Run:
     """Changes are made before the tick that they are listed under."""
     told, held = Run(air), Disruption.none(len(pose))
     for tick in range(ticks + 1):
@@ -78,8 +80,12 @@ def test_a_change_that_is_none_changes_nothing(method: str):
     plain = ran(make_air(radio, 8), FEW, everybody(8), {})
     assert links(ran(make_air(radio, 8), FEW, everybody(8), same)) == links(plain)
     gains: dict[int, Change] = {3: gained(1.0), 4: gained(0.0)}
-    apart = ran(make_air(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else Sent.none(), gains)
-    silent = ran(make_air(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else Sent.none(), {})
+    apart = ran(
+        make_air(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), gains
+    )
+    silent = ran(
+        make_air(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), {}
+    )
     assert links(apart) == links(silent)
 
 
@@ -99,17 +105,17 @@ def test_a_frame_on_air_meets_both_noises():
     slow = replace(with_access("aloha"), bit_rate_bps=900, max_payload_bytes=60)
     loud = replace(slow, noise=Noise(5e6, 30.0))
 
-    def heard(at_tick: int) -> int:
+    def received(at_tick: int) -> int:
         told = ran(
             make_air(slow, 2),
             at((0, 0), (50, 0)),
             lambda tick: packets([0] * (tick == 0), size=40),
             {at_tick: tuned(loud)},
         )
-        return told.fates().get("HEARD", 0)
+        return told.fates().get("RECEIVED", 0)
 
-    assert heard(1) == 0
-    assert heard(7) == 1
+    assert received(1) == 0
+    assert received(7) == 1
 
 
 def test_a_gain_of_the_sender_is_worth_as_much_as_power_and_one_of_the_receiver_as_an_antenna():
@@ -124,12 +130,12 @@ def test_a_gain_of_the_sender_is_worth_as_much_as_power_and_one_of_the_receiver_
 def test_an_antenna_that_hears_badly_still_sends_well_and_no_edge_leads_to_it():
     deaf = gained(receive_db=np.array([-60.0, 0.0]))
     told = ran(make_air(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf}, 6)
-    assert set(told.heard("receiver").tolist()) == {1}
+    assert set(told.received("receiver").tolist()) == {1}
     assert not len(told.edges)
     back = ran(
         make_air(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf, 3: gained()}, 6
     )
-    assert set(back.heard("receiver").tolist()) == {0, 1}
+    assert set(back.received("receiver").tolist()) == {0, 1}
     assert back.edges.tolist() == [[0, 1]]
 
 
@@ -137,17 +143,17 @@ def test_a_gain_may_reach_farther_than_any_radio_did_before():
     far = at((0, 0), (900, 0))
     assert ran(make_air(with_access("none"), 2), far, lambda _: packets([0]), {}, 4).fates() == {"OUT_OF_RANGE": 4}
     told = ran(make_air(with_access("none"), 2), far, lambda _: packets([0]), {0: gained(send_db=40.0)}, 4)
-    assert told.fates()["HEARD"] >= 3
+    assert told.fates()["RECEIVED"] >= 3
 
 
 def test_groups_have_their_own_power():
-    """The strong are heard by the weak, who are not heard by them."""
+    """The strong are received by the weak, who are not received by them."""
     radio, pose = with_access("none"), at((0, 0), (200, 0))
     antennas = Antennas.of_groups([(1, OwnAntenna(power_dbm=20.0)), (1, None)])
     keys = np.array([derive_key(1, "air")], np.uint64)
     air = Air(radio, keys, 2, SIZE_M, obstacle_arrays(((),)), RATE_HZ, antennas=antennas)
     told = ran(air, pose, lambda _: packets([0, 1]), {}, 5)
-    assert set(told.heard("receiver").tolist()) == {1}
+    assert set(told.received("receiver").tolist()) == {1}
 
 
 @pytest.mark.parametrize("method", ["none", "aloha", "csma-802154", "dcf"])
@@ -179,15 +185,15 @@ def test_all_wait_for_their_radio_up_to_the_limit(method: str):
     """Off from 0.2 to 0.8 s: four of six wait, and go out one after the other, before that of 0.8 s."""
     radio = replace(with_access(method), **SLOW)
 
-    def sent(tick: int) -> Sent:
+    def sent(tick: int) -> SentPackets:
         return packets([0] * (tick < 9))
 
     told = ran(make_air(radio, 2), PAIR, sent, {2: switched(ALL, 0), 8: switched(ALL)})
-    assert told.fates() == {"HEARD": 7, "QUEUE_FULL": 2}
-    assert told.heard("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
+    assert told.fates() == {"RECEIVED": 7, "QUEUE_FULL": 2}
+    assert told.received("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
     assert min(on_air_ticks(told)[2:]) == 8
     dropped = ran(make_air(radio, 2), PAIR, sent, {2: switched(DROP, 0), 8: switched(DROP)})
-    assert dropped.fates() == {"HEARD": 3, "BLACKOUT": 6}
+    assert dropped.fates() == {"RECEIVED": 3, "BLACKOUT": 6}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -198,21 +204,21 @@ def test_the_newest_waits_and_what_it_replaces_ends_with_the_blackout(method: st
         lambda tick: packets([0] * (tick < 8)),
         {2: switched(NEWEST, 0), 8: switched(NEWEST)},
     )
-    assert told.fates() == {"HEARD": 3, "BLACKOUT": 5}
-    assert told.heard("sequence").tolist() == [0, 1, 7]
+    assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
+    assert told.received("sequence").tolist() == [0, 1, 7]
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_addressed_packets_wait_too_and_are_heard_once(method: str):
-    def sent(tick: int) -> Sent:
+def test_addressed_packets_wait_too_and_are_received_once(method: str):
+    def sent(tick: int) -> SentPackets:
         return packets([0] * 2 * (tick < 4), 1)
 
     told = ran(make_air(with_access(method), 2), PAIR, sent, {1: switched(ALL, 0), 6: switched(ALL)})
-    assert told.fates() == {"HEARD": 8}
+    assert told.fates() == {"RECEIVED": 8}
     stricter = ran(
         make_air(with_access(method), 2), PAIR, sent, {1: switched(ALL, 0), 4: switched(NEWEST, 0), 6: switched(DROP)}
     )
-    assert stricter.fates() == {"HEARD": 3, "BLACKOUT": 5}
+    assert stricter.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
 
 
 def test_one_way_the_radio_graph_of_signals_has_no_edge():
@@ -222,4 +228,4 @@ def test_one_way_the_radio_graph_of_signals_has_no_edge():
     told = ran(make_air(with_access("aloha"), 2), PAIR, lambda _: packets([0]), {0: apart}, 4)
     assert told.fates() == {"PARTITIONED": 4}
     assert not len(told.edges)
-    assert ran(make_air(with_access("aloha"), 2), PAIR, lambda _: packets([1]), {0: apart}, 4).fates()["HEARD"] >= 3
+    assert ran(make_air(with_access("aloha"), 2), PAIR, lambda _: packets([1]), {0: apart}, 4).fates()["RECEIVED"] >= 3

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import NOWHERE, Fate, Sent
+from swarmwire.comms.packets import NOWHERE, Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
@@ -33,11 +33,11 @@ def test_packets_of_one_sender_follow_each_other_without_gap():
 
 @pytest.mark.parametrize("limit", [0, 1, 3])
 def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
-    """One packet is on air and `limit` wait; the refused count as in range where they would have been heard."""
+    """One packet is on air and `limit` wait; the refused count as in range where they would have been received."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=limit)
     told = run(make_air(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
     assert told.on_air("sequence").tolist() == list(range(limit + 1))
-    assert told.fates() == {"HEARD": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
+    assert told.fates() == {"RECEIVED": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
     assert told.tally.in_range.tolist() == [5]
 
 
@@ -45,7 +45,7 @@ def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
     radio = Radio(2.0, line_of_sight=True, bit_rate_bps=4000, send_offset="tick", queue_limit=0)
     air = make_air(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
     told = run(air, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
-    assert told.fates() == {"HEARD": 1, "BLOCKED": 1, "QUEUE_FULL": 2}
+    assert told.fates() == {"RECEIVED": 1, "BLOCKED": 1, "QUEUE_FULL": 2}
     assert told.tally.in_range.tolist() == [2]
 
 
@@ -55,7 +55,7 @@ def test_the_queue_empties_as_time_passes():
     told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
     on_air_ms = (told.on_air("on_air_at_ns") // 10**6).tolist()
     assert on_air_ms == [0, 60, 120, 200, 260, 320, 400, 460, 520]
-    assert told.fates() == {"HEARD": 9, "QUEUE_FULL": 3}
+    assert told.fates() == {"RECEIVED": 9, "QUEUE_FULL": 3}
     assert (np.diff(told.on_air("sequence")) > 0).all()
 
 
@@ -70,7 +70,7 @@ def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
 def test_refused_packets_are_numbered_too():
     """And a packet too large takes no time on air: the next goes out at once."""
     told = run(make_air(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
-    assert told.heard("sequence").tolist() == [1]
+    assert told.received("sequence").tolist() == [1]
     assert told.on_air("on_air_at_ns").tolist() == [0]
 
 
@@ -78,7 +78,7 @@ def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
     """Overhead does not count, and nobody was in range of it."""
     radio = Radio(2.0, max_payload_bytes=10, overhead_bytes=50, send_offset="tick")
     told = run(make_air(radio, 3), TRIO, lambda _: packets([0, 0, 1], [-1, -1, 2], [11, 10, 11]), 1)
-    assert told.fates() == {"TOO_LARGE": 3, "HEARD": 1, "OUT_OF_RANGE": 1}
+    assert told.fates() == {"TOO_LARGE": 3, "RECEIVED": 1, "OUT_OF_RANGE": 1}
     assert told.tally.in_range.tolist() == [1]
 
 
@@ -107,11 +107,11 @@ def off(backlog: int, *rows: int) -> Disruption:
     return now
 
 
-def one_each(first: int, stop: int, count: int = 1) -> dict[int, Sent]:
+def one_each(first: int, stop: int, count: int = 1) -> dict[int, SentPackets]:
     return {tick: packets([0] * count) for tick in range(first, stop)}
 
 
-def blacked_out(backlog: int, sent: dict[int, Sent], radio: Radio = SLOWEST, ticks: int = 15) -> Run:
+def blacked_out(backlog: int, sent: dict[int, SentPackets], radio: Radio = SLOWEST, ticks: int = 15) -> Run:
     """The sender's radio is off from 0.2 to 0.8 s."""
     return run_disrupted(make_air(radio, 2), PAIR, sent, {2: off(backlog, 0), 8: Disruption.none(2)}, ticks)
 
@@ -122,16 +122,16 @@ def on_air_ms(told: Run) -> list[int]:
 
 def test_nothing_waits_by_default():
     told = blacked_out(DROP, one_each(0, 9))
-    assert told.fates() == {"HEARD": 3, "BLACKOUT": 6}
+    assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 6}
     assert on_air_ms(told) == [0, 100, 800]
 
 
 def test_all_wait_up_to_the_limit_and_go_out_one_after_the_other():
     """Handed over at 0.2 to 0.8 s: four wait, two find the queue full, and the one at 0.8 s goes last."""
     told = blacked_out(ALL, one_each(0, 9))
-    assert told.fates() == {"HEARD": 7, "QUEUE_FULL": 2}
+    assert told.fates() == {"RECEIVED": 7, "QUEUE_FULL": 2}
     assert on_air_ms(told) == [0, 100, 800, 880, 960, 1040, 1120]
-    assert told.heard("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
+    assert told.received("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
     refused = told.finished("receiver") < 0
     assert (told.finished("sent_at_ns")[refused] // 10**8).tolist() == [6, 7]
 
@@ -139,19 +139,19 @@ def test_all_wait_up_to_the_limit_and_go_out_one_after_the_other():
 @pytest.mark.parametrize("limit", [0, 1, 4])
 def test_the_newest_waits_whatever_the_limit(limit: int):
     told = blacked_out(NEWEST, one_each(0, 8), replace(SLOWEST, queue_limit=limit))
-    assert told.fates() == {"HEARD": 3, "BLACKOUT": 5}
+    assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
     assert on_air_ms(told) == [0, 100, 800]
-    assert told.heard("sequence").tolist() == [0, 1, 7]
+    assert told.received("sequence").tolist() == [0, 1, 7]
     told = blacked_out(NEWEST, {2: packets([0] * 3)}, replace(SLOWEST, queue_limit=limit))
-    assert told.heard("sequence").tolist() == [2]
-    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2}
+    assert told.received("sequence").tolist() == [2]
+    assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2}
 
 
 def test_what_waited_already_waits_on_and_what_is_on_air_ends_in_peace():
     """Four packets at 0.1 s begin at 100, 180, 260 and 340 ms: that of 180 ms is on air when the radio goes off."""
     told = blacked_out(ALL, {1: packets([0] * 4)})
     assert on_air_ms(told) == [100, 180, 800, 880]
-    assert told.fates() == {"HEARD": 4}
+    assert told.fates() == {"RECEIVED": 4}
 
 
 def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
@@ -164,7 +164,7 @@ def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
 
 def test_a_packet_too_large_does_not_wait():
     told = blacked_out(ALL, {3: packets([0, 0], size=[101, 10])})
-    assert told.fates() == {"HEARD": 1, "TOO_LARGE": 1}
+    assert told.fates() == {"RECEIVED": 1, "TOO_LARGE": 1}
     assert told.news[4].tally.fates.sum() == 1
 
 
@@ -173,7 +173,7 @@ def test_the_backlog_of_a_robot_that_dies_dies_with_it_and_the_next_starts_afres
     dead.alive[0] = False
     now = {2: off(ALL, 0), 4: dead, 6: off(ALL, 0), 8: Disruption.none(2)}
     told = run_disrupted(make_air(SLOWEST, 2), PAIR, {2: packets([0] * 3), 7: packets([0])}, now, 12)
-    assert told.fates() == {"HEARD": 1, "SENDER_DEAD": 3}
+    assert told.fates() == {"RECEIVED": 1, "SENDER_DEAD": 3}
     assert on_air_ms(told) == [800]
 
 
@@ -187,7 +187,7 @@ def test_a_backlog_that_gets_stricter_is_cut_at_once():
     told = run_disrupted(
         make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(NEWEST, 0), 8: Disruption.none(2)}, 12
     )
-    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2}
+    assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2}
     told = run_disrupted(make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(DROP, 0), 8: Disruption.none(2)}, 12)
     assert told.fates() == {"BLACKOUT": 3}
 
@@ -199,7 +199,7 @@ def test_a_backlog_keeps_to_its_own_radio():
     sender, on_air = told.on_air("sender"), np.array(on_air_ms(told))
     assert on_air[sender == 0].tolist() == [800, 880, 960, 1040]
     assert on_air[sender == 1].tolist() == [200, 280, 360, 440, 520, 600, 680, 760]
-    assert told.fates() == {"HEARD": 4, "BLACKOUT": 8}
+    assert told.fates() == {"RECEIVED": 4, "BLACKOUT": 8}
 
 
 def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
@@ -207,7 +207,7 @@ def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
     later = replace(SLOWEST, send_offset=0.25)
     sent, now = {1: packets([0, 0, 1, 1], size=[10, 10, 101, 10])}, {2: off(ALL, 1), 8: Disruption.none(2)}
     told = run_disrupted(make_air(later, 2), PAIR, sent, now, 12)
-    assert told.fates() == {"HEARD": 1, "BLACKOUT": 2, "TOO_LARGE": 1}
+    assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2, "TOO_LARGE": 1}
     assert on_air_ms(told) == [350, 430, 800]
     assert [one.tally.fates[0, Fate.TOO_LARGE] for one in told.news].index(1) == 4
 
@@ -230,13 +230,13 @@ def test_each_radio_lets_go_its_own_packets():
 def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
     radio = Radio(2.0, bit_rate_bps=1000, overhead_bytes=6, max_payload_bytes=10, send_offset="tick")
     told = run(make_air(radio, 2), PAIR, lambda _: packets([0, 0, 0], size=[10, 11, 10]), 1, 4)
-    assert (told.heard("heard_at_ns") // 10**6).tolist() == [128, 256]
+    assert (told.received("received_at_ns") // 10**6).tolist() == [128, 256]
     departed = [one.departed for one in told.news]
     lasts_ns = np.concatenate([of.off_air_at_ns - of.on_air_at_ns for of in departed])
     fate = np.concatenate([of.fate for of in departed])
     assert sorted(zip(fate.tolist(), (lasts_ns // 1000).tolist(), strict=True)) == [
-        (Fate.HEARD, 128_000),
-        (Fate.HEARD, 128_000),
+        (Fate.RECEIVED, 128_000),
+        (Fate.RECEIVED, 128_000),
         (Fate.TOO_LARGE, 0),
     ]
     assert lasts_ns[fate == Fate.TOO_LARGE].tolist() == [0]

@@ -24,7 +24,7 @@ BETWEEN = {
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 9.0), st.integers(1, 40))
-def test_heard_by_exactly_those_within_range(seed: int, range_m: float, robots: int):
+def test_received_by_exactly_those_within_range(seed: int, range_m: float, robots: int):
     pose = scattered(robots, seed) * [1.3, 1.3, 1.0]  # some outside the arena
     told = run(make_air(Radio(range_m, send_offset="tick"), robots), pose, everybody(robots), 1)
     apart_m = np.hypot(*(pose[:, None, :2] - pose[None, :, :2]).transpose(2, 0, 1))
@@ -36,20 +36,20 @@ def test_heard_by_exactly_those_within_range(seed: int, range_m: float, robots: 
 
 def test_range_is_inclusive():
     told = run(make_air(Radio(2.0, send_offset="tick"), 3), at((-1, 0), (1, 0), (1, 2.0000001)), everybody(3), 1)
-    assert told.fates() == {"HEARD": 2, "OUT_OF_RANGE": 4}
+    assert told.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 4}
 
 
 def test_robots_of_other_arenas_hear_nothing():
     """Even if they stand at the same place."""
     told = run(make_air(Radio(99.0, send_offset="tick"), 2, [1, 2]), np.zeros((4, 3)), lambda _: packets([0]), 1)
-    assert told.heard("receiver").tolist() == [1]
+    assert told.received("receiver").tolist() == [1]
 
 
 def test_an_addressed_packet_reaches_only_its_receiver():
     pose = at((0, 0), (1, 0), (0, 1), (3, 0))
     told = run(make_air(Radio(2.0, send_offset="tick"), 4), pose, lambda _: packets([0, 0], [2, 3]), 1)
-    assert told.heard("receiver").tolist() == [2]
-    assert told.fates() == {"HEARD": 1, "OUT_OF_RANGE": 1}
+    assert told.received("receiver").tolist() == [2]
+    assert told.fates() == {"RECEIVED": 1, "OUT_OF_RANGE": 1}
     assert told.tally.intended.tolist() == [2]
 
 
@@ -61,7 +61,7 @@ def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(
         air.send(0, 0, packets([0, 0], [1, to]))
     air.send(0, 0, packets([0], 1))
     news = air.advance(10**8)
-    assert news.heard.sequence.tolist() == [0]
+    assert news.received.sequence.tolist() == [0]
     assert news.tally.sent.tolist() == [1]
 
 
@@ -69,7 +69,7 @@ def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(
 def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
     """Blocked receivers are not in range; without line of sight they hear."""
     pose = at((-1, 0), (1, 0), (-1, 1))
-    for line_of_sight, fates, in_range in ((True, {"HEARD": 4, "BLOCKED": 2}, 4), (False, {"HEARD": 6}, 6)):
+    for line_of_sight, fates, in_range in ((True, {"RECEIVED": 4, "BLOCKED": 2}, 4), (False, {"RECEIVED": 6}, 6)):
         radio = Radio(9.0, line_of_sight=line_of_sight, send_offset="tick")
         told = run(make_air(radio, 3, [1], [[BETWEEN[shape]]]), pose, everybody(3), 1)
         assert told.fates() == fates
@@ -83,7 +83,11 @@ def test_range_and_bearing_are_exact_without_noise():
     seen = {
         (int(r), int(s)): (range_m, bearing_rad)
         for r, s, range_m, bearing_rad in zip(
-            told.heard("receiver"), told.heard("sender"), told.given("range_m"), told.given("bearing_rad"), strict=True
+            told.received("receiver"),
+            told.received("sender"),
+            told.given("range_m"),
+            told.given("bearing_rad"),
+            strict=True,
         )
     }
     assert seen[1, 0] == (2.0, np.pi / 2)
@@ -95,7 +99,7 @@ def test_range_and_bearing_are_exact_without_noise():
 def test_only_what_the_radio_gives_comes_with_a_packet():
     for gives in (Gives(), Gives(range=RangeGiven()), Gives(bearing=BearingGiven()), GIVES):
         told = run(make_air(Radio(9.0, gives=gives), 3), scattered(3), everybody(3), 2, 2)
-        assert all(tuple(one.heard.given) == gives.columns for one in told.news)
+        assert all(tuple(one.received.given) == gives.columns for one in told.news)
 
 
 def test_noise_has_its_standard_deviation_and_stays_in_bounds():
@@ -103,8 +107,8 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
     radio = Radio(99.0, gives=Gives(RangeGiven(0.1), BearingGiven(0.3)))
     pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
     told = run(make_air(radio, 40), pose, everybody(40), 7, 2)
-    way = pose[told.heard("sender"), :2] - pose[told.heard("receiver"), :2]
-    bearing_rad = np.arctan2(way[:, 1], way[:, 0]) - pose[told.heard("receiver"), 2]
+    way = pose[told.received("sender"), :2] - pose[told.received("receiver"), :2]
+    bearing_rad = np.arctan2(way[:, 1], way[:, 0]) - pose[told.received("receiver"), 2]
     wrong_rad = np.angle(np.exp(1j * (told.given("bearing_rad") - bearing_rad)))
     far = np.hypot(*way.T) > 1.0  # no cut at zero
     wrong_m = (told.given("range_m") - np.hypot(*way.T))[far]
@@ -117,14 +121,14 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
 
 
 @given(st.integers(0, 1000), st.floats(0.3, 4.0))
-def test_edges_are_the_links_that_are_heard_both_ways(seed: int, range_m: float):
+def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: float):
     obstacles = [*BETWEEN.values(), Obstacle("cylinder", 1.5, 1.0, radius_m=0.5)]
     air = make_air(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
     pose = scattered(24, seed)
     edges = air.edges(pose, np.ones(24, bool))
     told = run(air, pose, everybody(24), 1)
-    sender = told.heard("receiver") // 12 * 12 + told.heard("sender")
-    links = np.column_stack([sender, told.heard("receiver")])
+    sender = told.received("receiver") // 12 * 12 + told.received("sender")
+    links = np.column_stack([sender, told.received("receiver")])
     both = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).reshape(-1, 2)
     np.testing.assert_array_equal(links[np.lexsort(links.T[::-1])], both)
     np.testing.assert_array_equal(edges, edges[np.lexsort(edges.T[::-1])])
@@ -142,7 +146,7 @@ def test_fate_of_a_link_is_listed_once():
     told = run(make_air(Radio(9.0, loss=0.5, latency_s=0.2), 6), scattered(6), everybody(6), 4, 6)
     links = np.column_stack([told.finished(name) for name in ("sender", "receiver", "sequence")])
     assert len(np.unique(links, axis=0)) == len(links) == 6 * 5 * 4
-    assert set(told.finished("fate")) == {Fate.HEARD, Fate.LOST}
+    assert set(told.finished("fate")) == {Fate.RECEIVED, Fate.LOST}
 
 
 SIZE_M = (6.0, 4.0)
@@ -181,7 +185,7 @@ def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: floa
     """Ranges make grids of one, two, four and more cells a side."""
     pose = scattered_torus(80)
     out = run(torus(Radio(range_m=range_m, gives=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
-    receiver, sender = out.heard("receiver"), out.heard("sender")
+    receiver, sender = out.received("receiver"), out.received("sender")
     sender = sender + receiver // 40 * 40
     found = pairs(receiver, sender)
     assert found == expected_pairs(pose, 40, range_m)
@@ -198,10 +202,10 @@ def test_an_addressed_packet_crosses_the_seam() -> None:
     pose = np.array([[2.9, 1.9, 0.0], [-2.9, -1.9, 0.0], [0.0, 0.0, 0.0]])
     radio = Radio(range_m=1.0, gives=EXACT)
     out = run(torus(radio, 3), pose, lambda _: packets([0, 0], [1, 2]), ticks=1, quiet_ticks=2)
-    assert (out.heard("receiver").tolist(), out.heard("sender").tolist()) == ([1], [0])
+    assert (out.received("receiver").tolist(), out.received("sender").tolist()) == ([1], [0])
     assert out.given("range_m") == pytest.approx([np.hypot(0.2, 0.2)])
     assert out.given("bearing_rad") == pytest.approx([-0.75 * np.pi])
-    assert out.fates() == {"HEARD": 1, "OUT_OF_RANGE": 1}
+    assert out.fates() == {"RECEIVED": 1, "OUT_OF_RANGE": 1}
 
 
 def test_slow_waves_take_the_shortest_way() -> None:
@@ -210,7 +214,7 @@ def test_slow_waves_take_the_shortest_way() -> None:
     for speed_mps in (None, 340.0):
         radio = Radio(range_m=1.0, propagation_mps=speed_mps)
         out = run(torus(radio, 2), pose, lambda _: packets([0]), ticks=1, quiet_ticks=2)
-        late_ns += out.heard("heard_at_ns").tolist()
+        late_ns += out.received("received_at_ns").tolist()
     assert late_ns[1] - late_ns[0] == pytest.approx(0.2 / 340.0 * 1e9, abs=2)
 
 

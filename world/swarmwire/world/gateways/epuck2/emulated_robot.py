@@ -63,7 +63,7 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
-        self._robot.hear(self, data)
+        self._robot.on_receive(self, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """As asyncio has it."""
@@ -100,7 +100,7 @@ class EmulatedRobot:
         if connection in self._waiting:
             connection.transport.pause_reading()
 
-    def hear(self, connection: Connection, data: bytes) -> None:
+    def on_receive(self, connection: Connection, data: bytes) -> None:
         """The connection that is served sent this; what it told is done, even if it did not wait for the answers."""
         try:
             for command in connection.commands.fed(data):
