@@ -47,7 +47,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "processes-200-plain": partial(plain_processes, robots=200, ticks=200),
     "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
     "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),
-    "realtime-50": partial(realtime, robots=50, runners=2, quantum_s=0.001, duration_s=30.0),
+    "realtime-50": partial(realtime, robots=50, runners=2, subtick_s=0.001, duration_s=30.0),
     "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),

@@ -1,4 +1,4 @@
-"""Real time with a quantum: how late packets are handed over, and how late ticks begin."""
+"""Real time with a subtick: how late packets are handed over, and how late ticks begin."""
 
 import os
 import statistics
@@ -13,21 +13,21 @@ AGENT = "benchmarks.agents:Relay"
 MS_PER_S = 1000.0
 
 
-def realtime(name: str, repeats: int, *, robots: int, runners: int, quantum_s: float, duration_s: float) -> None:
+def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: float, duration_s: float) -> None:
     """Actual minus modelled delivery and tick jitter of robots that relay; p99 in ms, the rest beside it."""
     mapping = scenes.flocking(robots, duration_s)
     mapping["robots"]["flock"]["agent"] = AGENT
     mapping["radio"] |= {"latency_s": 0.005, "jitter_s": 0.002}
     scenario = scenario_from(mapping, name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
-    results = [run(scenario, runners=runners, realtime=1.0, quantum=quantum_s) for _ in range(repeats)]
+    results = [run(scenario, runners=runners, realtime=1.0, subtick=subtick_s) for _ in range(repeats)]
     told = [result.realtime for result in results if result.realtime]
     delivery = [_ms(of.delivery) for of in told]
     jitter = [_ms(of.tick_jitter) for of in told]
     for of, values, last in ((name, delivery, told[-1].delivery), (f"{name}-jitter", jitter, told[-1].tick_jitter)):
         config = {
             "agent": AGENT,
-            "quantum_s": quantum_s,
+            "subtick_s": subtick_s,
             "radio": mapping["radio"],
             "p50_ms": round(last.p50_s * MS_PER_S, 3) if last else None,
             "worst_ms": round(last.worst_s * MS_PER_S, 3) if last else None,

@@ -76,8 +76,8 @@ def _drawn(run: IntArray, what: str) -> FloatArray:
 
 def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
     numbers = [*(f"{metric}.final" for metric in METRICS), "radio.pdr"]
-    outcomes = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
-    outcomes += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
+    tx_status = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
+    tx_status += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
     return {
         "format": 1,
         "name": "made up",
@@ -94,5 +94,5 @@ def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
         "points": [{"radio.loss": loss, "robots.flock.count": count} for loss, count in points],
         "overrides": [],
         "duration_s": LIMIT_S,
-        "outcomes": outcomes,
+        "outcomes": tx_status,
     }

@@ -73,6 +73,6 @@ def flocking(robots: int, duration_s: float, agent: str = "swarmwire.agent.behav
             "loss": 0.3,
             "latency_s": 0.1,
             "jitter_s": 0.02,
-            "gives": {"range": {"noise_m": 0.02}, "bearing": {"noise_rad": 0.05}},
+            "measures": {"range": {"noise_m": 0.02}, "bearing": {"noise_rad": 0.05}},
         },
     }

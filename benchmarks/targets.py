@@ -71,7 +71,7 @@ TARGETS = {
         "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",
     ),
     "realtime-50": most(
-        2, "50 robots that relay, 2 runners, 1 ms quantum: 99 % of packets are handed over no later than so after due"
+        2, "50 robots that relay, 2 runners, 1 ms subtick: 99 % of packets are handed over no later than so after due"
     ),
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"

@@ -18,7 +18,7 @@ from benchmarks import scenes
 from benchmarks.lines import print_line
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire.access_control import RunAccess, agents_access
 from swarmwire.comms.wire.keys import Keys
@@ -49,13 +49,15 @@ class InTurn:
     def start(self) -> None:
         """All of them have been started."""
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What the last one says; the others say the same."""
         first = tick % len(KINDS)
         took, actions = dict[str, int](), None
         for kind in (*KINDS[first:], *KINDS[:first]):
             before_ns = self._clock.now_ns()
-            actions = self._backends[kind].act(tick, senses, received, outcomes)
+            actions = self._backends[kind].act(tick, senses, received, tx_status)
             took[kind] = self._clock.now_ns() - before_ns
         self.took_ns.append(took)
         assert actions is not None

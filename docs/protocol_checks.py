@@ -14,7 +14,7 @@ from swarmwire.agent import runner
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
+from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
@@ -88,7 +88,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
         own=Actuations(ROWS, ROWS, zeros),
         values=Values(ROWS, zeros),
     )
-    tick = encode_tick(0, senses, received, Outcomes(one, one, one))
+    tick = encode_tick(0, senses, received, TxStatuses(one, one, one))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):
         ours = {array: (value.dtype.str, value.ndim) for array, value in frames.decode(data).arrays.items()}
         yield f"arrays of {name}", page.arrays(name), ours
@@ -99,7 +99,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
 def _numbers(page: _Page) -> Iterator[Comparison]:
     sizes = {code: dtype.itemsize for code, dtype in frames.DTYPES.items()}
     yield "bytes of dtypes", {code: int(size) for code, (_, size) in page.table("dtypes").items()}, sizes
-    yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in SendResult]
+    yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in TxResult]
     yield "the tag of Heading", re.findall(r"<!-- tag: Heading -->(\d+)", page.text), [str(Heading.tag)]
     limits = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
     limits |= {"frame": frames.MAX_BYTES, "items": frames.MAX_ITEMS, "request to join": join.MAX_JOIN_BYTES}

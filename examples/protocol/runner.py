@@ -59,14 +59,14 @@ def frame(kind: str, tick: int, arrays: dict[str, Any], values: dict[str, Any]) 
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": arrays, "values": values})
 
 
-def neighbours(arrays: dict[str, Any], gives: list[str]) -> dict[int, list[Neighbour]]:
+def neighbours(arrays: dict[str, Any], measures: list[str]) -> dict[int, list[Neighbour]]:
     """What each robot row received of headings."""
     received: dict[int, list[Neighbour]] = {}
     if "received/numbers" in arrays:
         count = arrays["received/numbers"][1][1]
         numbers, given = unpacked(arrays["received/numbers"]), unpacked(arrays["received/given"])
         data, offset = arrays["received/data"][2], unpacked(arrays["received/offset"])
-        range_m, bearing_rad = (given[gives.index(name) * count :] for name in ("range_m", "bearing_rad"))
+        range_m, bearing_rad = (given[measures.index(name) * count :] for name in ("range_m", "bearing_rad"))
         for at, payload in enumerate(numbers[4 * count :]):
             message = data[offset[payload] : offset[payload + 1]]
             if len(message) == 6 and int.from_bytes(message[:2], "little") == TAG:
@@ -77,7 +77,7 @@ def neighbours(arrays: dict[str, Any], gives: list[str]) -> dict[int, list[Neigh
 
 def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
     """A command and a packet of each robot that acts in a tick."""
-    received = neighbours(arrays, assignment["gives"])
+    received = neighbours(arrays, assignment["measures"])
     rows: list[int] = []
     commands: list[list[float]] = []
     messages = b""

@@ -21,7 +21,7 @@ from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
 from swarmwire.comms.bodies.sensors import SHEETS
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.config.impairments import Gives
+from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
@@ -94,7 +94,7 @@ def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
     kinds = [kind for kind in vars(readings).values() if isinstance(kind, type) and is_dataclass(kind)]
     read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"sheet", "vector_sum", "of"} <= named
-    assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Gives))} <= named
+    assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
     assert {f"[senses.{name}]" for name in SHEETS} <= named
     assert {of.name for kind in SHEETS.values() for of in fields(kind)} <= named
 

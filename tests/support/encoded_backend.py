@@ -12,7 +12,7 @@ import zenoh
 
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.world.backends.allocation import split
@@ -38,10 +38,12 @@ class EncodedBackend:
             self._runners[name] = inbox, answers(assignment, memory, inbox)
             self._lockstep.answer(name, next(self._runners[name][1]))
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """One frame to every runner, one answer from each, in a random order."""
         answered: list[tuple[str, bytes]] = []
-        for name, data in self._lockstep.open_tick(tick, senses, received, outcomes):
+        for name, data in self._lockstep.open_tick(tick, senses, received, tx_status):
             inbox, its = self._runners[name]
             inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
             answered.append((name, next(its)))

@@ -2,7 +2,7 @@
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.api_version import API_VERSION
-from swarmwire.agent.packet import Outcome, Packet
+from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import (
@@ -16,7 +16,7 @@ from swarmwire.agent.vector_agent import (
     per_robot,
 )
 from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
-from swarmwire.comms.packets import Outcomes, SendResult
+from swarmwire.comms.packets import TxResult, TxStatuses
 
 __all__ = [
     "API_VERSION",
@@ -25,14 +25,14 @@ __all__ = [
     "FloatColumn",
     "IntColumn",
     "Message",
-    "Outcome",
-    "Outcomes",
     "Packet",
     "PerRobot",
     "Robot",
     "Robots",
-    "SendResult",
     "State",
+    "TxResult",
+    "TxStatus",
+    "TxStatuses",
     "VectorAgent",
     "column",
     "f4",

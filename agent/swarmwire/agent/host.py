@@ -1,4 +1,4 @@
-"""What robots are told of the radio: packets received, and outcomes of their own."""
+"""What robots are told of the radio: packets received, and tx statuses of their own."""
 
 import traceback
 from abc import ABC, abstractmethod
@@ -17,24 +17,25 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
 
 class Told(NamedTuple):
-    """Packets received and outcomes, in the orders that these promise; true if there is any."""
+    """Packets received and tx statuses, in the orders that these promise; true if there is any."""
 
     received: ReceivedPackets
-    outcomes: Outcomes
+    tx_status: TxStatuses
 
     def __bool__(self) -> bool:
-        return bool(len(self.received) or len(self.outcomes))
+        return bool(len(self.received) or len(self.tx_status))
 
     def followed_by(self, other: "Told") -> "Told":
         """Both together."""
         return Told(
-            ReceivedPackets.joined([self.received, other.received]), Outcomes.joined([self.outcomes, other.outcomes])
+            ReceivedPackets.joined([self.received, other.received]),
+            TxStatuses.joined([self.tx_status, other.tx_status]),
         )
 
     def of(self, rows: IntArray) -> "Told":
@@ -43,11 +44,11 @@ class Told(NamedTuple):
 
     def parted(self, rows: IntArray) -> "tuple[Told, Told]":
         """What is for these robot rows, (n,), and what is for others."""
-        received, told = np.isin(self.received.receiver, rows), np.isin(self.outcomes.row, rows)
+        received, told = np.isin(self.received.receiver, rows), np.isin(self.tx_status.row, rows)
         if received.all() and told.all():
-            return self, Told(self.received.select(NONE), self.outcomes.select(NONE))
+            return self, Told(self.received.select(NONE), self.tx_status.select(NONE))
         ours, theirs = (
-            Told(self.received.select(np.flatnonzero(h)).compacted(), self.outcomes.select(np.flatnonzero(o)))
+            Told(self.received.select(np.flatnonzero(h)).compacted(), self.tx_status.select(np.flatnonzero(o)))
             for h, o in ((received, told), (~received, ~told))
         )
         return ours, theirs
@@ -77,10 +78,10 @@ class Host:
         for name, kept in (memory or {}).items():
             self._groups[name].recall(kept)
 
-    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
         rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
-        came = Told(received, outcomes).of(np.sort(rows))
+        came = Told(received, tx_status).of(np.sort(rows))
         if came:
             self._waiting = self._waiting.followed_by(came) if self._waiting else came
 
@@ -94,16 +95,18 @@ class Host:
                     sent.append(agents.on_receive((tick, at_ns, self._time(tick, agents.group)[2]), its))
         return SentPackets.joined(sent)
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         if self._waiting:
             acting_rows = [self._groups[name].group.rows for name in senses]
             # Also what waits for the dead of these groups: it is lost with them.
             its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
-            received, outcomes = Told(received, outcomes).followed_by(its) if its else (received, outcomes)
+            received, tx_status = Told(received, tx_status).followed_by(its) if its else (received, tx_status)
         acting = ((self._groups[name], group) for name, group in senses.items())
         return Actions.joined(
-            [agents.act(self._time(tick, agents.group), group, received, outcomes) for agents, group in acting]
+            [agents.act(self._time(tick, agents.group), group, received, tx_status) for agents, group in acting]
         )
 
     def memory(self, names: Iterable[str]) -> Memory:
@@ -132,7 +135,7 @@ class Hosted(ABC):
         time: tuple[int, int, int],
         senses: GroupSenses,
         received: ReceivedPackets,
-        outcomes: Outcomes = NO_OUTCOMES,
+        tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> Actions:
         """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
@@ -150,7 +153,7 @@ class Hosted(ABC):
             time,
             senses,
             _own(received, senses.rows),
-            self._own_outcomes(outcomes, senses.rows, place),
+            self._own_tx_status(tx_status, senses.rows, place),
             self.group.keys[place],
             sent_before,
         )
@@ -175,7 +178,7 @@ class Hosted(ABC):
             time,
             senses,
             _own(told.received, self.rows),
-            self._own_outcomes(told.outcomes, self.rows, place),
+            self._own_tx_status(told.tx_status, self.rows, place),
             self.group.keys[place],
             sent_before,
             self._hearings * DRAWS_APART,
@@ -219,17 +222,17 @@ class Hosted(ABC):
     def fill(self, kept: GroupMemory) -> bool:
         """Take over the memory of the robots that it is of, whose rows are kept; whether agents have any."""
 
-    def _own_outcomes(self, outcomes: Outcomes, rows: IntArray, place: slice | IntArray) -> Outcomes:
-        """The outcomes of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
+    def _own_tx_status(self, tx_status: TxStatuses, rows: IntArray, place: slice | IntArray) -> TxStatuses:
+        """Tx statuses of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
 
         Without those of packets that an agent before this one sent: the robot died since, or its runner was lost.
         """
-        if not len(outcomes) or not len(rows):
-            return NO_OUTCOMES
-        mine = outcomes.select(np.flatnonzero(np.isin(outcomes.row, rows)))
+        if not len(tx_status) or not len(rows):
+            return NO_TX_STATUSES
+        mine = tx_status.select(np.flatnonzero(np.isin(tx_status.row, rows)))
         at = np.searchsorted(rows, mine.row)
         own = (self._first_own[place][at] <= mine.id) & (mine.id < self._sent_before[place][at])
-        return Outcomes(at, mine.id, mine.result).select(np.flatnonzero(own))
+        return TxStatuses(at, mine.id, mine.result).select(np.flatnonzero(own))
 
     @abstractmethod
     def step(self, turn: Turn) -> None:
@@ -298,7 +301,7 @@ class _Single(Hosted):
             self._call(self._agents[row].step, turn, at, row)
 
     def listen(self, turn: Turn) -> None:
-        told = np.union1d(turn.received.receiver, turn.outcome_rows)
+        told = np.union1d(turn.received.receiver, turn.tx_status_rows)
         for at in cast("list[int]", told.tolist()):
             row = int(turn.senses.rows[at])
             self._call(self._agents[row].on_receive, turn, at, row)

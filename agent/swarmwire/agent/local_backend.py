@@ -3,7 +3,7 @@
 from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 
 
@@ -21,13 +21,15 @@ class LocalBackend:
         """Make the agents."""
         self._host = Host(self._assignment)
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What every robot does in this tick."""
-        return self._started().act(tick, _read_only(senses), _received_read_only(received), outcomes)
+        return self._started().act(tick, _read_only(senses), _received_read_only(received), tx_status)
 
-    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep this until the robots that it is for step, or hear."""
-        self._started().receive(_received_read_only(received), outcomes)
+        self._started().receive(_received_read_only(received), tx_status)
 
     def on_receive(self, tick: int, at_ns: int) -> SentPackets:
         """Let agents that read between ticks read, at a time in this tick; what they sent."""

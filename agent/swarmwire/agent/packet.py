@@ -8,20 +8,20 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import TAG_BYTES, ReceivedPackets, SendResult
+from swarmwire.comms.packets import TAG_BYTES, ReceivedPackets, TxResult
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TxStatus:
     """One addressed packet whose fate the sender's radio knows, as far as it can."""
 
     id: int  # that `send` returned
-    result: SendResult
+    result: TxResult
 
     @property
     def acknowledged(self) -> bool:
         """Whether it arrived for certain; if not, it may have arrived all the same, and its acknowledgement not."""
-        return self.result == SendResult.ACKNOWLEDGED
+        return self.result == TxResult.ACKNOWLEDGED
 
 
 # --- Packets as agents see them: one object each for an Agent, columns for a VectorAgent.

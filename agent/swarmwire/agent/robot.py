@@ -5,7 +5,7 @@ from typing import Any, TypeVar, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.packet import Outcome, Packet
+from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
 from swarmwire.agent.robots import Draw, forward_and_turn
 from swarmwire.agent.sensors import Sensing
@@ -13,7 +13,7 @@ from swarmwire.agent.step_context import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
-from swarmwire.comms.packets import SendResult
+from swarmwire.comms.packets import TxResult
 
 M = TypeVar("M", bound=Message)
 
@@ -123,11 +123,11 @@ class RadioPort:
         return self._turn.send_one(self._row, to, _encoded(message))
 
     @property
-    def outcomes(self) -> list[Outcome]:
+    def tx_status(self) -> list[TxStatus]:
         """Packets sent to one robot that the radio is done with since the robot's last step, by id."""
-        table = self._turn.outcomes()
+        table = self._turn.tx_status()
         ids, results = table.id.tolist(), table.result.tolist()
-        return [Outcome(ids[at], SendResult(results[at])) for at in self._span(table.row)]
+        return [TxStatus(ids[at], TxResult(results[at])) for at in self._span(table.row)]
 
     def _span(self, row: IntArray) -> range:
         if not len(row):

@@ -13,7 +13,7 @@ from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import Message, encode_rows, message_class
-from swarmwire.comms.packets import Outcomes
+from swarmwire.comms.packets import TxStatuses
 
 
 class Draws:
@@ -167,9 +167,9 @@ class RadioRows:
         return self._turn.packets(kind)
 
     @property
-    def outcomes(self) -> Outcomes:
+    def tx_status(self) -> TxStatuses:
         """Packets sent to one robot that the radios are done with since the last step: row (0 to n - 1), id, result."""
-        return self._turn.outcomes()
+        return self._turn.tx_status()
 
     def send(
         self,

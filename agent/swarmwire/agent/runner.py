@@ -26,7 +26,7 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
-from swarmwire.comms.packets import Outcomes, ReceivedPackets
+from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, decode_memory
@@ -153,15 +153,15 @@ class Inbox:
     def ticks(
         self,
         assignment: Assignment,
-        receive: Callable[[ReceivedPackets, Outcomes], None] = lambda _received, _outcomes: None,
-    ) -> Iterator[tuple[int, Senses, ReceivedPackets, Outcomes] | tuple[int, int]]:
+        receive: Callable[[ReceivedPackets, TxStatuses], None] = lambda _received, _tx_status: None,
+    ) -> Iterator[tuple[int, Senses, ReceivedPackets, TxStatuses] | tuple[int, int]]:
         """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
 
         What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
         """
-        gives, rows = assignment.gives or (), {group.name: group.rows for group in assignment.groups}
+        measures, rows = assignment.measures or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
-        newest: tuple[int, Senses, ReceivedPackets, Outcomes] | None = None
+        newest: tuple[int, Senses, ReceivedPackets, TxStatuses] | None = None
         between: tuple[int, int] | None = None
         tick = -1
         while True:
@@ -186,15 +186,15 @@ class Inbox:
                     self.ended = _end(frame)
                     return
                 if frame.kind == "packets":
-                    at_ns, number, received, outcomes = decode_packets(frame, gives)
+                    at_ns, number, received, tx_status = decode_packets(frame, measures)
                     self.missed += max(0, number - self._next_packets)
                     self._next_packets = number + 1
-                    receive(received, outcomes)
+                    receive(received, tx_status)
                     between = frame.tick, at_ns
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-                told = decode_tick(frame, gives, rows.keys())
+                told = decode_tick(frame, measures, rows.keys())
                 check_rows(told[0], told[1], rows)
             except BadFrame:
                 self.dropped += 1
@@ -280,8 +280,8 @@ def answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iter
                     missed, inbox.missed = inbox.missed, 0
                     yield encode_sent(told[0], sent, missed)
                 continue
-            tick, senses, received, outcomes = told
-            actions = host.act(tick, senses, received, outcomes)
+            tick, senses, received, tx_status = told
+            actions = host.act(tick, senses, received, tx_status)
             dropped, inbox.dropped = inbox.dropped, 0
             yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(senses))
         return

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import NotFitted
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import (
     NO_ACTUATIONS,
     NO_LED_CHANGES,
@@ -25,14 +25,14 @@ from swarmwire.comms.tick_io import (
 )
 
 M = TypeVar("M", bound=Message)
-OUTCOMES = "radio.outcomes"  # what `needs` calls the outcomes of addressed packets
+OUTCOMES = "radio.tx_status"  # what `needs` calls the tx statuses of addressed packets
 NOT_SWITCHED = -1
 
 
 class Turn:
     """The robots `senses.rows` of a group in one tick.
 
-    `received.receiver` and `outcomes.row` count these rows from 0.
+    `received.receiver` and `tx_status.row` count these rows from 0.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Turn:
         time: tuple[int, int, int],
         senses: GroupSenses,
         received: ReceivedPackets,
-        outcomes: Outcomes,
+        tx_status: TxStatuses,
         keys: KeyArray,
         sent_before: IntArray,
         first_draw: int = 0,
@@ -51,8 +51,8 @@ class Turn:
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
         self.senses, self.received = senses, received
-        self._outcomes, self._asks = outcomes, OUTCOMES in needs
-        self.outcome_rows = outcomes.row  # (k,) places of robots that there is an outcome for
+        self._tx_status, self._asks = tx_status, OUTCOMES in needs
+        self.tx_status_rows = tx_status.row  # (k,) places of robots that there is an outcome for
         self.keys = keys  # (n,) of the robots' draws
         self.n = len(senses.rows)
         self.drive = np.zeros(self.n, np.bool_)
@@ -78,10 +78,10 @@ class Turn:
         of = f"{sense}."
         return {name.removeprefix(of): values for name, values in self.senses.fields.items() if name.startswith(of)}
 
-    def outcomes(self) -> Outcomes:
+    def tx_status(self) -> TxStatuses:
         """What became of packets that these robots sent; NotDeclared if the agent's needs do not name it."""
         self._require(OUTCOMES)
-        return self._outcomes
+        return self._tx_status
 
     def packets(self, kind: type[M]) -> Packets[M]:
         """All packets of a message class that these robots received."""
@@ -124,8 +124,8 @@ class Turn:
         ids = self._sent_before[place].copy()
         self._sent_before[place] += 1
         # Whoever does not ask is not told, and nothing of it crosses the wire.
-        outcome_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
-        self._outbox.append(SentPackets(self.senses.rows[place], receiver, payloads, outcome_id))
+        tx_status_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
+        self._outbox.append(SentPackets(self.senses.rows[place], receiver, payloads, tx_status_id))
         return ids
 
     def send_one(self, place: int, to: int | None, payload: bytes) -> int:
@@ -138,9 +138,9 @@ class Turn:
             receiver = int(to)
         id_ = self._sent_before.item(place)
         self._sent_before[place] = id_ + 1
-        outcome_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
+        tx_status_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
         sender = self.senses.rows[place : place + 1]
-        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), outcome_id))
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
         return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:

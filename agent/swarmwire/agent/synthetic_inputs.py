@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.bodies.sensors import Camera, GroundColour, OwnSheet
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import NO_OUTCOMES, UNTOLD, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.tick_io import GroupSenses
 
 
@@ -22,8 +22,8 @@ class Trial:
     """What to try an agent with: robots whose senses and packets are made up.
 
     All that the body senses is drawn anew in each tick. What robots send is received a tick later, by each of the
-    others with probability 0.4, and outcomes of all kinds are told to an agent that needs them. A tenth of the robots
-    is missing in each tick and starts afresh when it is back.
+    others with probability 0.4, and tx statuses of all kinds are told to an agent that needs them. A tenth of the
+    robots is missing in each tick and starts afresh when it is back.
     """
 
     robots: int = 7  # of one group
@@ -40,15 +40,15 @@ class Trial:
 
 # --- What robots of a trial sense and hear, made up and keyed by its seed.
 #
-# Ragged packets (what robots sent a tick ago, received by some), outcomes of addressed ones, robots that drop out and
-# come back.
+# Ragged packets (what robots sent a tick ago, received by some), tx statuses of addressed ones, robots that drop out
+# and come back.
 
 
 RATE_HZ = 10
 GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
 DROP_OUT = 0.1  # share of the robots missing in a tick
 HEARING = 0.4  # share of the senders that a robot hears
-LEARNING = 0.6  # share of the outcomes still to come that come in a tick
+LEARNING = 0.6  # share of the tx statuses still to come that come in a tick
 
 
 class _Ether:
@@ -56,17 +56,17 @@ class _Ether:
 
     def __init__(self, key: int) -> None:
         self._key, self._sent = key, SentPackets.none()
-        self._untold = NO_OUTCOMES
+        self._untold = NO_TX_STATUSES
 
     def show(self, sent: SentPackets) -> None:
         self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        asked = np.flatnonzero(self._sent.outcome_ids != UNTOLD)
-        row, id_ = self._sent.sender[asked], self._sent.outcome_ids[asked]
+        asked = np.flatnonzero(self._sent.tx_status_ids != UNTOLD)
+        row, id_ = self._sent.sender[asked], self._sent.tx_status_ids[asked]
         chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
-        new = Outcomes(row, id_, (chance * len(SendResult)).astype(np.int64))
-        self._untold = Outcomes.joined([self._untold, new])
+        new = TxStatuses(row, id_, (chance * len(TxResult)).astype(np.int64))
+        self._untold = TxStatuses.joined([self._untold, new])
 
-    def outcomes(self, tick: int) -> Outcomes:
+    def tx_status(self, tick: int) -> TxStatuses:
         """As the air would tell them: also to robots that have dropped out, and to those that have forgotten."""
         comes = _uniform(self._key, tick, "learning", (len(self._untold),)) < LEARNING
         told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
@@ -83,12 +83,12 @@ class _Ether:
 
 
 class Given(NamedTuple):
-    """What a group is given in a tick: time (its number, start and length in ns), senses, packets and outcomes."""
+    """What a group is given in a tick: time (its number, start and length in ns), senses, packets and tx statuses."""
 
     time: tuple[int, int, int]
     senses: GroupSenses
     received: ReceivedPackets
-    outcomes: Outcomes
+    tx_status: TxStatuses
 
 
 def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]]:
@@ -100,7 +100,7 @@ def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
         senses = GroupSenses(rows, _senses(body, key, tick, rows))
-        yield Given(time, senses, ether.received(tick, rows), ether.outcomes(tick)), ether.show
+        yield Given(time, senses, ether.received(tick, rows), ether.tx_status(tick)), ether.show
 
 
 def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:

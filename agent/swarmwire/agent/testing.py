@@ -64,12 +64,12 @@ def _actuated(actions: Actions, body: Body) -> Iterator[Deed]:
 
 def _sent(sent: SentPackets) -> Iterator[Deed]:
     packets: dict[int, int] = {}  # of each robot, up to now
-    columns = sent.sender.tolist(), sent.to.tolist(), sent.outcome_ids.tolist()
-    for at, (robot, to, outcome_id) in enumerate(zip(*columns, strict=True)):
+    columns = sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()
+    for at, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
         number = packets[robot] = packets.get(robot, 0) + 1
         yield robot, f"packet {number}: to", "all" if to == BROADCAST else f"robot {to}"
-        if outcome_id != UNTOLD:
-            yield robot, f"packet {number}: id", str(outcome_id)
+        if tx_status_id != UNTOLD:
+            yield robot, f"packet {number}: id", str(tx_status_id)
         for name, value in _fields(sent.payloads.row(at)):
             yield robot, f"packet {number}: {name}", value
 
@@ -162,4 +162,4 @@ def _only(row: int, given: Given) -> Given:
     at = np.flatnonzero(given.senses.rows == row)
     own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
     received = given.received.select(np.flatnonzero(given.received.receiver == row))
-    return Given(given.time, own, received, given.outcomes.select(np.flatnonzero(given.outcomes.row == row)))
+    return Given(given.time, own, received, given.tx_status.select(np.flatnonzero(given.tx_status.row == row)))

@@ -31,7 +31,7 @@ class Assignment:
 
     groups: tuple[GroupAssignment, ...]
     rate_hz: int
-    gives: tuple[str, ...] | None  # columns that the radio tells with a packet; None: there is no radio
+    measures: tuple[str, ...] | None  # columns that the radio tells with a packet; None: there is no radio
 
     @property
     def robot_names(self) -> tuple[str, ...]:
@@ -51,7 +51,7 @@ class Assignment:
         """The assignment as plain values that msgpack takes."""
         return {
             "rate_hz": self.rate_hz,
-            "gives": None if self.gives is None else list(self.gives),
+            "measures": None if self.measures is None else list(self.measures),
             "groups": [
                 {
                     "name": group.name,
@@ -71,8 +71,8 @@ class Assignment:
     def from_mapping(cls, given: dict[str, Any]) -> "Assignment":
         """The assignment that `as_mapping` described; BadFrame if this is none."""
         try:
-            gives = None if given["gives"] is None else _texts(given["gives"])
-            return cls(tuple(_group(group) for group in given["groups"]), _whole(given["rate_hz"]), gives)
+            measures = None if given["measures"] is None else _texts(given["measures"])
+            return cls(tuple(_group(group) for group in given["groups"]), _whole(given["rate_hz"]), measures)
         except (KeyError, TypeError, ValueError, OverflowError, BadInput) as error:
             raise BadFrame("malformed", f"expected robots: {' '.join(str(error).split())}") from error
 

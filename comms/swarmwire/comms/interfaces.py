@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 
@@ -15,7 +15,7 @@ class AgentBackend(Protocol):
         """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         """What every robot does in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 
@@ -71,7 +71,7 @@ class AirTime(Protocol):
         """Take packets that came no sooner than those before them, and within the tick."""
         ...
 
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         ...
 
@@ -80,11 +80,11 @@ class TimedBackend(AgentBackend, Protocol):
     """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """What every robot does in this tick, but for packets, which were put on the air.
 
-        `received` and `outcomes` are what came since the last tick, for robots that do not act in this one as well.
+        `received` and `tx_status` are what came since the last tick, for robots that do not act in this one as well.
         """
         ...
 
@@ -92,7 +92,7 @@ class TimedBackend(AgentBackend, Protocol):
 class ReceivingBackend(AgentBackend, Protocol):
     """A backend in this process whose agents can read between ticks."""
 
-    def receive(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep this until the robots that it is for step, or hear."""
         ...
 

@@ -37,7 +37,7 @@ FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summarie
 
 BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
-UNTOLD = -1  # the outcome id of a packet whose sender does not ask
+UNTOLD = -1  # the tx status id of a packet whose sender does not ask
 TAG_BYTES = 2  # at the start of a payload: which class of messages it is
 
 
@@ -126,20 +126,20 @@ class SentPackets:
     sender: IntArray  # (k,) robot row: arena x robots + index
     to: IntArray  # (k,) index in the arena of the one receiver, BROADCAST or, between loop and air, NOWHERE
     payloads: Payloads  # (k,)
-    outcome_id: IntArray | None = None  # (k,) under which a sender is told of a packet, or UNTOLD; None: all UNTOLD
+    tx_status_id: IntArray | None = None  # (k,) under which a sender is told of a packet, or UNTOLD; None: all UNTOLD
 
     def __len__(self) -> int:
         return len(self.sender)
 
     @property
-    def outcome_ids(self) -> IntArray:
-        """`outcome_id`, also where nobody asks, (k,)."""
-        return np.full(len(self), UNTOLD) if self.outcome_id is None else self.outcome_id
+    def tx_status_ids(self) -> IntArray:
+        """`tx_status_id`, also where nobody asks, (k,)."""
+        return np.full(len(self), UNTOLD) if self.tx_status_id is None else self.tx_status_id
 
     def select(self, index: IntArray) -> "SentPackets":
         """The packets of `index` (k,), in its order."""
-        outcome_id = None if self.outcome_id is None else self.outcome_id[index]
-        return SentPackets(self.sender[index], self.to[index], self.payloads.rows(index), outcome_id)
+        tx_status_id = None if self.tx_status_id is None else self.tx_status_id[index]
+        return SentPackets(self.sender[index], self.to[index], self.payloads.rows(index), tx_status_id)
 
     @classmethod
     def none(cls) -> "SentPackets":
@@ -157,8 +157,8 @@ class SentPackets:
             np.concatenate([part.sender for part in parts]),
             np.concatenate([part.to for part in parts]),
             Payloads.joined([part.payloads for part in parts]),
-            np.concatenate([part.outcome_ids for part in parts])
-            if any(part.outcome_id is not None for part in parts)
+            np.concatenate([part.tx_status_ids for part in parts])
+            if any(part.tx_status_id is not None for part in parts)
             else None,
         )
 
@@ -182,9 +182,9 @@ class ReceivedPackets:
         return len(self.receiver)
 
     @classmethod
-    def none(cls, gives: tuple[str, ...] = ()) -> "ReceivedPackets":
+    def none(cls, measures: tuple[str, ...] = ()) -> "ReceivedPackets":
         """Nothing received over a medium that gives the named columns."""
-        given = {name: np.empty(0, np.float64) for name in gives}
+        given = {name: np.empty(0, np.float64) for name in measures}
         return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "ReceivedPackets":
@@ -227,7 +227,7 @@ class ReceivedPackets:
 # --- What a sender's radio knows of an addressed packet once it is done with it: all but what became of it elsewhere.
 
 
-class SendResult(Explained):
+class TxResult(Explained):
     """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
@@ -238,12 +238,12 @@ class SendResult(Explained):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcomes:
+class TxStatuses:
     """Packets that their senders' radios are done with, sorted by (row, id)."""
 
     row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between backend and air arena x robots + index
     id: IntArray  # (k,) that `send` returned
-    result: IntArray  # (k,) SendResult
+    result: IntArray  # (k,) TxResult
 
     def __len__(self) -> int:
         return len(self.row)
@@ -251,21 +251,21 @@ class Outcomes:
     @property
     def acknowledged(self) -> BoolArray:
         """Which packets arrived for certain, (k,)."""
-        return self.result == SendResult.ACKNOWLEDGED
+        return self.result == TxResult.ACKNOWLEDGED
 
-    def select(self, index: IntArray) -> "Outcomes":
+    def select(self, index: IntArray) -> "TxStatuses":
         """The rows of `index` (k,), in its order."""
-        return Outcomes(self.row[index], self.id[index], self.result[index])
+        return TxStatuses(self.row[index], self.id[index], self.result[index])
 
     @classmethod
-    def joined(cls, parts: "list[Outcomes]") -> "Outcomes":
-        """The outcomes of all parts, sorted."""
+    def joined(cls, parts: "list[TxStatuses]") -> "TxStatuses":
+        """The tx statuses of all parts, sorted."""
         parts = [part for part in parts if len(part)]
         if not parts:
-            return NO_OUTCOMES
+            return NO_TX_STATUSES
         row, id_, result = (np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "id", "result"))
         return cls(row, id_, result).select(np.lexsort((id_, row)))
 
 
 _NOTHING.setflags(write=False)
-NO_OUTCOMES = Outcomes(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell
+NO_TX_STATUSES = TxStatuses(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell

@@ -9,7 +9,7 @@ from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
 
 FASTEST = 1e6  # factor in real time
-MIN_QUANTUM_S = 0.001
+MIN_SUBTICK_S = 0.001
 LARGEST_SEED = 2**63 - 1
 MAX_SEEDS = 1_000_000
 MAX_ARENAS = 10_000  # of one world
@@ -84,19 +84,19 @@ def real_time_factor(realtime: float | str | None) -> float | None:
     return factor
 
 
-def quantum_of(quantum: float | None, factor: float | None, scenario: Scenario) -> float | None:
-    """The quantum of a run in real time at so many times the wall clock's pace, in s; BadInput if it cannot be."""
-    if quantum is None:
+def subtick_of(subtick: float | None, factor: float | None, scenario: Scenario) -> float | None:
+    """The subtick of a run in real time at so many times the wall clock's pace, in s; BadInput if it cannot be."""
+    if subtick is None:
         return None
     if factor is None:
-        raise BadInput("--quantum", "", "expected --realtime with it, or gateways: without them no clock paces the run")
+        raise BadInput("--subtick", "", "expected --realtime with it, or gateways: without them no clock paces the run")
     if scenario.radio is None:
-        raise BadInput("--quantum", "", "expected a scenario with a radio: without one nothing happens between ticks")
+        raise BadInput("--subtick", "", "expected a scenario with a radio: without one nothing happens between ticks")
     tick_s = 1 / scenario.time.rate_hz / factor
-    if not MIN_QUANTUM_S <= quantum <= tick_s:
-        expected = f"expected {MIN_QUANTUM_S:g} s to a tick's {tick_s:g} s of wall time, got {quantum!r}"
-        raise BadInput("--quantum", "", expected)
-    return quantum
+    if not MIN_SUBTICK_S <= subtick <= tick_s:
+        expected = f"expected {MIN_SUBTICK_S:g} s to a tick's {tick_s:g} s of wall time, got {subtick!r}"
+        raise BadInput("--subtick", "", expected)
+    return subtick
 
 
 def scenario_of(given: Scenario | Path | str, overrides: Sequence[str]) -> Scenario:

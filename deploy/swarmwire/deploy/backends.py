@@ -23,7 +23,7 @@ from swarmwire.world.backends.registry import Change, Loss
 from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.subtick import Quanta
+from swarmwire.world.subtick import Subticks
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Backends:
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
     changed: Callable[[Change], None]  # is told of every runner that came or went
     say: Callable[[str], None]  # what people should know at once
-    quanta: Quanta | None = None  # of real time, in which packets cross also between ticks
+    subticks: Subticks | None = None  # of real time, in which packets cross also between ticks
 
     @contextmanager
     def backend(self, served: Served | None = None) -> Generator[AgentBackend]:
@@ -61,7 +61,7 @@ class Backends:
                     self.static.rate_hz,
                     served.show,
                     served.show_counts,
-                    self.quanta,
+                    self.subticks,
                 )
             return
         if self.listening is not None:
@@ -72,7 +72,7 @@ class Backends:
             return
         if not self.runners:
             with closing(LocalBackend(whole)) as local:
-                yield PacedBackend(local, self.pace, self.quanta) if self.pace else local
+                yield PacedBackend(local, self.pace, self.subticks) if self.pace else local
             return
         processes: list[RunnerProcesses] = []
 
@@ -147,7 +147,7 @@ class Backends:
                 self.pace,
                 table.watchdog_s,
                 terms,
-                self.quanta,
+                self.subticks,
             )
         return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
 

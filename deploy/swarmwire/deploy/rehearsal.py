@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static
@@ -42,7 +42,9 @@ class _Extras:
     def start(self) -> None:
         """They are ready."""
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """The same in every tick."""
         return self._actions
 

@@ -96,7 +96,7 @@ class RepeatedRun:
             observers=observers,
             record=record,
             replay=Replay(
-                self._ticks(recorded_anew=out is not None), self._inputs, interventions, self.origin.quantum_s
+                self._ticks(recorded_anew=out is not None), self._inputs, interventions, self.origin.subtick_s
             ),
         )
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
@@ -161,7 +161,7 @@ def _read_summary(folder: Path) -> _Summary | None:
 
 def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:
     inputs = recorded_inputs(folder)
-    driven = bool(origin.gateways) or (origin.realtime is not None and (origin.runners > 0 or origin.quantum_s))
+    driven = bool(origin.gateways) or (origin.realtime is not None and (origin.runners > 0 or origin.subtick_s))
     from_outside = driven or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
         expected = "expected the record of what came from outside, on which this run depends"

@@ -13,4 +13,4 @@ class Replay:
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
     interventions: tuple[Intervention, ...] = ()  # what people did to it
-    quantum_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts
+    subtick_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts

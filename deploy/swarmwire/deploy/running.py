@@ -24,7 +24,7 @@ def run(
     observers: Sequence[Observer] = (),
     socket: Path | None = None,
     realtime: float | None = None,
-    quantum: float | None = None,
+    subtick: float | None = None,
     record: Recording | None = None,
     gateways: GatewaysGiven = None,
     listening: Listening | None = None,
@@ -35,7 +35,7 @@ def run(
     agents in this process), a number of runner processes, or "per-robot". `overrides` are "path=value" as for `--set`.
     With `out`, a new or empty folder, the run folder is written there; `record` says what goes into it. `realtime`
     keeps the run to the wall clock, so many simulated seconds per second, and waits for no runner; None runs as fast as
-    the machine allows; with a `quantum`, 0.001 s or more of wall time, packets cross also between its ticks, when they
+    the machine allows; with a `subtick`, 0.001 s or more of wall time, packets cross also between its ticks, when they
     are sent and due. `gateways` has robots answer as real ones, in real time, for programs elsewhere to drive: "epuck2"
     all of them, {"flock": "ros2"} those of a group; `Gateways` says also options, and the network of their agents.
     `listening` has the world wait for runners that others start, on this machine or elsewhere.
@@ -53,7 +53,7 @@ def run(
         observers=observers,
         socket=socket,
         realtime=realtime,
-        quantum=quantum,
+        subtick=subtick,
         record=record,
         gateways=gateways,
         listening=listening,

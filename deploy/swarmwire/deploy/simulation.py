@@ -15,10 +15,10 @@ from swarmwire.deploy.arguments import (
     Runners,
     SeedsGiven,
     choose_seeds,
-    quantum_of,
     real_time_factor,
     runner_count,
     scenario_of,
+    subtick_of,
     tick_count,
 )
 from swarmwire.deploy.backends import Backends
@@ -61,7 +61,7 @@ from swarmwire.world.live_events import Interventions
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, own_code
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.subtick import Quanta
+from swarmwire.world.subtick import Subticks
 from swarmwire.world.world import World
 
 
@@ -106,7 +106,7 @@ class Simulation:
         observers: Sequence[Observer] = (),
         socket: Path | None = None,
         realtime: float | str | None = None,
-        quantum: float | None = None,
+        subtick: float | None = None,
         record: Recording | None = None,
         gateways: GatewaysGiven = None,
         replay: Replay | None = None,
@@ -117,7 +117,7 @@ class Simulation:
         self.scenario = scenario_of(scenario, overrides)
         self._behind = Behind(as_gateways(gateways), self.scenario)
         factor = self._behind.factor(real_time_factor(realtime))
-        self._quantum_s = quantum_of(quantum, factor, self.scenario)
+        self._subtick_s = subtick_of(subtick, factor, self.scenario)
         self.agents = agent_specs(self.scenario)
         self.world = self._new_world(seed, seeds)
         measures = measuring(self.scenario)
@@ -145,9 +145,9 @@ class Simulation:
         # Only now a folder: what is refused leaves none.
         self._record = RunRecord(None if out is None else Path(out), self._clock)
         rate_hz = self.scenario.time.rate_hz
-        clock = PreciseClock(self._clock) if self._quantum_s else self._clock
+        clock = PreciseClock(self._clock) if self._subtick_s else self._clock
         self._pace = None if factor is None else Pace(clock, rate_hz, factor, self._record.say)
-        self._recorded_quantum_s = replay.quantum_s if replay else self._quantum_s
+        self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
         self.interventions = Interventions(
@@ -307,7 +307,7 @@ class Simulation:
             ticks=self.ticks,
             runners=self.runners,
             realtime=self._pace.factor if self._pace else None,
-            quantum_s=self._recorded_quantum_s,
+            subtick_s=self._recorded_subtick_s,
             gateways=self._behind.kinds,
             metrics=self.metrics,
         )
@@ -325,7 +325,7 @@ class Simulation:
             self.scenario.events,
             self.judge,
             self.interventions,
-            cast("TimedBackend", acting) if self._recorded_quantum_s is not None else None,
+            cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
         )
 
     def _start(self, backend: AgentBackend) -> None:
@@ -400,8 +400,8 @@ class Simulation:
             lost=self._losses.append,
             changed=self._changes.append,
             say=self._record.say,
-            quanta=Quanta(self._clock, self._pace, self.static.rate_hz, self._quantum_s)
-            if self._pace and self._quantum_s
+            subticks=Subticks(self._clock, self._pace, self.static.rate_hz, self._subtick_s)
+            if self._pace and self._subtick_s
             else None,
         )
 
@@ -411,7 +411,7 @@ class Simulation:
             return tick >= self.inputs.first_tick
         if self._not_its_own or any(change.tick >= 0 for change in self._changes):
             return True
-        in_real_time = self._pace is not None and (self.runners > 0 or self._quantum_s is not None)
+        in_real_time = self._pace is not None and (self.runners > 0 or self._subtick_s is not None)
         return bool(self._losses or self._behind.kinds) or in_real_time
 
     def _stopped(self) -> bool:

@@ -12,14 +12,14 @@ from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import Joining, join
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import BadInput, RunnerLost
-from swarmwire.comms.packets import NO_OUTCOMES, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.comms.wire.tick_frames import encode_tick
-from tests.support.agent.hosts import GIVES, senses, spec
+from tests.support.agent.hosts import MEASURES, senses, spec
 from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world
 
 END = frames.encode("end", -1, {})
@@ -28,7 +28,8 @@ SHORT_S = 0.3
 
 def ticks_of(*numbers: int) -> list[bytes]:
     return [
-        encode_tick(tick, {"flock": senses(tick, [0, 1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES) for tick in numbers
+        encode_tick(tick, {"flock": senses(tick, [0, 1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+        for tick in numbers
     ]
 
 

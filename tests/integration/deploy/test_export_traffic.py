@@ -20,7 +20,7 @@ from tests.support.metrics.capture.reading import Capture, read
 
 SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
 SHORT = ["duration_s=0.5", "robots.flock.count=6"]
-GIVES = "gives={range={},bearing={}}"
+MEASURES = "gives={range={},bearing={}}"
 HEADERS = {"ieee802154": (283, 36 + 9), "wifi-b-1M": (127, 15 + 24 + 8 + 28), "argos-rab": (147, 20)}
 
 
@@ -30,7 +30,7 @@ def folders(tmp_path_factory) -> dict[str, Path]:
     made: dict[str, Path] = {}
     for preset in HEADERS:
         made[preset] = tmp_path_factory.mktemp("runs") / preset
-        overrides = [*SHORT, f'radio={{preset="{preset}",{GIVES}}}']
+        overrides = [*SHORT, f'radio={{preset="{preset}",{MEASURES}}}']
         run(SCENARIO, overrides=overrides, out=made[preset], record=Recording(packets=1.0))
     return made
 

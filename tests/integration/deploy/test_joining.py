@@ -53,7 +53,7 @@ class Case:
     settings: tuple[str, ...] = (LONG,)
     start_with: int | None = None
     realtime: float | None = None
-    quantum: float | None = None
+    subtick: float | None = None
     before: tuple[str, ...] = ()  # what starts the runners
     over: str = "interrupted"
     counts: Mapping[str, int] = field(default_factory=dict)
@@ -118,10 +118,10 @@ CASES = {
         ends={"a": LEFT},
         repeats=False,
     ),
-    "real time with quanta: late, and leaves": Case(
+    "real time with subticks: late, and leaves": Case(
         on_loss="stand",
         realtime=FACTOR,
-        quantum=0.005,
+        subtick=0.005,
         first=("a --robots 5",),
         start_with=5,
         steps=((move(5), "start b --robots 4"), (move(9), "SIGINT b"), (move(5), "quit")),
@@ -195,7 +195,7 @@ def test_who_joins_leaves_or_is_lost(joiners, tmp_path, case):
         watcher=watcher,
         start_with=case.start_with,
         realtime=case.realtime,
-        quantum=case.quantum,
+        subtick=case.subtick,
         out=tmp_path / "run",
     )
     assert not watcher.steps

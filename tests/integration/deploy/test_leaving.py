@@ -59,7 +59,7 @@ queue_limit = 3
 latency_s = 0.13
 jitter_s = 0.05
 bodies_block = true
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 SIGNAL = """
 [radio]
@@ -71,7 +71,7 @@ antenna = { power_dbm = -30.0 }
 log_distance = { exponent = 3.5 }
 shadowing = { deviation_db = 6.0, correlation_m = 1.0 }
 fading = { distribution = "rician", k = 4.0 }
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 ROOM = "arena = { size_m = [1.2, 1.0] }\n"
 INSISTING = f"""

@@ -1,4 +1,4 @@
-"""Runs in real time over real processes, with a quantum and without: what happens, in no set time."""
+"""Runs in real time over real processes, with a subtick and without: what happens, in no set time."""
 
 import json
 from pathlib import Path
@@ -45,7 +45,7 @@ EVENTS = f"""[
     {{ do = "kill", {OF_FIVE}, at_s = 0.2, for_s = 0.4 }},
     {{ do = "blackout", {OF_FIVE}, at_s = 0.4, for_s = 0.3 }},
 ]"""
-QUANTUM_S = 0.002
+SUBTICK_S = 0.002
 
 
 def runners_here() -> list[psutil.Process]:
@@ -77,7 +77,7 @@ def test_a_run_in_real_time_ends_and_its_fates_add_up():
     assert sum(result.radio.fates.values()) == result.radio.intended
     assert result.radio.fates["received"] > 0
     assert result.realtime is not None
-    assert (result.realtime.factor, result.realtime.quantum_s) == (20, None)
+    assert (result.realtime.factor, result.realtime.subtick_s) == (20, None)
     summary = result.summary()["realtime"]
     assert {"factor", "late_answers", "missed_ticks", "worst_lag_s", "frames_dropped", "watchdog_stops"} <= set(summary)
 
@@ -85,7 +85,7 @@ def test_a_run_in_real_time_ends_and_its_fates_add_up():
 @pytest.mark.parametrize("runners", [None, 2])
 def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(tmp_path, runners):
     folder = tmp_path / "run"
-    result = run(LOSSY, overrides=relays(tmp_path), runners=runners, realtime=1, quantum=QUANTUM_S, out=folder)
+    result = run(LOSSY, overrides=relays(tmp_path), runners=runners, realtime=1, subtick=SUBTICK_S, out=folder)
     assert (result.mode, result.runners, result.ended, result.ticks) == ("realtime", runners or 0, "duration", 10)
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended
@@ -94,14 +94,14 @@ def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(
     assert told is not None
     assert told.delivery is not None
     assert told.tick_jitter is not None
-    assert (told.quantum_s, told.tick_jitter.count) == (QUANTUM_S, 9)
+    assert (told.subtick_s, told.tick_jitter.count) == (SUBTICK_S, 9)
     assert told.delivery.count >= result.radio.fates["received"]
     assert result.inputs is not None
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, 10)
     assert any(WITHIN in frame["arrays"] for frame in frames_of(folder))
     summary = json.loads((folder / "summary.json").read_text())["realtime"]
     assert {"count", "p50_s", "p99_s", "worst_s"} == set(summary["delivery"]) == set(summary["tick_jitter"])
-    assert json.loads((folder / "run.json").read_text())["quantum_s"] == QUANTUM_S
+    assert json.loads((folder / "run.json").read_text())["subtick_s"] == SUBTICK_S
     repetition = repeat(folder, out=tmp_path / "again")
     assert repetition.same
     assert (repetition.result.radio, repetition.result.inputs) == (result.radio, result.inputs)
@@ -121,9 +121,9 @@ def contradicting(folder: Path) -> None:
     (folder / INPUTS).write_bytes(b"".join(len(frame).to_bytes(LENGTH_BYTES, "little") + frame for frame in packed))
 
 
-def test_the_command_takes_a_quantum_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
-    arguments = ("--realtime", "--quantum", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
+def test_the_command_takes_a_subtick_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
+    arguments = ("--realtime", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
     assert code == 0, errors
-    assert "in quanta of 5.0 ms" in " ".join(out.split())
+    assert "in subticks of 5.0 ms" in " ".join(out.split())
     assert "ticks began late" in out

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli import app
@@ -288,7 +288,7 @@ class Standing:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: TxStatuses) -> Actions:
         return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
 
     def counts(self) -> dict[str, int]:
@@ -301,7 +301,7 @@ def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp
     (tmp_path / "inputs").write_text("in the way")
     backend = RecordedBackend(Standing(), tmp_path, lambda tick: tick >= 2)
     for tick in range(5):
-        backend.act(tick, {}, ReceivedPackets.none(), NO_OUTCOMES)
+        backend.act(tick, {}, ReceivedPackets.none(), NO_TX_STATUSES)
     record = backend.record()
     assert record is not None
     assert (record.first_tick, record.ticks, record.ticks_not_recorded) == (2, 0, 3)

@@ -20,19 +20,19 @@ def with_sense(name: str) -> pytest.MarkDecorator:
 
 
 def test_a_driver_gives_all_senses_but_those_that_it_is_known_to_lack(connected: Rig) -> None:
-    assert connected.driver.gives == SHEETS.keys() - connected.lacks
-    assert connected.driver.gives <= connected.body.senses.keys()
-    assert connected.driver.gives <= connected.gateway.senses
+    assert connected.driver.measures == SHEETS.keys() - connected.lacks
+    assert connected.driver.measures <= connected.body.senses.keys()
+    assert connected.driver.measures <= connected.gateway.senses
 
 
 @ON_ONE_RIG
 @given(data=st.data())
 def test_a_reading_comes_back_as_exactly_as_the_wire_can_tell_it(connected: Rig, data: st.DataObject) -> None:
-    connected.come_back(data.draw(readings(connected.body, connected.driver.gives)))
+    connected.come_back(data.draw(readings(connected.body, connected.driver.measures)))
 
 
 def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:
-    for name in connected.driver.gives:
+    for name in connected.driver.measures:
         assert {field.partition(".")[0] for field in connected.driver.sense(frozenset({name}))} == {name}
     assert connected.driver.sense(frozenset()) == {}
 

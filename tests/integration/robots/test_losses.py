@@ -91,7 +91,7 @@ def test_another_thread_stops_the_motors_while_this_one_reads(connected: Rig) ->
 
     def read() -> None:
         while not done.is_set():
-            driver.sense(driver.gives)
+            driver.sense(driver.measures)
 
     reader = Thread(target=read)
     reader.start()

@@ -10,14 +10,14 @@ from swarmwire.agent.host import Hosted, hosted
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")
-GIVES = ("range_m", "bearing_rad")
+MEASURES = ("range_m", "bearing_rad")
 PERIOD_NS = 100_000_000
-SILENCE = ReceivedPackets.none(GIVES)
+SILENCE = ReceivedPackets.none(MEASURES)
 
 
 def spec(name: str) -> str:
@@ -34,7 +34,7 @@ def group(
 
 
 def assignment(*groups: GroupAssignment) -> Assignment:
-    return Assignment(groups, 10, GIVES)
+    return Assignment(groups, 10, MEASURES)
 
 
 def senses(tick: int, rows: list[int], rays: int = 8) -> GroupSenses:
@@ -85,7 +85,7 @@ def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
 
 
 def step(
-    host: Hosted, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: Outcomes = NO_OUTCOMES
+    host: Hosted, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: TxStatuses = NO_TX_STATUSES
 ) -> Actions:
     """One step of the robots in these rows."""
     return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), received, told)

@@ -74,17 +74,17 @@ class VectorEcho(VectorAgent[Known]):
 class Insisting(Agent):
     """Sends a number to its neighbour until it is acknowledged, then the next one; its speed tells what it was told."""
 
-    needs = ("radio.outcomes",)
+    needs = ("radio.tx_status",)
 
     def __init__(self) -> None:
         self.number, self.waits_for, self.told = 0, -1, 0
 
     def step(self, robot: Robot) -> None:
-        for outcome in robot.radio.outcomes:
-            self.told = 7 * self.told + outcome.id + 100 * outcome.result
+        for tx_status in robot.radio.tx_status:
+            self.told = 7 * self.told + tx_status.id + 100 * tx_status.result
             self.told %= 10_007
-            self.number += outcome.acknowledged
-            if outcome.id == self.waits_for:
+            self.number += tx_status.acknowledged
+            if tx_status.id == self.waits_for:
                 self.waits_for = -1
         if self.waits_for < 0:
             robot.radio.send(Other(number=-1))
@@ -101,15 +101,15 @@ class Insistence(State):
 class VectorInsisting(VectorAgent[Insistence]):
     """The same for n robots."""
 
-    needs: ClassVar[tuple[str, ...]] = ("radio.outcomes",)
+    needs: ClassVar[tuple[str, ...]] = ("radio.tx_status",)
 
     def step(self, robots: Robots, state: Insistence) -> None:
-        outcomes = robots.radio.outcomes
-        for at, row in enumerate(outcomes.row.tolist()):
-            told = 7 * state.told[row] + outcomes.id[at] + 100 * outcomes.result[at]
+        tx_status = robots.radio.tx_status
+        for at, row in enumerate(tx_status.row.tolist()):
+            told = 7 * state.told[row] + tx_status.id[at] + 100 * tx_status.result[at]
             state.told[row] = told % 10_007
-        state.number += np.bincount(outcomes.row[outcomes.acknowledged], minlength=robots.n)
-        state.waits_for[outcomes.row[outcomes.id == state.waits_for[outcomes.row]]] = -1
+        state.number += np.bincount(tx_status.row[tx_status.acknowledged], minlength=robots.n)
+        state.waits_for[tx_status.row[tx_status.id == state.waits_for[tx_status.row]]] = -1
         again = state.waits_for < 0
         robots.radio.send(Other, rows=again, number=-1.0)
         state.waits_for[again] = robots.radio.send(Other, rows=again, to=0, number=state.number.astype(float))

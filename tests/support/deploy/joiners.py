@@ -16,7 +16,7 @@ from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire import frames
@@ -160,7 +160,9 @@ class EncodedJoiners:
         for line in self._script[-1]:
             self._do(*line.split())
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         lines = [line.split() for line in self._script.get(tick, ())]
         for _, name in (line for line in lines if line[0] == "mute"):
             del self._runners[name]

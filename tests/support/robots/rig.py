@@ -187,7 +187,7 @@ def sense_until_lost(rig: Rig) -> None:
 
     def lost() -> bool:
         try:
-            rig.driver.sense(rig.driver.gives)
+            rig.driver.sense(rig.driver.measures)
         except DriverLost:
             return True
         return False

@@ -12,7 +12,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from tests.support.agent.hosts import GIVES, assignment, group, senses
+from tests.support.agent.hosts import MEASURES, assignment, group, senses
 
 R = TypeVar("R", Lockstep, RealTime)
 GROUPS = {"flock", "scouts", "lone"}
@@ -73,7 +73,7 @@ def actions(rows: list[int]) -> Actions:
 
 
 def rows_of(frame: bytes) -> list[int]:
-    found, *_ = decode_tick(frames.decode(frame), GIVES, GROUPS)
+    found, *_ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
     return [row for part in found.values() for row in part.rows.tolist()]
 
 

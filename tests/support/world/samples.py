@@ -28,7 +28,7 @@ SAMPLE: dict[str, Any] = {
         "flock": {"body": "epuck", "count": 12, "agent": "a:B", "place": {"how": "disc", "radius_m": 1.5}},
         "big": {"body": "footbot", "count": 3, "agent": "a:C"},
     },
-    "radio": {"range_m": 2.0, "loss": 0.3, "gives": {"range": {"noise_m": 0.02}, "bearing": {}}},
+    "radio": {"range_m": 2.0, "loss": 0.3, "measures": {"range": {"noise_m": 0.02}, "bearing": {}}},
 }
 SENSES = ("proximity", "compass", "odometry", "light", "bumper")
 ALL_SENSES = {"flock": SENSES, "big": SENSES}

@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Actuations, Notes, Senses, Values
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
@@ -56,7 +56,7 @@ SCENARIO: dict[str, Any] = {
         "loss": 0.1,
         "bit_rate_bps": 250_000,
         "max_payload_bytes": 100,
-        "gives": {"range": {"noise_m": 0.02}, "bearing": {"noise_rad": 0.05}},
+        "measures": {"range": {"noise_m": 0.02}, "bearing": {"noise_rad": 0.05}},
     },
 }
 
@@ -67,7 +67,7 @@ class SmallRun:
     Attributes:
         parts: the robots of each runner.
         layouts: of the memory of each group's robots.
-        senses: of the last tick; `received` and `outcomes` likewise.
+        senses: of the last tick; `received` and `tx_status` likewise.
         frames: to each runner, tick by tick; `answers`: from it.
         truths: what observers see.
     """
@@ -83,7 +83,7 @@ class SmallRun:
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}
         self.senses: Senses = {}
         self.received = ReceivedPackets.none()
-        self.outcomes: Outcomes = NO_OUTCOMES
+        self.tx_status: TxStatuses = NO_TX_STATUSES
         self.frames: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.truths: list[Truth] = []
@@ -96,11 +96,13 @@ class SmallRun:
         self.given = actions
         return self.loop.step()
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         if self.given is not None:
             return self.given
-        self.senses, self.received, self.outcomes = senses, received, outcomes
-        for runner, data in self._roster.open_tick(tick, senses, received, outcomes):
+        self.senses, self.received, self.tx_status = senses, received, tx_status
+        for runner, data in self._roster.open_tick(tick, senses, received, tx_status):
             self.frames[runner].append(data)
             answer = self._answer(runner, data)
             self.answers[runner].append(answer)
@@ -113,8 +115,8 @@ class SmallRun:
 
     def _answer(self, runner: str, data: bytes) -> bytes:
         host, frame = self._hosts[runner], frame_codec.decode(data)
-        senses, received, outcomes = decode_tick(frame, self.whole.gives or (), senses_of(self.parts, runner))
-        actions = host.act(frame.tick, senses, received, outcomes)
+        senses, received, tx_status = decode_tick(frame, self.whole.measures or (), senses_of(self.parts, runner))
+        actions = host.act(frame.tick, senses, received, tx_status)
         return encode_actions(frame.tick, with_all(actions), memory=host.memory(senses))
 
 

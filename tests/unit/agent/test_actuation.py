@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import Actions
-from tests.support.agent.hosts import GIVES, group, senses
+from tests.support.agent.hosts import MEASURES, group, senses
 
 ROWS = [1, 4, 6]
 EPUCK_BASE_M = 0.053
@@ -25,7 +25,7 @@ def acted(kind: type[Any], **sheet: Any) -> Actions:
     """What three robots of this body do in their first step."""
     body = body_from({"like": "epuck", "name": "mine", **sheet}, "mine.toml")
     host = hosted(replace(group("", ROWS), body=body), kind)
-    return host.act((0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(GIVES))
+    return host.act((0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
 def single(does: Callable[[Robot], None]) -> type[Agent]:
@@ -103,7 +103,7 @@ def test_a_body_without_leds_says_so() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
     with pytest.raises(AgentFailed, match="NotFitted: the body epuck has no LEDs"):
         hosted(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
-            (0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(GIVES)
+            (0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(MEASURES)
         )
 
 

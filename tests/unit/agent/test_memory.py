@@ -8,20 +8,20 @@ import pytest
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import Outcomes, ReceivedPackets
+from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory, encode_memory
-from tests.support.agent.hosts import GIVES, assignment, group, one_group, plain, spec
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, spec
 
 ROWS = [0, 1, 2, 5, 6]
 WHOLE = {name: assignment(group(spec(name), ROWS)) for name in ("VectorInsisting", "VectorCounter", "Counter")}
 
 
-def told(tick: int) -> Outcomes:
+def told(tick: int) -> TxStatuses:
     """What radios tell: of packets of this agent, and of some that an agent before it sent."""
     row = np.array([0, 1, 5, 6], np.int64)
-    return Outcomes(row, np.array([2 * tick, 0, tick, 1], np.int64), np.array([0, 1, 0, 2], np.int64))
+    return TxStatuses(row, np.array([2 * tick, 0, tick, 1], np.int64), np.array([0, 1, 0, 2], np.int64))
 
 
 def acting(tick: int) -> list[int]:
@@ -30,11 +30,11 @@ def acting(tick: int) -> list[int]:
 
 
 def act(host: Host, tick: int) -> Actions:
-    return host.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(GIVES), told(tick))
+    return host.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), told(tick))
 
 
 def ids(actions: Actions) -> list[int]:
-    return [] if actions.sent.outcome_id is None else actions.sent.outcome_id.tolist()
+    return [] if actions.sent.tx_status_id is None else actions.sent.tx_status_id.tolist()
 
 
 def over_the_wire(host: Host, name: str) -> Memory:
@@ -58,10 +58,10 @@ def test_another_host_goes_on_as_the_first_would_have(name: str, at: int) -> Non
 def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> None:
     first = Host(WHOLE["VectorCounter"])
     for tick in range(4):
-        first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+        first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
     kept = {"flock": first.memory(["flock"])["flock"].of(np.array([1, 5]))}
     second = Host(WHOLE["VectorCounter"], kept)
-    got = second.act(4, one_group(4, ROWS), ReceivedPackets.none(GIVES))
+    got = second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES))
     assert dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True)) == {
         0: 1.0,
         1: 5.0,
@@ -73,10 +73,10 @@ def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> No
 
 def test_a_robot_that_did_not_act_last_starts_afresh_when_it_does() -> None:
     first = Host(WHOLE["VectorCounter"])
-    first.act(0, one_group(0, ROWS), ReceivedPackets.none(GIVES))
-    first.act(1, one_group(1, [0, 1]), ReceivedPackets.none(GIVES))
+    first.act(0, one_group(0, ROWS), ReceivedPackets.none(MEASURES))
+    first.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES))
     got = Host(WHOLE["VectorCounter"], first.memory(["flock"])).act(
-        2, one_group(2, [1, 2]), ReceivedPackets.none(GIVES)
+        2, one_group(2, [1, 2]), ReceivedPackets.none(MEASURES)
     )
     assert got.linear_mps.tolist() == [3.0, 1.0]
 
@@ -84,9 +84,9 @@ def test_a_robot_that_did_not_act_last_starts_afresh_when_it_does() -> None:
 def test_an_agent_of_one_robot_starts_afresh() -> None:
     first = Host(WHOLE["Counter"])
     for tick in range(4):
-        first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+        first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
     second = Host(WHOLE["Counter"], over_the_wire(first, "Counter"))
-    assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(GIVES)).linear_mps.tolist() == [1.0] * len(ROWS)
+    assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0] * len(ROWS)
 
 
 def test_memories_of_parts_join_in_the_order_of_the_robots() -> None:

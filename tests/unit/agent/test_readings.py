@@ -15,7 +15,7 @@ from swarmwire.comms.bodies.custom import ActuatorSheet
 from swarmwire.comms.bodies.sensors import Battery, Imu, OwnSheet
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
-from tests.support.agent.hosts import GIVES, group, senses
+from tests.support.agent.hosts import MEASURES, group, senses
 
 
 class Moth(Agent):
@@ -253,7 +253,7 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
 
         rows = [2, 3, 5]
         host = hosted(replace(group("", rows), body=BODY), Some)
-        own = host.act((0, 0, 100_000_000), senses(0, rows), ReceivedPackets.none(GIVES)).own
+        own = host.act((0, 0, 100_000_000), senses(0, rows), ReceivedPackets.none(MEASURES)).own
         return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
 
     arm = [1.0, 2.0, 3.0]

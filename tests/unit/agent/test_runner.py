@@ -11,11 +11,11 @@ import zenoh
 from swarmwire.agent import runner
 from swarmwire.agent.runner import PLAIN, Inbox, given_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import GIVES, assignment, group, received_from, senses
+from tests.support.agent.hosts import MEASURES, assignment, group, received_from, senses
 
 
 @dataclass
@@ -39,7 +39,7 @@ def inbox_of(*arrived: Any) -> Inbox:
 
 
 def tick(number: int) -> bytes:
-    return encode_tick(number, {"flock": senses(number, [0])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
+    return encode_tick(number, {"flock": senses(number, [0])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
 
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
@@ -51,8 +51,8 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
     ticks = inbox.ticks(ASSIGNMENT)
     assert next(ticks)[0] == 2
     assert inbox.dropped == 2
-    strange = encode_tick(9, {"others": senses(9, [1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
-    of_others = encode_tick(9, {"flock": senses(9, [1])}, ReceivedPackets.none(GIVES), NO_OUTCOMES)
+    strange = encode_tick(9, {"others": senses(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+    of_others = encode_tick(9, {"flock": senses(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
     for data in (tick(2), tick(1), b"\xc1", strange, of_others, tick(3), tick(5), tick(4)):
         inbox.put_frame(Sample(Bytes(data)))
     assert next(ticks)[0] == 5
@@ -69,13 +69,13 @@ def test_nothing_is_acted_on_once_the_run_is_over() -> None:
 
 def packets(number: int, tick_number: int = 0) -> bytes:
     sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
-    return encode_packets(tick_number, 1_000 * number, number, received_from(sent, [0]), NO_OUTCOMES)
+    return encode_packets(tick_number, 1_000 * number, number, received_from(sent, [0]), NO_TX_STATUSES)
 
 
 def test_packets_between_ticks_are_kept_at_once_and_told_of_when_nothing_newer_waits() -> None:
     inbox, kept = inbox_of(True, tick(0)), list[int]()
 
-    def receive(received: ReceivedPackets, _: Outcomes) -> None:
+    def receive(received: ReceivedPackets, _: TxStatuses) -> None:
         kept.append(received.payloads.row(0)[2])
 
     told = inbox.ticks(ASSIGNMENT, receive)
@@ -133,7 +133,7 @@ def test_why_a_runner_ended_is_told() -> None:
         {"groups": None},
         {"groups": [3]},
         {"rate_hz": 0},
-        {"gives": [1]},
+        {"measures": [1]},
         {"memory": "text"},
         {"memory": b"\xc1"},
         {"v": frames.VERSION - 1},

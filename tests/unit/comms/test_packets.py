@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from swarmwire.comms.packets import (
     BROADCAST,
     FATE_NAMES,
-    NO_OUTCOMES,
+    NO_TX_STATUSES,
     TAG_BYTES,
     Fate,
-    Outcomes,
     Payloads,
     ReceivedPackets,
     SentPackets,
+    TxStatuses,
 )
 from swarmwire.comms.tick_io import Actions, checked_state
 
@@ -66,30 +66,30 @@ def test_sent_packets_keep_their_order_when_joined() -> None:
     assert len(SentPackets.joined([])) == 0
 
 
-def test_outcome_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
+def test_tx_status_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
     silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
     asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]), np.array([4, 5]))
     joined = SentPackets.joined([silent, SentPackets.none(), asking])
-    assert joined.outcome_ids.tolist() == [-1, 4, 5]
+    assert joined.tx_status_ids.tolist() == [-1, 4, 5]
     picked = joined.select(np.array([2, 0]))
-    assert (picked.sender.tolist(), picked.to.tolist(), picked.outcome_ids.tolist()) == ([1, 3], [2, -1], [5, -1])
+    assert (picked.sender.tolist(), picked.to.tolist(), picked.tx_status_ids.tolist()) == ([1, 3], [2, -1], [5, -1])
     assert listed(picked.payloads) == [b"ccc", b"aa"]
-    assert SentPackets.joined([silent, silent]).outcome_id is None
+    assert SentPackets.joined([silent, silent]).tx_status_id is None
 
 
-def test_outcomes_joined_are_sorted_by_robot_and_id() -> None:
+def test_tx_status_joined_are_sorted_by_robot_and_id() -> None:
     parts = [
-        Outcomes(np.array(row), np.array(id_), np.array(what))
+        TxStatuses(np.array(row), np.array(id_), np.array(what))
         for row, id_, what in (([2, 0], [7, 9], [1, 0]), ([0, 2], [3, 1], [4, 2]))
     ]
-    joined = Outcomes.joined([*parts, NO_OUTCOMES])
+    joined = TxStatuses.joined([*parts, NO_TX_STATUSES])
     assert (joined.row.tolist(), joined.id.tolist(), joined.result.tolist()) == (
         [0, 0, 2, 2],
         [3, 9, 1, 7],
         [4, 0, 2, 1],
     )
     assert joined.acknowledged.tolist() == [False, True, False, False]
-    assert len(Outcomes.joined([])) == 0
+    assert len(TxStatuses.joined([])) == 0
 
 
 def test_actions_joined_carry_the_packets_of_all() -> None:

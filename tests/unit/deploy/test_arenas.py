@@ -38,7 +38,7 @@ params = { separation_m = 0.2 }
 [radio]
 range_m = 0.6
 line_of_sight = true
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 
 

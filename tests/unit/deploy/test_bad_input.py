@@ -85,7 +85,7 @@ REFUSED = [  # a setting, and the key that the line names
     (f"{THREE}'lanes.py:Lanes', params={{lane=[1, 2]}}}}", "robots.flock.params.lane"),
     (f"{THREE}'lanes.py:Lanes', params={{lane=[1, 2, 0.5]}}}}", "robots.flock.params.lane"),
     (f"{THREE}'lanes.py:Lone'}}", "robots.flock.agent"),
-    ("radio.gives={}", "robots.flock.agent"),
+    ("radio.measures={}", "robots.flock.agent"),
     ("events=3", "events"),
     ("events=[{at_s=1}]", "events.0.do"),
     ("events=[{at_s=1, do='burn'}]", "events.0.do"),

@@ -18,7 +18,7 @@ from swarmwire.comms.config import limits_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import FATE_NAMES
-from swarmwire.comms.radio.config.impairments import Gives
+from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.deploy.catalogue.entry import Entry
@@ -37,7 +37,7 @@ EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for k
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 HELD = {
     "bodies": [*body_names()],
-    "senses": [*SHEETS, *(f"radio.{of.name}" for of in fields(Gives)), OUTCOMES],
+    "senses": [*SHEETS, *(f"radio.{of.name}" for of in fields(Measures)), OUTCOMES],
     "behaviours": behaviours.__all__,
     "drives": [*DRIVES],
     "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],
@@ -175,7 +175,7 @@ def test_every_key_of_a_scenarios_schema_can_be_described():
     [
         ("seed", "seed, before the first table"),
         ("radio", "the table [radio]"),
-        ("radio.gives.range.noise_m", "noise_m in [radio.gives.range]"),
+        ("radio.measures.range.noise_m", "noise_m in [radio.measures.range]"),
         ("robots.*.place.radius_m", "radius_m in [robots.GROUP.place]"),
         ("arena.lights", "the tables [[arena.lights]]"),
         ("events.*.robots.share", "share in [events.robots]"),

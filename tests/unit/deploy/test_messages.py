@@ -54,7 +54,7 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
         "(did you mean separation_m?)",
     ),
     (
-        "radio.gives={}",
+        "radio.measures={}",
         "robots.flock.agent: Flocking needs 'radio.range', which the radio does not tell: [radio] gives nothing",
     ),
 ]

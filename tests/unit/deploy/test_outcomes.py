@@ -82,4 +82,4 @@ def test_an_agent_that_asks_is_refused_where_nothing_is_acknowledged(scenario: P
     with pytest.raises(BadInput) as caught:
         run(path, overrides=[f"radio={radio}"] if radio else [])
     assert (caught.value.where, caught.value.key) == (str(path), "robots.often.agent")
-    assert "'radio.outcomes'" in caught.value.expected
+    assert "'radio.tx_status'" in caught.value.expected

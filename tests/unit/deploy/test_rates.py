@@ -30,7 +30,7 @@ act_every_ticks = {every}
 range_m = 3.0
 loss = 0.2
 latency_s = 0.05
-gives = {{ range = {{ noise_m = 0.02 }}, bearing = {{ noise_rad = 0.05 }} }}
+measures = {{ range = {{ noise_m = 0.02 }}, bearing = {{ noise_rad = 0.05 }} }}
 """
 COUNTING = """
 from swarmwire.agent import Agent, Message, f4

@@ -37,10 +37,10 @@ def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkey
     [
         *(({"realtime": factor}, "--realtime", "a factor above 0") for factor in (0, -1, float("nan"), "fast")),
         ({"realtime": 1, "overrides": ["run.watchdog_s=0"]}, "run.watchdog_s", "a number above 0"),
-        ({"quantum": 0.001}, "--quantum", "--realtime with it"),
-        ({"quantum": 0.0009, "realtime": 1}, "--quantum", "0.001 s to a tick's 0.1 s"),
-        ({"quantum": float("nan"), "realtime": 1}, "--quantum", "0.001 s"),
-        ({"quantum": 0.06, "realtime": 2}, "--quantum", "to a tick's 0.05 s"),
+        ({"subtick": 0.001}, "--subtick", "--realtime with it"),
+        ({"subtick": 0.0009, "realtime": 1}, "--subtick", "0.001 s to a tick's 0.1 s"),
+        ({"subtick": float("nan"), "realtime": 1}, "--subtick", "0.001 s"),
+        ({"subtick": 0.06, "realtime": 2}, "--subtick", "to a tick's 0.05 s"),
     ],
 )
 def test_what_cannot_be_is_refused(arguments, key, expected):
@@ -53,7 +53,7 @@ def test_without_a_radio_there_is_nothing_between_ticks(tmp_path):
     bare = LOSSY.read_text().partition("[radio]")[0].replace("behaviours:Flocking", "behaviours:Diffusion")
     (tmp_path / "bare.toml").write_text(bare.replace("params = { separation_m = 0.8 }", ""))
     with pytest.raises(BadInput, match="a scenario with a radio"):
-        run(tmp_path / "bare.toml", realtime=1, quantum=0.01)
+        run(tmp_path / "bare.toml", realtime=1, subtick=0.01)
 
 
 @pytest.mark.usefixtures("_moved")

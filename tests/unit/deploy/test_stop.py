@@ -25,7 +25,7 @@ agent = "swarmwire.agent.behaviours:Flocking"
 [radio]
 range_m = 2.0
 loss = 0.1
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 [stop]
 metric = "order"
 at_least = 0.85

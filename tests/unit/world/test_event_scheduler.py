@@ -8,7 +8,7 @@ import pytest
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -42,7 +42,7 @@ class Ahead:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Actions:
+    def act(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         rows = np.concatenate([group.rows for group in senses.values()])
         self.rows.append(rows.tolist())
         n = len(rows)
@@ -140,7 +140,7 @@ def test_all_may_be_dead_and_the_run_goes_on():
     world.live(np.zeros(2, np.bool_))
     backend = LocalBackend(whole)
     backend.start()
-    assert len(backend.act(0, world.sense(0), ReceivedPackets.none(), NO_OUTCOMES).rows) == 0
+    assert len(backend.act(0, world.sense(0), ReceivedPackets.none(), NO_TX_STATUSES).rows) == 0
 
 
 def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():

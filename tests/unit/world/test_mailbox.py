@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.packets import Outcomes, Payloads, ReceivedPackets
+from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.world.loop import Mailbox
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
@@ -67,22 +67,22 @@ def test_what_waits_for_a_robot_that_dies_is_lost():
     assert read(box.hand_over(3, received(), ALIVE)) == [(13, 3, 0, 7)]
 
 
-def outcomes(*rows: tuple[int, int, int]) -> Outcomes:
-    return Outcomes(*np.array(rows, np.int64).reshape(-1, 3).T)
+def tx_status(*rows: tuple[int, int, int]) -> TxStatuses:
+    return TxStatuses(*np.array(rows, np.int64).reshape(-1, 3).T)
 
 
-def rows_of(told: Outcomes) -> list[tuple[int, ...]]:
+def rows_of(told: TxStatuses) -> list[tuple[int, ...]]:
     return list(zip(told.row.tolist(), told.id.tolist(), told.result.tolist(), strict=True))
 
 
-def test_outcomes_wait_for_robots_that_act_later_and_not_for_the_dead():
+def test_tx_status_wait_for_robots_that_act_later_and_not_for_the_dead():
     box = Mailbox(world(1, 3).static)
-    first = box.hand_over_outcomes(1, outcomes((0, 4, 1), (12, 0, 0), (13, 0, 2)), ALIVE)
+    first = box.hand_over_tx_status(1, tx_status((0, 4, 1), (12, 0, 0), (13, 0, 2)), ALIVE)
     assert rows_of(first) == [(0, 4, 1)]
-    assert rows_of(box.hand_over_outcomes(2, outcomes((12, 2, 0), (14, 1, 0)), np.arange(15) != 13)) == []
-    third = box.hand_over_outcomes(3, outcomes((0, 5, 0), (12, 1, 3)), ALIVE)
+    assert rows_of(box.hand_over_tx_status(2, tx_status((12, 2, 0), (14, 1, 0)), np.arange(15) != 13)) == []
+    third = box.hand_over_tx_status(3, tx_status((0, 5, 0), (12, 1, 3)), ALIVE)
     assert rows_of(third) == [(0, 5, 0), (12, 0, 0), (12, 1, 3), (12, 2, 0), (14, 1, 0)]
-    assert rows_of(box.hand_over_outcomes(6, outcomes(), ALIVE)) == []
+    assert rows_of(box.hand_over_tx_status(6, tx_status(), ALIVE)) == []
 
 
 def test_only_groups_that_act_sense():

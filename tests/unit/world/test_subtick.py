@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -85,9 +85,9 @@ def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_fligh
 
 @settings(max_examples=60, deadline=None)
 @given(RADIOS, st.integers(0, 1000), st.lists(st.integers(0, 99), max_size=30), st.booleans())
-def test_fates_add_up_and_quanta_change_nothing(radio: Radio, seed: int, quanta_ms: list[int], one_leaves: bool):
+def test_fates_add_up_and_subticks_change_nothing(radio: Radio, seed: int, subticks_ms: list[int], one_leaves: bool):
     """Packets of steps and at once, in two arenas, one of which may leave; looked at now and then, or only at ticks."""
-    looked, not_looked = (_played(radio, seed, looks, one_leaves) for looks in (sorted(quanta_ms), []))
+    looked, not_looked = (_played(radio, seed, looks, one_leaves) for looks in (sorted(subticks_ms), []))
     assert looked == not_looked
     assert looked[1] == looked[2]
 
@@ -136,11 +136,13 @@ class Sender:
     def start(self) -> None:
         """Ready."""
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         raise AssertionError("a backend that takes its time is asked in time")
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
@@ -205,7 +207,7 @@ class FromBoth(Sender):
     """Robot 0 of each arena sends late in each tick, also where the arena is over."""
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):

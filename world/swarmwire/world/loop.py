@@ -1,4 +1,4 @@
-"""The mailbox: packets, and outcomes of packets, wait here for robots that do not act in every tick."""
+"""The mailbox: packets, and tx statuses of packets, wait here for robots that do not act in every tick."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
-from swarmwire.comms.packets import NO_OUTCOMES, NOWHERE, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.tick_io import Actions, Senses
@@ -31,7 +31,7 @@ class Mailbox:
         self._every: IntArray = np.tile(static.act_every_ticks, static.arenas)  # (rows,)
         self._always = bool((self._every == 1).all())
         self._waiting = ReceivedPackets.none()
-        self._outcomes = NO_OUTCOMES
+        self._tx_status = NO_TX_STATUSES
 
     def hand_over(self, tick: int, received: ReceivedPackets, alive: BoolArray) -> ReceivedPackets:
         """All that waits for the robots that act in this tick, with what they `received` since the last tick.
@@ -45,13 +45,13 @@ class Mailbox:
         self._waiting = here.select(np.flatnonzero(~acts & alive[here.receiver])).compacted()
         return here.select(np.flatnonzero(acts))
 
-    def hand_over_outcomes(self, tick: int, outcomes: Outcomes, alive: BoolArray) -> Outcomes:
-        """The same of `outcomes`; `alive` is (rows,)."""
+    def hand_over_tx_status(self, tick: int, tx_status: TxStatuses, alive: BoolArray) -> TxStatuses:
+        """The same of `tx_status`; `alive` is (rows,)."""
         if self._always:
-            return outcomes
-        here = Outcomes.joined([self._outcomes, outcomes])
+            return tx_status
+        here = TxStatuses.joined([self._tx_status, tx_status])
         acts = (tick % self._every == 0)[here.row]
-        self._outcomes = here.select(np.flatnonzero(~acts & alive[here.row]))
+        self._tx_status = here.select(np.flatnonzero(~acts & alive[here.row]))
         return here.select(np.flatnonzero(acts))
 
 
@@ -120,9 +120,9 @@ class Loop:
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.air)
-        news, packets, outcomes = self._receive(start_ns)
+        news, packets, tx_status = self._receive(start_ns)
         senses = world.sense(tick)
-        actions = self._act(start_ns, senses, packets, outcomes)
+        actions = self._act(start_ns, senses, packets, tx_status)
         received = news.received if news else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
         onsets = world.move(actions)
@@ -199,27 +199,27 @@ class Loop:
         packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
-    def _receive(self, start_ns: int) -> tuple[News | None, ReceivedPackets, Outcomes]:
+    def _receive(self, start_ns: int) -> tuple[News | None, ReceivedPackets, TxStatuses]:
         """What came of the radio up to a tick's start; of that, what the backend is to be told."""
         if self._in_time:
-            news, packets, outcomes = self._in_time.begin(start_ns)
+            news, packets, tx_status = self._in_time.begin(start_ns)
             self._open = news.tally
-            return news, packets, outcomes
+            return news, packets, tx_status
         tick, alive = self.ticks_done, self.world.alive
         news = self.air.advance(start_ns) if self.air else None
         self._open = news.tally if news else None
         packets = self._mailbox.hand_over(tick, news.received if news else ReceivedPackets.none(), alive)
-        outcomes = self._mailbox.hand_over_outcomes(tick, news.outcomes if news else NO_OUTCOMES, alive)
-        return news, packets, outcomes
+        tx_status = self._mailbox.hand_over_tx_status(tick, news.tx_status if news else NO_TX_STATUSES, alive)
+        return news, packets, tx_status
 
-    def _act(self, start_ns: int, senses: Senses, packets: ReceivedPackets, outcomes: Outcomes) -> Actions:
+    def _act(self, start_ns: int, senses: Senses, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         """What the robots do in a tick; what they send is the air's."""
         world, tick = self.world, self.ticks_done
         if self.air:
             self.air.hold(world.pose, world.alive.copy())
         if self._timed and self._in_time:
-            return self._timed.act_in_time(tick, senses, packets, outcomes, self._in_time)
-        actions = self.backend.act(tick, senses, packets, outcomes)
+            return self._timed.act_in_time(tick, senses, packets, tx_status, self._in_time)
+        actions = self.backend.act(tick, senses, packets, tx_status)
         if self.air:
             self.air.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):

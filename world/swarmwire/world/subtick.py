@@ -15,7 +15,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import AirTime, Put
-from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Static
@@ -36,13 +36,13 @@ class AirInTime:
         self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
 
-    def begin(self, start_ns: int) -> tuple[News, ReceivedPackets, Outcomes]:
+    def begin(self, start_ns: int) -> tuple[News, ReceivedPackets, TxStatuses]:
         """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
-        received, outcomes = self._air.advance_within(start_ns)
-        return self._air.advance(start_ns), received, outcomes
+        received, tx_status = self._air.advance_within(start_ns)
+        return self._air.advance(start_ns), received, tx_status
 
     def send(self, put: Put) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -62,7 +62,7 @@ class AirInTime:
         self._next_ns = int(self._turn_ns.min())
         self._release(at_ns)
 
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         self._release(until_ns)
         self._now_ns = until_ns
@@ -95,15 +95,15 @@ class AirInTime:
             self._next_ns = int(self._turn_ns.min())
 
 
-# --- A tick in quanta: the loop wakes many times in it, to take in what came and hand over what is due.
+# --- A tick in subticks: the loop wakes many times in it, to take in what came and hand over what is due.
 #
-# In every quantum `take_in` gives what agents sent since, with the time at which it came; these packets go on the air,
+# In every subtick `take_in` gives what agents sent since, with the time at which it came; these packets go on the air,
 # it advances to now, and `hand_over` takes what was received. So once more at the tick's end, where commands are taken
 # as ever.
 
 
 MEAN_OF = 16  # sleeps, about: that were late
-SHARE_EARLY = 5  # of a quantum, at most, that a sleep is shorter: a machine that wakes later than that is busy
+SHARE_EARLY = 5  # of a subtick, at most, that a sleep is shorter: a machine that wakes later than that is busy
 
 
 class Exchange(Protocol):
@@ -113,39 +113,39 @@ class Exchange(Protocol):
         """Packets that agents sent since the last call, `at_ns` in wall time."""
         ...
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Hand this to those that it is for, now, at `at_ns` of simulated time."""
         ...
 
 
-class Quanta:
-    """The quanta of ticks, by the wall clock.
+class Subticks:
+    """The subticks of ticks, by the wall clock.
 
     Attributes:
-        quantum_s: wall time.
+        subtick_s: wall time.
     """
 
-    def __init__(self, clock: Clock, pace: Pace, rate_hz: int, quantum_s: float) -> None:
-        self.quantum_s = quantum_s
-        self._clock, self._pace, self._rate_hz, self._quantum_ns = clock, pace, rate_hz, to_ns(quantum_s)
+    def __init__(self, clock: Clock, pace: Pace, rate_hz: int, subtick_s: float) -> None:
+        self.subtick_s = subtick_s
+        self._clock, self._pace, self._rate_hz, self._subtick_ns = clock, pace, rate_hz, to_ns(subtick_s)
         self._last_ns = 0  # up to which the air has advanced
         self._wakes_late_ns = 0  # by how much sleeps ended late, of late
 
     def pass_tick(self, tick: int, air: AirTime, exchange: Exchange) -> None:
         """Return once the tick is over by the wall clock, and all that is due by then was handed over."""
-        last_ns = self._pace.over_ns(tick) - self._quantum_ns  # later, there may not be the time before the tick's end
+        last_ns = self._pace.over_ns(tick) - self._subtick_ns  # later, there may not be the time before the tick's end
         wake_ns = self._clock.now_ns()
         while wake_ns <= last_ns:
             self._sleep_until(wake_ns)
             self.exchange(tick, air, exchange)
-            # Whoever woke late goes on from there: quanta that were missed are not made up for.
-            wake_ns = max(wake_ns + self._quantum_ns, self._clock.now_ns())
+            # Whoever woke late goes on from there: subticks that were missed are not made up for.
+            wake_ns = max(wake_ns + self._subtick_ns, self._clock.now_ns())
         self._pace.hold(tick)
         self.exchange(tick, air, exchange)
 
     def _sleep_until(self, at_ns: int) -> None:
         """Sleep, for less by what the machine takes to wake; a little early or late does not matter here."""
-        early_ns = at_ns - min(self._wakes_late_ns, self._quantum_ns // SHARE_EARLY)
+        early_ns = at_ns - min(self._wakes_late_ns, self._subtick_ns // SHARE_EARLY)
         if self._clock.now_ns() < early_ns:
             self._clock.sleep_until(early_ns)
             self._wakes_late_ns += (self._clock.now_ns() - early_ns - self._wakes_late_ns) // MEAN_OF
@@ -161,7 +161,7 @@ class Quanta:
             from_ns = min(max(from_ns, pace.simulated_ns(put.at_ns)), now_ns)
             air.send(put._replace(at_ns=from_ns))
         self._last_ns = now_ns
-        received, outcomes = air.advance(now_ns)
-        if len(received) or len(outcomes):
-            exchange.hand_over(tick, now_ns, received, outcomes)
+        received, tx_status = air.advance(now_ns)
+        if len(received) or len(tx_status):
+            exchange.hand_over(tick, now_ns, received, tx_status)
             pace.handed_over(received.received_at_ns)

@@ -54,7 +54,7 @@ class Driver(ABC):
 
     @property
     @abstractmethod
-    def gives(self) -> frozenset[str]:
+    def measures(self) -> frozenset[str]:
         """The senses of the body that the robot can tell, by the names that sheets and `needs` have for them."""
 
     @abstractmethod

@@ -231,8 +231,8 @@ def _assembled(
         offer = replace(offer, radio_gives=network.radio.needs)
         check_needs(plan.agent.__name__, plan.agent.needs, offer, plan.where)
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, settings.seed)
-    gives = None if settings.radio.kind == "none" else network.radio.gives
-    mind = Mind(group, settings.rate_hz, gives, plan.limits)
+    measures = None if settings.radio.kind == "none" else network.radio.measures
+    mind = Mind(group, settings.rate_hz, measures, plan.limits)
     needs = frozenset(need for need in plan.agent.needs if not need.startswith("radio."))
     senses = SensesOnRobot(plan.driver, needs, tracked(plan.agent.needs, offer), network.own_pose)
     parts = RobotParts(plan.driver, network.radio, mind, senses, motors, watchdog, clock)

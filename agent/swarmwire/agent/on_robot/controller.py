@@ -15,7 +15,7 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses
 from swarmwire.comms.wire.radio_bridge import Pose
 
@@ -36,7 +36,7 @@ class SensesOnRobot:
         self, driver: Driver, needs: frozenset[str], tracked: frozenset[str], own_pose: Callable[[], Pose | None]
     ) -> None:
         self._driver, self._tracked, self._own_pose = driver, tracked, own_pose
-        self._asked = ((needs - tracked) | {BATTERY}) & driver.gives
+        self._asked = ((needs - tracked) | {BATTERY}) & driver.measures
         self.pose: Pose | None = None
         self.charge: float | None = None
         self.complete = False
@@ -91,10 +91,10 @@ class Mind:
     """
 
     def __init__(
-        self, group: GroupAssignment, rate_hz: int, gives: tuple[str, ...] | None, limits: SpeedLimits
+        self, group: GroupAssignment, rate_hz: int, measures: tuple[str, ...] | None, limits: SpeedLimits
     ) -> None:
         """AgentFailed if the agent cannot be made."""
-        self._host = Host(Assignment((group,), rate_hz, gives))
+        self._host = Host(Assignment((group,), rate_hz, measures))
         self._group, self._limits = group, limits
         self._sideways = isinstance(group.body.drive, Holonomic)
         self._command = STOP
@@ -103,10 +103,12 @@ class Mind:
         self.leds: dict[int, int] = {}
         self.clipped = self.nan = self.actuations = 0
 
-    def step(self, tick: int, fields: dict[str, FloatArray], received: ReceivedPackets, outcomes: Outcomes) -> Decision:
+    def step(
+        self, tick: int, fields: dict[str, FloatArray], received: ReceivedPackets, tx_status: TxStatuses
+    ) -> Decision:
         """One step of the agent; AgentFailed with its traceback if it raises."""
         senses = {self._group.name: GroupSenses(self._group.rows, fields)}
-        actions = self._host.act(tick, senses, received, outcomes)
+        actions = self._host.act(tick, senses, received, tx_status)
         drive = bool(actions.drive[0])
         if drive:
             self._follow(actions)

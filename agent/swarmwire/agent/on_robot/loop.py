@@ -207,13 +207,13 @@ class RobotLoop:
     def _step(self, tick: int, late: bool) -> TickRow:
         parts = self._parts
         fields = parts.senses.read()
-        received, outcomes = parts.radio.received(self._pacer.since_start_ns())
+        received, tx_status = parts.radio.received(self._pacer.since_start_ns())
         self._tick = tick
         decision = NOTHING
         if parts.motors.control.stopped:
             parts.motors.stop()
         elif self._begins(tick):
-            decision = parts.mind.step(tick, fields, received, outcomes)
+            decision = parts.mind.step(tick, fields, received, tx_status)
             self._do(decision)
         utc_ns, told = parts.clock.utc_ns(), (parts.mind.state, parts.mind.value, parts.senses.charge)
         return TickRow(tick, utc_ns, late, parts.senses.pose, decision.drive, decision.command, *told)

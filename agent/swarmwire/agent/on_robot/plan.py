@@ -59,9 +59,9 @@ def _of_robot(need: str, offer: Offer) -> str | None:
         return f"the body {body.name} lacks: it has {', '.join(body.senses) or 'no senses'}"
     if need in offer.driver_gives or need in tracked((need,), offer):
         return None
-    gives = ", ".join(sorted(offer.driver_gives)) or "nothing"
+    measures = ", ".join(sorted(offer.driver_gives)) or "nothing"
     cure = ": expected tracker = true" if need in OF_TRACKER else ""
-    return f"the driver {offer.driver} does not give (it gives {gives}){cure}"
+    return f"the driver {offer.driver} does not give (it gives {measures}){cure}"
 
 
 def _of_radio(need: str, offer: Offer) -> str | None:
@@ -71,8 +71,8 @@ def _of_radio(need: str, offer: Offer) -> str | None:
         return 'only a radio tells: expected radio.kind "zenoh" or "air"'
     if need in OF_POSES and offer.radio == "zenoh":
         return "a real radio does not tell: expected tracker = true"
-    gives = ", ".join(sorted(offer.radio_gives)) or "nothing of a packet"
-    return f"the radio {offer.radio} does not tell: it tells {gives}"
+    measures = ", ".join(sorted(offer.radio_gives)) or "nothing of a packet"
+    return f"the radio {offer.radio} does not tell: it tells {measures}"
 
 
 # --- Speed limits of a robot, below what its hardware can do.
@@ -152,7 +152,12 @@ class Plan:
         settings = self.settings
         tells = OF_POSES if settings.radio.kind == "zenoh" and settings.tracker else ()
         return Offer(
-            self.body, settings.driver.name, self.driver.gives, settings.radio.kind, frozenset(tells), settings.tracker
+            self.body,
+            settings.driver.name,
+            self.driver.measures,
+            settings.radio.kind,
+            frozenset(tells),
+            settings.tracker,
         )
 
     def __str__(self) -> str:

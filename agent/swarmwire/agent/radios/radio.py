@@ -2,28 +2,28 @@
 
 from typing import NamedTuple, Protocol
 
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 
 
 class RobotRadio(Protocol):
     """The radio of one robot: `received` and `send` are called from one thread, once per tick each.
 
     Attributes:
-        needs: what of an agent's `needs` it meets: "radio.range", "radio.bearing", "radio.outcomes", …
+        needs: what of an agent's `needs` it meets: "radio.range", "radio.bearing", "radio.tx_status", …
         gives: the columns of `ReceivedPackets.given`, in their order.
     """
 
     needs: frozenset[str]
-    gives: tuple[str, ...]
+    measures: tuple[str, ...]
 
     def open(self) -> None:
         """Take part in the network."""
         ...
 
-    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """What reached the robot since the last call, in the order that `ReceivedPackets` promises.
 
-        `receiver` and `Outcomes.row` are the robot's row. `now_ns` and `received_at_ns` are times since the agent's
+        `receiver` and `TxStatuses.row` are the robot's row. `now_ns` and `received_at_ns` are times since the agent's
         start.
         """
         ...
@@ -48,7 +48,7 @@ class NoRadio:
     """Nothing is received; what the agent sends is counted, and goes nowhere."""
 
     needs: frozenset[str] = frozenset()
-    gives: tuple[str, ...] = ()
+    measures: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self._unsent = 0
@@ -56,9 +56,9 @@ class NoRadio:
     def open(self) -> None:
         """There is nothing to take part in."""
 
-    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Nothing."""
-        return ReceivedPackets.none(), NO_OUTCOMES
+        return ReceivedPackets.none(), NO_TX_STATUSES
 
     def send(self, sent: SentPackets) -> None:
         """Count the packets."""

@@ -18,7 +18,7 @@ from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, decode_air
 from swarmwire.comms.wire.robot_network import SwarmKeys
@@ -44,7 +44,7 @@ class AirRadio:
     """The radio of the robot `own`, one of `robots`, in the air of the world that answers in this network.
 
     Attributes:
-        terms: what the world's radio is to this robot; None before `open`. So are `needs` and `gives` empty.
+        terms: what the world's radio is to this robot; None before `open`. So are `needs` and `measures` empty.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class AirRadio:
         self._sequence = self._frames = self._far_too_large = 0
         self._counted = Counter[str]()
         self.terms: AirTerms | None = None
-        self.gives: tuple[str, ...] = ()
+        self.measures: tuple[str, ...] = ()
         self.needs: frozenset[str] = frozenset()
 
     def open(self) -> None:
@@ -76,14 +76,14 @@ class AirRadio:
         if terms.robots != self._robots:
             given = ", ".join(terms.robots)
             raise BadInput("robots", "", f"expected the robots of the world, in its order: {given}")
-        self.terms, self.gives, self.needs = terms, terms.gives, frozenset(terms.needs)
+        self.terms, self.measures, self.needs = terms, terms.measures, frozenset(terms.needs)
         self._subscriber = self._session.declare_subscriber(
             self._keys.air_received(self._own), Callback(self._arrive, indirect=False)
         )
 
-    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """What the world's air brought since the last call."""
-        terms, received, outcomes = self._joined(), ReceivedPackets.none(self.gives), NO_OUTCOMES
+        terms, received, tx_status = self._joined(), ReceivedPackets.none(self.measures), NO_TX_STATUSES
         started_ns = self._clock.now_ns() - now_ns
         for arrival in self._inbox.take():
             try:
@@ -96,8 +96,8 @@ class AirRadio:
             mine = self._own_rows(its, ahead_ns)
             self._note(mine, arrival.utc_ns - arrival.at_ns + started_ns)
             received = received.merged(mine)
-            outcomes = Outcomes.joined([outcomes, Outcomes(self._rows(told.row), told.id, told.result)])
-        return received, outcomes
+            tx_status = TxStatuses.joined([tx_status, TxStatuses(self._rows(told.row), told.id, told.result)])
+        return received, tx_status
 
     def send(self, sent: SentPackets) -> None:
         """Hand the packets to the world's air, also those that are too large for it: it counts them."""
@@ -112,7 +112,7 @@ class AirRadio:
             self._log.sent(SentPacket(utc_ns, self._sequence, to, size_bytes, tag, SENT if fits else TOO_LARGE))
             self._sequence += 1
         row = np.array([terms.row])
-        packets = SentPackets(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.outcome_id)
+        packets = SentPackets(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.tx_status_id)
         still = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
         self._frames += 1
         try:

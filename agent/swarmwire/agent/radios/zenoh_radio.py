@@ -23,7 +23,15 @@ from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, 
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, TAG_BYTES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_TX_STATUSES,
+    TAG_BYTES,
+    Payloads,
+    ReceivedPackets,
+    SentPackets,
+    TxStatuses,
+)
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 
@@ -155,7 +163,7 @@ def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
 
 
 MAX_WAITING = 1024  # packets that may wait for the agent's next step
-GIVES = ("range_m", "bearing_rad")  # with a tracker
+MEASURES = ("range_m", "bearing_rad")  # with a tracker
 NEEDS = ("radio.range", "radio.bearing")  # what these meet
 NOWHERE = float("nan")
 
@@ -197,7 +205,7 @@ class ZenohRadio:
         self._far_too_large = 0  # refused by the network's thread
         self._counted = Counter[str]()
         self.links: dict[int, Link] = {}
-        self.gives: tuple[str, ...] = GIVES if tracker else ()
+        self.measures: tuple[str, ...] = MEASURES if tracker else ()
         self.needs: frozenset[str] = frozenset(NEEDS if tracker else ())
 
     def open(self) -> None:
@@ -206,11 +214,11 @@ class ZenohRadio:
             self._keys.any_radio, Callback(self._arrive, indirect=False), allowed_origin=zenoh.Locality.REMOTE
         )
 
-    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """What arrived for the robot since the last call, each with its time and, with a tracker, range and bearing."""
         packets = [packet for arrival in self._inbox.take() if (packet := self._checked(arrival)) is not None]
         if not packets:
-            return ReceivedPackets.none(self.gives), NO_OUTCOMES
+            return ReceivedPackets.none(self.measures), NO_TX_STATUSES
         packets.sort(key=_promised_order)
         given = [(packet, where) for packet in packets if (where := self._given(packet)) is not None]
         started_ns = self._clock.now_ns() - now_ns
@@ -221,11 +229,11 @@ class ZenohRadio:
             sender=np.array([packet.sender for packet, _ in given], np.int64),
             sequence=np.array([packet.header.sequence for packet, _ in given], np.int64),
             received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in given], np.int64),
-            given={name: np.ascontiguousarray(column) for name, column in zip(self.gives, columns, strict=False)},
+            given={name: np.ascontiguousarray(column) for name, column in zip(self.measures, columns, strict=False)},
             payload=index,
             payloads=Payloads.of([packet.message for packet, _ in given]),
         )
-        return received, NO_OUTCOMES
+        return received, NO_TX_STATUSES
 
     def send(self, sent: SentPackets) -> None:
         """Put each packet into the network; too large ones and those for nobody are numbered, as in emulation."""

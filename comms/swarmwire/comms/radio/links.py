@@ -31,7 +31,7 @@ class Links(NamedTuple):
     fate: IntArray  # (k,) a Fate
     final_at_ns: IntArray  # (k,) when the fate becomes final
     rssi_dbm: FloatArray  # (k,) strength at the receiver; NaN where there is none
-    given: FloatArray  # (k, columns) what the receiver learns, in the order of the radio's `gives.columns`
+    given: FloatArray  # (k, columns) what the receiver learns, in the order of the radio's `measures.columns`
 
     @classmethod
     def under_way(

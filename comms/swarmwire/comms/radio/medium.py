@@ -11,7 +11,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, Fate, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, Fate, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -118,12 +118,12 @@ class Air:
         self._now_ns = 0
         self._within: list[results.Final] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
-        self._links = self._no_links = Links.none(len(radio.gives.columns))
+        self._links = self._no_links = Links.none(len(radio.measures.columns))
         nothing = (
-            ReceivedPackets.none(radio.gives.columns),
+            ReceivedPackets.none(radio.measures.columns),
             *results.nothing_final(self._links, self._on_air, radio.is_signal),
         )
-        self._nothing = results.Final(*nothing, NO_OUTCOMES)
+        self._nothing = results.Final(*nothing, NO_TX_STATUSES)
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
@@ -188,9 +188,9 @@ class Air:
             self._cut_off(until_ns)
         told = results.joined([*self._within, self._final(until_ns)])
         self._within = []
-        return results.News(told.received, told.finished, told.departed, self._accounts.close(), told.outcomes)
+        return results.News(told.received, told.finished, told.departed, self._accounts.close(), told.tx_status)
 
-    def advance_within(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def advance_within(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing.
 
         What became final is told again with all of the tick by the next `advance`.
@@ -201,7 +201,7 @@ class Air:
             self._within.append(told)
             if len(self._within) == PARTS:  # now, and not in the one moment in which the next tick waits for them
                 self._within = [results.joined(self._within)]
-        return told.received, told.outcomes
+        return told.received, told.tx_status
 
     def end(self) -> Tally:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
@@ -246,13 +246,15 @@ class Air:
         links, packets, robots = self._links, self._on_air, self._robots
         rows = results.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
         if len(rows.open) == len(links.fate):
-            return self._nothing._replace(outcomes=self._way.outcomes(self._coming.alive & ~self._gone))
+            return self._nothing._replace(tx_status=self._way.tx_status(self._coming.alive & ~self._gone))
         self._accounts.settle(links, until_ns)
         told = results.Final(
-            results.received(rows.received, links, packets, self.radio.gives.columns, robots, len(self._others_alive)),
+            results.received(
+                rows.received, links, packets, self.radio.measures.columns, robots, len(self._others_alive)
+            ),
             results.finished(rows.finished, links, packets, robots, self.radio.is_signal),
             results.departed(rows.departed, links, packets, robots),
-            self._way.outcomes(self._coming.alive & ~self._gone),
+            self._way.tx_status(self._coming.alive & ~self._gone),
         )
         self._keep(rows.open)
         return told

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
 from swarmwire.comms.radio.disruption import Disruption
@@ -51,9 +51,9 @@ class Way(ABC):
         Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.
         """
 
-    def outcomes(self, alive: BoolArray) -> Outcomes:
+    def tx_status(self, alive: BoolArray) -> TxStatuses:
         """What senders have learned since the last call, those `alive` (rows,); nothing without acknowledgements."""
-        return NO_OUTCOMES
+        return NO_TX_STATUSES
 
     @abstractmethod
     def drain(self) -> Transmissions:

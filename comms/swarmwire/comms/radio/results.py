@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.packets import Outcomes, ReceivedPackets
+from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import Departed, Finished, Tally
@@ -88,7 +88,7 @@ class News:
     finished: Finished
     departed: Departed
     tally: Tally
-    outcomes: Outcomes  # of packets whose senders ask and are alive
+    tx_status: TxStatuses  # of packets whose senders ask and are alive
 
 
 class Final(NamedTuple):
@@ -97,30 +97,30 @@ class Final(NamedTuple):
     received: ReceivedPackets
     finished: Finished
     departed: Departed
-    outcomes: Outcomes
+    tx_status: TxStatuses
 
     @property
     def anything(self) -> bool:
         """Whether anything did."""
-        return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.outcomes))
+        return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.tx_status))
 
     def of(self, arenas: BoolArray, robots: int) -> "Final":
         """What concerns these arenas (arenas,) of so many robots each."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
-        outcomes = self.outcomes.select(np.flatnonzero(arenas[self.outcomes.row // robots]))
-        return Final(received, self.finished.of(arenas), self.departed.of(arenas), outcomes)
+        tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
+        return Final(received, self.finished.of(arenas), self.departed.of(arenas), tx_status)
 
 
 def joined(parts: list[Final]) -> Final:
     """What became final in all parts, one or more."""
     if len(parts) == 1:
         return parts[0]
-    received, finished, departed, outcomes = (list(of) for of in zip(*parts, strict=True))
+    received, finished, departed, tx_status = (list(of) for of in zip(*parts, strict=True))
     return Final(
         ReceivedPackets.joined(received),
         Finished.joined(finished),
         Departed.joined(departed),
-        Outcomes.joined(outcomes),
+        TxStatuses.joined(tx_status),
     )
 
 
@@ -152,11 +152,11 @@ def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: 
 
 
 def received(
-    index: IntArray, links: Links, packets: Transmissions, gives: tuple[str, ...], robots: int, rows: int
+    index: IntArray, links: Links, packets: Transmissions, measures: tuple[str, ...], robots: int, rows: int
 ) -> ReceivedPackets:
     """The links `index` were received; sorted by (receiver, received_at, sender, sequence)."""
     if not len(index):
-        return ReceivedPackets.none(gives)
+        return ReceivedPackets.none(measures)
     index = by_receiver(index, links.receiver, links.final_at_ns, links.sender, rows)
     kept, payload = compacted(links.packet.take(index), len(packets.sender))
     return ReceivedPackets(
@@ -164,7 +164,7 @@ def received(
         sender=in_arena(links.sender.take(index), robots),
         sequence=links.sequence.take(index),
         received_at_ns=links.final_at_ns.take(index),
-        given={name: links.given[:, column].take(index) for column, name in enumerate(gives)},
+        given={name: links.given[:, column].take(index) for column, name in enumerate(measures)},
         payload=payload,
         payloads=packets.payloads.rows(kept),
     )

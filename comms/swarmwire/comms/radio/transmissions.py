@@ -27,7 +27,7 @@ class Transmissions(NamedTuple):
     on_air_at_ns: IntArray  # (k,) the first bit
     off_air_at_ns: IntArray  # (k,) the end of the last bit
     fate: IntArray  # (k,) RECEIVED: accepted, to be decided for each receiver; else the fate for all of them
-    outcome_id: IntArray  # (k,) under which the sender is told what became of it, or UNTOLD
+    tx_status_id: IntArray  # (k,) under which the sender is told what became of it, or UNTOLD
     payloads: Payloads  # (k,)
 
     @classmethod
@@ -104,7 +104,7 @@ class Intake:
             on_air_at_ns=sent_at_ns[sender],
             off_air_at_ns=sent_at_ns[sender],
             fate=np.full(len(sender), int(Fate.RECEIVED)),
-            outcome_id=sent.outcome_ids.copy(),
+            tx_status_id=sent.tx_status_ids.copy(),
             payloads=sent.payloads,
         )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import Outcomes, ReceivedPackets
+from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import GroupSenses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import MAX_BYTES, VERSION
@@ -28,7 +28,7 @@ class AirTerms:
     robots: tuple[str, ...]  # all robots of its arena, by index
     rate_hz: int  # ticks of the world per second
     max_payload_bytes: int
-    gives: tuple[str, ...]  # columns of `ReceivedPackets.given`
+    measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # what of an agent's needs it meets
 
     def encode(self) -> bytes:
@@ -45,7 +45,7 @@ class AirTerms:
         for name in ("row", "rate_hz", "max_payload_bytes"):
             if type(values[name]) is not int or values[name] < (name == "rate_hz"):
                 raise BadFrame("malformed", f"{name}: expected a whole number")
-        for name in ("robots", "gives", "needs"):
+        for name in ("robots", "measures", "needs"):
             texts = values[name]
             if type(texts) is not list or not all(type(text) is str for text in cast("list[object]", texts)):
                 raise BadFrame("malformed", f"{name}: expected a list of texts")
@@ -61,22 +61,22 @@ MAX_RADIO_FRAME_BYTES = 2**20  # of a frame, either way
 LAST_NS = 2**62  # no run comes so far; later times do not fit those that are told with packets
 
 
-def encode_air(tick: int, row: int, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+def encode_air(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """The frame to the robot of this row: what it received, and what became of its packets."""
-    return encode_tick(tick, {GROUP: GroupSenses(np.array([row]), {})}, received, outcomes)
+    return encode_tick(tick, {GROUP: GroupSenses(np.array([row]), {})}, received, tx_status)
 
 
-def decode_air(data: bytes, terms: AirTerms) -> tuple[int, ReceivedPackets, Outcomes]:
+def decode_air(data: bytes, terms: AirTerms) -> tuple[int, ReceivedPackets, TxStatuses]:
     """The tick and what `encode_air` was given; BadFrame if the frame is none, contradicts itself or is for another."""
     frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
     if frame.kind != "tick" or not 0 <= tick_start_ns(frame.tick, terms.rate_hz) < LAST_NS:
         raise BadFrame("malformed", f"{frame.kind} {frame.tick}, expected a tick")
-    _, received, outcomes = decode_tick(frame, terms.gives, {GROUP})
+    _, received, tx_status = decode_tick(frame, terms.measures, {GROUP})
     if ((received.sender < 0) | (received.sender >= len(terms.robots)) | (received.receiver != terms.row)).any():
         raise BadFrame("malformed", "received/numbers: expected packets of the robot's arena to itself")
-    if (outcomes.row != terms.row).any():
-        raise BadFrame("malformed", "outcomes: expected the robot's own")
-    return frame.tick, received, outcomes
+    if (tx_status.row != terms.row).any():
+        raise BadFrame("malformed", "tx_status: expected the robot's own")
+    return frame.tick, received, tx_status
 
 
 # --- An inbox between the network's thread and a loop: it holds so much, and counts what it had no room for.

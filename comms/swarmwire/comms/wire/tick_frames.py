@@ -11,13 +11,13 @@ from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
-    NO_OUTCOMES,
+    NO_TX_STATUSES,
     UNTOLD,
-    Outcomes,
     Payloads,
     ReceivedPackets,
-    SendResult,
     SentPackets,
+    TxResult,
+    TxStatuses,
 )
 from swarmwire.comms.tick_io import (
     MAX_STATES,
@@ -40,17 +40,17 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
 
-def encode_tick(tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+def encode_tick(tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """A `tick` frame: what a runner's robots sense and received, and what became of packets that they sent."""
     arrays: dict[str, AnyArray] = {}
     for name, group in senses.items():
         arrays[f"sense/{name}/rows"] = group.rows
         for sense, column in group.fields.items():
             arrays[f"sense/{name}/{sense}"] = column
-    return frames.encode("tick", tick, arrays | told_arrays(received, outcomes))
+    return frames.encode("tick", tick, arrays | told_arrays(received, tx_status))
 
 
-def told_arrays(received: ReceivedPackets, outcomes: Outcomes) -> dict[str, AnyArray]:
+def told_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, AnyArray]:
     """What was received, and what became of packets, as the arrays of a frame."""
     arrays: dict[str, AnyArray] = {}
     if len(received):
@@ -60,12 +60,12 @@ def told_arrays(received: ReceivedPackets, outcomes: Outcomes) -> dict[str, AnyA
         arrays["received/given"] = np.array(list(received.given.values())).reshape(len(received.given), len(received))
         arrays["received/data"] = received.payloads.data
         arrays["received/offset"] = received.payloads.offset
-    if len(outcomes):
-        arrays["outcomes"] = np.array((outcomes.row, outcomes.id, outcomes.result))
+    if len(tx_status):
+        arrays["tx_status"] = np.array((tx_status.row, tx_status.id, tx_status.result))
     return arrays
 
 
-def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[Senses, ReceivedPackets, Outcomes]:
+def decode_tick(frame: Frame, measures: tuple[str, ...], known: Set[str]) -> tuple[Senses, ReceivedPackets, TxStatuses]:
     """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known.
 
     Whose senses they are, and who received, `check_rows` tells.
@@ -79,7 +79,7 @@ def decode_tick(frame: Frame, gives: tuple[str, ...], known: Set[str]) -> tuple[
         senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
         if not senses or not senses.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
-        return senses, *told_of(frame, gives)
+        return senses, *told_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
@@ -99,17 +99,19 @@ def check_rows(senses: Senses, received: ReceivedPackets, rows: Mapping[str, Int
             raise BadFrame("malformed", "received/numbers: expected packets of robots of this runner")
 
 
-def told_of(frame: Frame, gives: tuple[str, ...]) -> tuple[ReceivedPackets, Outcomes]:
+def told_of(frame: Frame, measures: tuple[str, ...]) -> tuple[ReceivedPackets, TxStatuses]:
     """What `told_arrays` was given; KeyError, ValueError or BadFrame if the frame does not hold it."""
-    return _received(frame, gives), _outcomes(frame)
+    return _received(frame, measures), _tx_status(frame)
 
 
-def _received(frame: Frame, gives: tuple[str, ...]) -> ReceivedPackets:
+def _received(frame: Frame, measures: tuple[str, ...]) -> ReceivedPackets:
     if "received/numbers" not in frame.arrays:
-        return ReceivedPackets.none(gives)
+        return ReceivedPackets.none(measures)
     numbers = checked_array(frame, "received/numbers", "<i8", (5, None))
     receiver, sender, sequence, received_at_ns, payload = numbers
-    given = dict(zip(gives, checked_array(frame, "received/given", "<f8", (len(gives), numbers.shape[1])), strict=True))
+    given = dict(
+        zip(measures, checked_array(frame, "received/given", "<f8", (len(measures), numbers.shape[1])), strict=True)
+    )
     data, offset = checked_array(frame, "received/data", "|u1", (None,)), frame.arrays["received/offset"]
     if not _rises_to(offset, len(data)):
         raise BadFrame("malformed", "received/offset: expected rising offsets into received/data")
@@ -125,13 +127,13 @@ def _rises_to(offset: AnyArray, end: int) -> bool:
     return not np.count_nonzero(offset[1:] < offset[:-1])
 
 
-def _outcomes(frame: Frame) -> Outcomes:
-    if "outcomes" not in frame.arrays:
-        return NO_OUTCOMES
-    row, id_, result = checked_array(frame, "outcomes", "<i8", (3, None))
-    if ((result < 0) | (result >= len(SendResult))).any():
-        raise BadFrame("malformed", f"outcomes: expected results from 0 to {len(SendResult) - 1}")
-    return Outcomes(row, id_, result)
+def _tx_status(frame: Frame) -> TxStatuses:
+    if "tx_status" not in frame.arrays:
+        return NO_TX_STATUSES
+    row, id_, result = checked_array(frame, "tx_status", "<i8", (3, None))
+    if ((result < 0) | (result >= len(TxResult))).any():
+        raise BadFrame("malformed", f"tx_status: expected results from 0 to {len(TxResult) - 1}")
+    return TxStatuses(row, id_, result)
 
 
 def encode_actions(
@@ -176,7 +178,7 @@ def sent_arrays(sent: SentPackets) -> dict[str, AnyArray]:
         "sent/data": sent.payloads.data,
         "sent/offset": sent.payloads.offset,
     }
-    return arrays if sent.outcome_id is None else arrays | {"sent/outcome_id": sent.outcome_id}
+    return arrays if sent.tx_status_id is None else arrays | {"sent/tx_status_id": sent.tx_status_id}
 
 
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
@@ -202,16 +204,16 @@ def sent_of(frame: Frame, rows: IntArray) -> SentPackets:
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
     if not _own(sender, rows) or np.count_nonzero(to < BROADCAST):
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
-    return SentPackets(sender, to, Payloads(data, offset), _outcome_id(frame, to))
+    return SentPackets(sender, to, Payloads(data, offset), _tx_status_id(frame, to))
 
 
-def _outcome_id(frame: Frame, to: IntArray) -> IntArray | None:
-    if "sent/outcome_id" not in frame.arrays:
+def _tx_status_id(frame: Frame, to: IntArray) -> IntArray | None:
+    if "sent/tx_status_id" not in frame.arrays:
         return None
-    outcome_id = checked_array(frame, "sent/outcome_id", "<i8", (len(to),))
-    if (outcome_id < UNTOLD).any() or ((outcome_id != UNTOLD) & (to == BROADCAST)).any():
-        raise BadFrame("malformed", "sent/outcome_id: expected numbers from 0, or -1, as for every broadcast")
-    return outcome_id
+    tx_status_id = checked_array(frame, "sent/tx_status_id", "<i8", (len(to),))
+    if (tx_status_id < UNTOLD).any() or ((tx_status_id != UNTOLD) & (to == BROADCAST)).any():
+        raise BadFrame("malformed", "sent/tx_status_id: expected numbers from 0, or -1, as for every broadcast")
+    return tx_status_id
 
 
 def _notes(frame: Frame, rows: IntArray) -> Notes:
@@ -263,24 +265,24 @@ def _own(some: IntArray, rows: IntArray) -> bool:
     return np.count_nonzero(known[np.searchsorted(known[:-1], some)] == some) == len(some)
 
 
-# --- What crosses the wire in the middle of a tick, in real time with a quantum: packets to a runner, packets back.
+# --- What crosses the wire in the middle of a tick, in real time with a subtick: packets to a runner, packets back.
 
 
-def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets, outcomes: Outcomes) -> bytes:
+def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """A `packets` frame: what a runner's robots received since the last, and learned of their own packets.
 
     It is handed over at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
     """
-    return frames.encode("packets", tick, told_arrays(received, outcomes), {"at_ns": at_ns, "number": number})
+    return frames.encode("packets", tick, told_arrays(received, tx_status), {"at_ns": at_ns, "number": number})
 
 
-def decode_packets(frame: Frame, gives: tuple[str, ...]) -> tuple[int, int, ReceivedPackets, Outcomes]:
+def decode_packets(frame: Frame, measures: tuple[str, ...]) -> tuple[int, int, ReceivedPackets, TxStatuses]:
     """Time, number and what else `encode_packets` was given; BadFrame if the frame does not hold it."""
     at_ns, number = frame.values.get("at_ns"), frame.values.get("number")
     if type(at_ns) is not int or type(number) is not int:
         raise BadFrame("malformed", "expected at_ns and number")
     try:
-        return at_ns, number, *told_of(frame, gives)
+        return at_ns, number, *told_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 

@@ -9,8 +9,8 @@ from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.sensors import SHEETS
-from swarmwire.comms.packets import SendResult
-from swarmwire.comms.radio.config.impairments import Gives
+from swarmwire.comms.packets import TxResult
+from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
@@ -30,19 +30,19 @@ def _of_bodies() -> Iterator[Entry]:
 
 
 def _of_packets() -> Iterator[Entry]:
-    hints = get_type_hints(Gives)
-    for of in fields(Gives):
+    hints = get_type_hints(Measures)
+    for of in fields(Measures):
         kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
-        (column,) = Gives(**{of.name: kind()}).columns
+        (column,) = Measures(**{of.name: kind()}).columns
         told = first_line(getattr(Packet, column).__doc__)
         yield _sense(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
 
 
 def _of_outcomes() -> Entry:
-    results = tuple((result.name, result.meaning) for result in SendResult)
+    results = tuple((result.name, result.meaning) for result in TxResult)
     facts = (
         ("in an agent", f'needs = ("{OUTCOMES}", …)'),
-        ("read as", f"robot.radio.outcomes: {first_line(RadioPort.outcomes.__doc__)}"),
+        ("read as", f"robot.radio.tx_status: {first_line(RadioPort.tx_status.__doc__)}"),
         ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
     )
     told = "The sender learns what became of a packet to one robot, as far as its own radio knows."

@@ -42,7 +42,7 @@ RealTime = Annotated[
         metavar="[FACTOR]",
     ),
 ]
-Quantum = Annotated[
+Subtick = Annotated[
     float | None,
     typer.Option(
         help="In real time, wake every so many seconds between ticks, 0.001 or more, and let packets cross then.",
@@ -71,7 +71,7 @@ def run_command(
     overrides: Overrides = None,
     socket: Socket = None,
     realtime: RealTime = None,
-    quantum: Quantum = None,
+    subtick: Subtick = None,
     packets: Packets = "off",
     links: Links = False,
     rrd: Rrd = True,
@@ -126,7 +126,7 @@ def run_command(
             out=folder,
             socket=socket,
             realtime=realtime,
-            quantum=quantum,
+            subtick=subtick,
             gateways=gateways,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
         )

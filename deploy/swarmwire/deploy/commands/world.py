@@ -20,7 +20,7 @@ from swarmwire.deploy.commands.access_options import (
 )
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.options import Links, Overrides, Packets, Quiet, ScenarioFile, Seed
-from swarmwire.deploy.commands.run import Out, Quantum, RealTime, Rrd, Seeds, Select, Ui, View, run_shown
+from swarmwire.deploy.commands.run import Out, RealTime, Rrd, Seeds, Select, Subtick, Ui, View, run_shown
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
@@ -49,7 +49,7 @@ def world_command(
     seeds: Seeds = None,
     overrides: Overrides = None,
     realtime: RealTime = None,
-    quantum: Quantum = None,
+    subtick: Subtick = None,
     packets: Packets = "off",
     links: Links = False,
     rrd: Rrd = True,
@@ -118,7 +118,7 @@ def world_command(
             seeds=chosen,
             out=folder,
             realtime=realtime,
-            quantum=quantum,
+            subtick=subtick,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
             listening=Listening(tuple(listen), tuple(observe or ()), of.network, of.access, start_with, told=gathering),
         )

@@ -131,5 +131,5 @@ class Behind:
         radio = self._scenario.radio
         if radio is None:
             return None
-        told = radio.max_payload_bytes, radio.gives.columns, radio.tells
+        told = radio.max_payload_bytes, radio.measures.columns, radio.tells
         return LentAir(static.robot_names, static.rate_hz, *told)

@@ -3,7 +3,7 @@
 In lockstep all actions follow from scenario and seed until a runner is lost, or one comes with code of its own. With
 runners in real time none do: it matters when an answer comes. From the first such tick on, each tick's actions are
 appended to `inputs/actions.frames`: a length of 4 bytes, little-endian, and an `actions` frame of the wire. In real
-time with a quantum, where packets come in the middle of a tick, its frame also holds when each came and whether it
+time with a subtick, where packets come in the middle of a tick, its frame also holds when each came and whether it
 waits for its robot's turn (`within`). Each goes to the system in one write, so that a run that is killed keeps all its
 ticks; a frame that is cut off at the end of the file is passed over.
 """
@@ -20,7 +20,7 @@ from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.interfaces import AgentBackend, AirTime, Put, TimedBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
@@ -53,19 +53,21 @@ class RecordedBackend:
         self._ticks = self._missed = 0
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What every robot does in this tick."""
-        actions = self._backend.act(tick, senses, received, outcomes)
+        actions = self._backend.act(tick, senses, received, tx_status)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, {})
         return actions
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same of a backend that puts packets on the air itself."""
         noted = _Noted(air)
-        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, received, outcomes, noted)
+        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, received, tx_status, noted)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, _puts_arrays(noted.puts))
         return actions
@@ -186,14 +188,16 @@ class ReplayedBackend:
         self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What every robot does in this tick, or did."""
         if tick < self._inputs.first_tick:
-            return self._agents.act(tick, senses, received, outcomes)
+            return self._agents.act(tick, senses, received, tx_status)
         return self._inputs.actions(tick, self._robots)
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):

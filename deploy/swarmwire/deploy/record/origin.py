@@ -37,7 +37,7 @@ class Origin:
     versions: Mapping[str, str]
     gateways: Mapping[str, str]  # by group: of which kind it has one
     metrics: tuple[MetricFacts, ...]  # that were measured
-    quantum_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
+    subtick_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
@@ -59,7 +59,7 @@ def origin_of(
     ticks: int,
     runners: int,
     realtime: float | None,
-    quantum_s: float | None,
+    subtick_s: float | None,
     metrics: Sequence[Metric],
     gateways: Mapping[str, str],
     folder: Path | None,
@@ -79,7 +79,7 @@ def origin_of(
         versions=machine.versions(),
         gateways=gateways,
         metrics=tuple(facts_of(metric) for metric in metrics),
-        quantum_s=quantum_s,
+        subtick_s=subtick_s,
     )
     if folder:
         write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
@@ -119,5 +119,5 @@ def _origin(found: dict[str, Any]) -> Origin:
         versions=dict(found["versions"]),
         gateways=dict(found["gateways"]),
         metrics=facts_in(found),
-        quantum_s=None if found["quantum_s"] is None else float(found["quantum_s"]),
+        subtick_s=None if found["subtick_s"] is None else float(found["subtick_s"]),
     )

@@ -92,7 +92,7 @@ class RunRecord:
         ticks: int,
         runners: int,
         realtime: float | None,
-        quantum_s: float | None,
+        subtick_s: float | None,
         gateways: Mapping[str, str],
         metrics: Metrics,
     ) -> Origin:
@@ -105,7 +105,7 @@ class RunRecord:
                 ticks=ticks,
                 runners=runners,
                 realtime=realtime,
-                quantum_s=quantum_s,
+                subtick_s=subtick_s,
                 metrics=metrics.metrics,
                 gateways=gateways,
                 folder=self.folder,

@@ -90,8 +90,8 @@ def _add_real_time(table: Table, result: Result) -> None:
         return
     missed = f"{real.missed_ticks} of {result.ticks} ticks missed"
     lag = f", worst lag {_lag(real.worst_lag_s)}" if real.missed_ticks else ""
-    quanta = f" in quanta of {_lag(real.quantum_s)}" if real.quantum_s else ""
-    table.add_row("real time", f"asked for x {real.factor:g}{quanta}{_longer(result, real.factor)}; {missed}{lag}")
+    subticks = f" in subticks of {_lag(real.subtick_s)}" if real.subtick_s else ""
+    table.add_row("real time", f"asked for x {real.factor:g}{subticks}{_longer(result, real.factor)}; {missed}{lag}")
     if real.tick_jitter:
         table.add_row("ticks began late", _delays(real.tick_jitter))
     if real.delivery:

@@ -1,4 +1,4 @@
-"""Outcomes of a campaign: columns of its table that say what came of each run."""
+"""TxStatuses of a campaign: columns of its table that say what came of each run."""
 
 from dataclasses import dataclass
 from typing import get_args

@@ -30,7 +30,7 @@ def network_table(fit: NetworkFit) -> dict[str, Any]:
             "deviation_s": rounded(delays.deviation_s.value),
         }
     if fit.log.has_distances:
-        radio["gives"] = {"range": {}, "bearing": {}}
+        radio["measures"] = {"range": {}, "bearing": {}}
     return {"radio": radio}
 
 

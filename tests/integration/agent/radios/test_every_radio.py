@@ -55,10 +55,10 @@ NEEDS = {"range_m": "radio.range", "bearing_rad": "radio.bearing", "rssi_dbm": "
 
 def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio):
     for _ in range(2):
-        received, outcomes = any_radio.received(0)
-        assert (len(received), len(outcomes)) == (0, 0)
-        assert tuple(received.given) == any_radio.gives
-    assert any_radio.needs == {NEEDS[column] for column in any_radio.gives}
+        received, tx_status = any_radio.received(0)
+        assert (len(received), len(tx_status)) == (0, 0)
+        assert tuple(received.given) == any_radio.measures
+    assert any_radio.needs == {NEEDS[column] for column in any_radio.measures}
 
 
 def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):

@@ -132,7 +132,7 @@ def test_packets_come_with_range_and_bearing_of_the_tracker():
         log, clock = KeptLog(), DatedClock()
         tracker = tracked(session, other, clock)
         a = radio(session, "flock-0", clock, tracker=tracker, asks_pose=True, log=log)
-        assert a.gives == ("range_m", "bearing_rad")
+        assert a.measures == ("range_m", "bearing_rad")
         assert a.needs == {"radio.range", "radio.bearing"}
         b = radio(other, "flock-1")
         meet(other, [a])
@@ -176,4 +176,4 @@ def test_without_a_tracker_nothing_is_given():
         meet(other, [a])
         b.send(words(1.0))
         assert received_by(a, 1) == [(1, 0, 1.0)]
-        assert (a.gives, a.needs) == ((), frozenset())
+        assert (a.measures, a.needs) == ((), frozenset())

@@ -53,7 +53,7 @@ def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now(
         b.send(words(*range(20)))
         until(lambda: len(c._inbox._waiting) == 40)
         now_ns = 5 * NS_PER_S
-        received, outcomes = c.received(now_ns)
+        received, tx_status = c.received(now_ns)
         rows = list(
             zip(received.received_at_ns.tolist(), received.sender.tolist(), received.sequence.tolist(), strict=True)
         )
@@ -61,7 +61,7 @@ def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now(
         assert [sequence for _, sender, sequence in rows if sender == 0] == list(range(20))
         assert 0 < rows[0][0] <= rows[-1][0] <= now_ns
         assert received.receiver.tolist() == [2] * 40
-        assert len(outcomes) == 0
+        assert len(tx_status) == 0
         assert received.given == {}
 
 

@@ -27,7 +27,7 @@ def test_the_status_tells_how_the_run_is_doing(tmp_path):
         assert (status["alive"], status["robots"], status["groups"]) == (20, 20, {"flock": 20})
         assert status["robot_names"][7] == "flock-7"
         assert status["runners"]["ready"] == 2
-        assert (status["radio"]["loss"], status["radio"]["gives.range.noise_m"]) == (0.3, 0.02)
+        assert (status["radio"]["loss"], status["radio"]["measures.range.noise_m"]) == (0.3, 0.02)
         assert 0.0 <= status["metrics"]["order"] <= 1.0
         assert status["counts"]["nan_commands"] == 0
         assert status["events"] == []

@@ -133,24 +133,24 @@ def test_a_body_that_is_another_robot_than_its_gateway_emulates_is_told_of_at_th
         assert "as scripted" not in capsys.readouterr().err
 
 
-def test_with_a_quantum_it_is_repeated_bit_for_bit_too(scenario, scripted, tmp_path) -> None:
+def test_with_a_subtick_it_is_repeated_bit_for_bit_too(scenario, scripted, tmp_path) -> None:
     folder = tmp_path / "run"
     both_flock = ["robots.own.agent=swarmwire.agent.behaviours:Flocking"]
-    in_quanta = Simulation(
+    in_subticks = Simulation(
         scenario,
         overrides=both_flock,
         gateways={"other": "scripted"},
         realtime=10,
-        quantum=0.002,
+        subtick=0.002,
         out=folder,
         record=BARE,
     )
-    with in_quanta as simulation:
+    with in_subticks as simulation:
         scripted[-1].drive = {1: (0.0, 1.0)}
         simulation.run()
     result = simulation.result
     assert result.realtime is not None
-    assert result.realtime.quantum_s == 0.002
+    assert result.realtime.subtick_s == 0.002
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended > 0
     repetition = repeat(folder)

@@ -26,7 +26,7 @@ params = { speed_mps = 0.05 }
 
 [radio]
 range_m = 2.0
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 
 

@@ -73,7 +73,7 @@ def test_the_newer_magnetometer_has_other_axes_and_both_have_offsets() -> None:
 
 def test_there_is_no_compass_unless_north_is_known() -> None:
     driver = Epuck2Driver("127.0.0.1", BODY, Epuck2Options(), WallClock())
-    assert driver.gives == {"proximity", "light", "ground", "scan", "odometry", "imu", "battery"}
+    assert driver.measures == {"proximity", "light", "ground", "scan", "odometry", "imu", "battery"}
 
 
 def test_steps_are_counted_on_where_the_counter_wraps() -> None:

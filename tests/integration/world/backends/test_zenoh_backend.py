@@ -29,7 +29,7 @@ from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.registry import RunnerHealth
 from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
-from tests.support.agent.hosts import GIVES, assignment, group, one_group, plain, received_from, spec
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
 from tests.support.waiting import TIMEOUT_S
 
 RUN = "r1"
@@ -96,11 +96,11 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
 
 def three_ticks(backend: LockstepBackend, rows: list[int]) -> None:
     for tick in range(3):
-        backend.act(tick, one_group(tick, rows), ReceivedPackets.none(GIVES))
+        backend.act(tick, one_group(tick, rows), ReceivedPackets.none(MEASURES))
 
 
 def on_receive(before: Actions | None) -> ReceivedPackets:
-    return ReceivedPackets.none(GIVES) if before is None else received_from(before.sent, ROWS)
+    return ReceivedPackets.none(MEASURES) if before is None else received_from(before.sent, ROWS)
 
 
 @pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
@@ -145,13 +145,13 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
             names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
             tick = 0
             while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
-                got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+                got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
                 tick += 1
                 assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
             errors = [reply.err for replies in asked for reply in replies]
         texts = [error.payload.to_string() if error else "granted" for error in errors]
         assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
-        got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+        got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
         assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
         assert set(backend.counts()) == names | {"bad_join", "refused_join"}
 
@@ -204,10 +204,10 @@ def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
         with thread(endpoint, "r1") as ends:
             tick = 0
             while "refused_join" not in backend.counts():
-                backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+                backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
                 tick += 1
             end = ends.get(timeout=20.0)
-        backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))  # that it left does not matter
+        backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))  # that it left does not matter
         backend.close()
     assert isinstance(end, RunnerLost)
     assert end.reason == "all robots are taken"
@@ -266,7 +266,7 @@ def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -
         with pytest.raises(BadInput, match="expected an endpoint that is free"):
             second.open()
         second.close()
-        got = backend.act(0, one_group(0, [0]), ReceivedPackets.none(GIVES))
+        got = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
         assert got.linear_mps.tolist() == [1.0]
 
 
@@ -282,7 +282,7 @@ def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
     assert Path(path).is_socket()
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
         backend.start()
-        assert backend.act(0, one_group(0, [0]), ReceivedPackets.none(GIVES)).linear_mps.tolist() == [1.0]
+        assert backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0]
 
 
 def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
@@ -332,9 +332,9 @@ def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
         later.callback(backend.close)
         backend.start()
         for tick in range(2):
-            backend.act(tick, one_group(tick, [0, 1, 2]), ReceivedPackets.none(GIVES))
+            backend.act(tick, one_group(tick, [0, 1, 2]), ReceivedPackets.none(MEASURES))
         kill_one(agent_host)
-        got = backend.act(2, one_group(2, [0, 1, 2]), ReceivedPackets.none(GIVES))
+        got = backend.act(2, one_group(2, [0, 1, 2]), ReceivedPackets.none(MEASURES))
         steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
         assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
         assert backend.counts() == {"runners_lost": 1, "runners_joined_late": 1}
@@ -351,7 +351,7 @@ def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
             kill_one(agent_host)
             asked.append(True)
             with pytest.raises(Interrupted):
-                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(GIVES))
+                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
         finally:
             backend.close()
 
@@ -373,7 +373,7 @@ def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(
         with closing(backend):
             backend.start()
             for tick in range(3):
-                actions = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(GIVES))
+                actions = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
                 assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
                 clock.ahead_ns += to_ns(10 * TIMEOUT_S)
             assert not backend.counts()
@@ -399,7 +399,7 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
             child = psutil.Process(agent_host.pid).children()[0]
             waits.clear()
             child.suspend()
-            actions = backend.act(0, one_group(0, [0]), ReceivedPackets.none(GIVES))
+            actions = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
             assert actions.linear_mps.tolist() == [1.0]
             assert waits[0].waits_s > 0
             assert waits[0].waits_for == "a, which plays flock-0"

@@ -9,7 +9,15 @@ from swarmwire.agent.radios import world_radio
 from swarmwire.agent.radios.world_radio import AirRadio
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SendResult, SentPackets
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_TX_STATUSES,
+    Payloads,
+    ReceivedPackets,
+    SentPackets,
+    TxResult,
+    TxStatuses,
+)
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_air
@@ -20,8 +28,8 @@ from tests.support.clocks import FakeClock
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, received_by, words
 from tests.support.waiting import until
 
-GIVES = ("range_m", "bearing_rad")
-AIR = LentAir(ROBOTS, 10, 20, GIVES, ("radio.range", "radio.bearing", "radio.outcomes"))
+MEASURES = ("range_m", "bearing_rad")
+AIR = LentAir(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))
 ROWS = {"flock-1": 1, "flock-2": 2}  # flock-0 is not driven from elsewhere
 
 
@@ -75,12 +83,12 @@ def exchange(bridge: AirBridge, radio: AirRadio) -> None:
     def reached() -> bool:
         nonlocal number
         number += 1
-        bridge.publish(0, received((row, 0, number, 0)), NO_OUTCOMES)
+        bridge.publish(0, received((row, 0, number, 0)), NO_TX_STATUSES)
         return len(radio.received(0)[0]) > 0
 
     until(reached)
     number += 1
-    bridge.publish(0, received((row, 0, number, 0)), NO_OUTCOMES)
+    bridge.publish(0, received((row, 0, number, 0)), NO_TX_STATUSES)
     until(lambda: number in radio.received(0)[0].sequence.tolist())
 
 
@@ -93,8 +101,8 @@ def taken(bridge: AirBridge, packets: int) -> SentPackets:
 def test_a_robot_learns_what_the_worlds_radio_gives():
     with bridged() as (_, session):
         radio = joined(session())
-        assert radio.gives == GIVES
-        assert radio.needs == {"radio.range", "radio.bearing", "radio.outcomes"}
+        assert radio.measures == MEASURES
+        assert radio.needs == {"radio.range", "radio.bearing", "radio.tx_status"}
         assert radio.terms == AIR.terms(1)
 
 
@@ -104,7 +112,11 @@ def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
         payloads = Payloads.of([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
         one.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
         sent = taken(bridge, 2)
-        assert (sent.sender.tolist(), sent.to.tolist(), sent.outcome_ids.tolist()) == ([1, 1], [BROADCAST, 2], [-1, 7])
+        assert (sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()) == (
+            [1, 1],
+            [BROADCAST, 2],
+            [-1, 7],
+        )
         assert [sent.payloads.row(i) for i in range(2)] == [payloads.row(i) for i in range(2)]
         for number in range(5):
             two.send(words(float(number), row=2))
@@ -130,34 +142,34 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
             np.array([1, 0, 1, 0]),
             shared,
         )
-        told = Outcomes(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, SendResult.QUEUE_FULL, 0]))
+        told = TxStatuses(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, TxResult.QUEUE_FULL, 0]))
         bridge.publish(7, table, told)
-        found: list[tuple[ReceivedPackets, Outcomes]] = []
+        found: list[tuple[ReceivedPackets, TxStatuses]] = []
 
-        def of(radio: AirRadio, packets: int) -> tuple[ReceivedPackets, Outcomes]:
+        def of(radio: AirRadio, packets: int) -> tuple[ReceivedPackets, TxStatuses]:
             found.clear()
             until(lambda: found.append(radio.received(NS_PER_S)) or len(found[-1][0]) == packets)
             return found[-1]
 
-        its, outcomes = of(one, 2)
+        its, tx_status = of(one, 2)
         assert (its.receiver.tolist(), its.sender.tolist(), its.sequence.tolist()) == ([1, 1], [0, 2], [8, 9])
         assert its.given["range_m"].tolist() == [1.0, 2.0]
         assert its.given["bearing_rad"].tolist() == [-1.0, -2.0]
         assert [Word.decode(its.payloads.row(at)).number for at in its.payload] == [8, 9]
-        assert (outcomes.row.tolist(), outcomes.id.tolist()) == ([1], [4])
-        assert outcomes.result.tolist() == [SendResult.QUEUE_FULL]
-        its, outcomes = of(two, 1)
-        assert (its.receiver.tolist(), its.sequence.tolist(), outcomes.id.tolist()) == ([2], [8], [5])
+        assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([1], [4])
+        assert tx_status.result.tolist() == [TxResult.QUEUE_FULL]
+        its, tx_status = of(two, 1)
+        assert (its.receiver.tolist(), its.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
 
 
 def test_nothing_received_is_no_frame(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
         monkeypatch.setattr("swarmwire.world.gateways.radio_bridge.encode_air", lambda *_: published.append(1) or b"")
-        bridge.publish(1, ReceivedPackets.none(GIVES), NO_OUTCOMES)
-        bridge.publish(2, received((0, 1, 1, 1)), NO_OUTCOMES)  # nobody behind the bridge received it
+        bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # nobody behind the bridge received it
         assert not published
-        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_OUTCOMES)
+        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_TX_STATUSES)
         assert len(published) == 2
 
 
@@ -167,7 +179,7 @@ def test_times_are_the_agents_own_by_how_old_a_packet_was_when_its_tick_began():
         radio = joined(session(), clock=clock, log=log)
         exchange(bridge, radio)
         log.received_packets.clear()
-        bridge.publish(20, received((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_OUTCOMES)
+        bridge.publish(20, received((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_TX_STATUSES)
         until(lambda: len(radio._inbox._waiting) == 1)
         clock.time_ns += 10_000_000
         its, _ = radio.received(5 * NS_PER_S)
@@ -233,7 +245,7 @@ def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
 
 def bad_frames() -> list[bytes]:
     """Frames that no robot can use, most of them almost right."""
-    good = frames.decode(encode_air(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_OUTCOMES))
+    good = frames.decode(encode_air(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_TX_STATUSES))
 
     def changed(name, value) -> bytes:
         return frames.encode("tick", 3, {**good.arrays, name: value})
@@ -244,8 +256,8 @@ def bad_frames() -> list[bytes]:
         frames.encode("end", 3, {}),
         frames.encode("tick", -1, good.arrays),
         frames.encode("tick", 3, {}),
-        encode_air(3, 1, received((2, 0, 1, 1)), NO_OUTCOMES),
-        encode_air(3, 1, ReceivedPackets.none(GIVES), Outcomes(np.array([2]), np.array([1]), np.array([0]))),
+        encode_air(3, 1, received((2, 0, 1, 1)), NO_TX_STATUSES),
+        encode_air(3, 1, ReceivedPackets.none(MEASURES), TxStatuses(np.array([2]), np.array([1]), np.array([0]))),
         changed("received/numbers", numbers[:4]),
         changed("received/numbers", numbers[0]),
         changed("received/numbers", numbers.astype(np.float64)),
@@ -269,7 +281,7 @@ def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it(
         for data in bad:
             bridge.session.put(KEYS.air_received("flock-1"), data)
         bridge.session.put(KEYS.air_received("flock-1"), bytes(2**20 + 1))
-        bridge.publish(4, received((1, 0, 5, 1)), NO_OUTCOMES)
+        bridge.publish(4, received((1, 0, 5, 1)), NO_TX_STATUSES)
         assert received_by(radio, 1) == [(0, 5, 5.0)]
         counts = radio.counts()
         assert (counts["frames_malformed"], counts["frames_oversized"]) == (len(bad), 1)
@@ -281,7 +293,7 @@ def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch)
         radio = joined(session())
         exchange(bridge, radio)
         for tick in range(14):
-            bridge.publish(tick, received((1, 0, tick, tick * NS_PER_S // 10)), NO_OUTCOMES)
+            bridge.publish(tick, received((1, 0, tick, tick * NS_PER_S // 10)), NO_TX_STATUSES)
         until(lambda: radio.counts().get("frames_dropped") == 4)
         assert [number for _, number, _ in received_by(radio, 10)] == list(range(10))
 

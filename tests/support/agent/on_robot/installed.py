@@ -33,7 +33,7 @@ class Written(Driver):
         if not address.startswith("/"):
             raise BadInput("Written", "address", f"expected the path of a file; got {address!r}")
 
-    gives = frozenset({"proximity", "battery"})
+    measures = frozenset({"proximity", "battery"})
 
     def _write(self, line):
         with open(self.address, "a") as file:

@@ -18,7 +18,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 
@@ -51,16 +51,16 @@ class ScriptedDriver(Driver):
     options: ClassVar[type] = ScriptedOptions
     body_name: ClassVar[str] = "epuck2"
 
-    def __init__(self, clock: DatedFakeClock, gives: tuple[str, ...] = ("proximity",), body: str = "epuck2") -> None:
+    def __init__(self, clock: DatedFakeClock, measures: tuple[str, ...] = ("proximity",), body: str = "epuck2") -> None:
         super().__init__("nowhere", load_body(body), ScriptedOptions(), clock)
-        self._gives = frozenset(gives)
+        self._gives = frozenset(measures)
         self.deeds: list[Any] = []
         self.faults: dict[str, list[Callable[[], object] | None]] = {}
         self.charge = 0.75
         self.asked: frozenset[str] = frozenset()
 
     @property
-    def gives(self) -> frozenset[str]:
+    def measures(self) -> frozenset[str]:
         return self._gives
 
     def open(self) -> None:
@@ -108,7 +108,7 @@ class ScriptedRadio:
     """A radio that brings what stands in `brings`, a list of (sender, sequence, payload) a tick."""
 
     needs: frozenset[str] = frozenset()
-    gives: tuple[str, ...] = ()
+    measures: tuple[str, ...] = ()
 
     def __init__(self, row: int = 0) -> None:
         self._row = row
@@ -119,14 +119,14 @@ class ScriptedRadio:
     def open(self) -> None:
         pass
 
-    def received(self, now_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         self.asked_ns.append(now_ns)
         packets = self.brings.pop(0) if self.brings else []
         n = len(packets)
         column = [np.array([packet[i] for packet in packets], np.int64) for i in (0, 1)]
         payloads = Payloads.of([packet[2] for packet in packets])
         row, at = np.full(n, self._row), np.full(n, now_ns)
-        return ReceivedPackets(row, *column, at, {}, np.arange(n), payloads), NO_OUTCOMES
+        return ReceivedPackets(row, *column, at, {}, np.arange(n), payloads), NO_TX_STATUSES
 
     def send(self, sent: SentPackets) -> None:
         self.sent.append(sent)
@@ -168,7 +168,7 @@ class Rig:
     def __init__(
         self,
         agent: str,
-        gives: tuple[str, ...] = ("proximity",),
+        measures: tuple[str, ...] = ("proximity",),
         params: dict[str, Any] | None = None,
         body: str = "epuck2",
         limits: SpeedLimits | None = None,
@@ -178,7 +178,7 @@ class Rig:
         watchdog_s: float = 0.5,
     ) -> None:
         self.clock, self.end = DatedFakeClock(), End()
-        self.driver = ScriptedDriver(self.clock, gives, body)
+        self.driver = ScriptedDriver(self.clock, measures, body)
         self.radio = radio or ScriptedRadio()
         self.pose: Pose | None = None
         group = group_of("robot-0", 0, f"{PLAYERS}:{agent}", params or {}, self.driver.body, seed=5)

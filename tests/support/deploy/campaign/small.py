@@ -25,7 +25,7 @@ agent = "AGENT"
 [radio]
 range_m = 3.0
 loss = 0.2
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 # An agent that does what it was asked to where its robot draws a low number in its first tick: for some seeds.
 STUMBLING = """

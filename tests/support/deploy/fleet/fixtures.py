@@ -55,7 +55,7 @@ def robots(monkeypatch, capsys, fleet, packages) -> Robots:
 
 @pytest.fixture
 def lab_certificates(fleet) -> Callable[..., None]:
-    """Gives the fleet a CA, and certificates of these names for this machine."""
+    """Measures the fleet a CA, and certificates of these names for this machine."""
 
     def made(*names: str) -> None:
         folder = fleet.folder / "certs"

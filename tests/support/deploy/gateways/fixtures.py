@@ -29,7 +29,7 @@ agent = "swarmwire.agent.behaviours:Flocking"
 
 [radio]
 range_m = 1.5
-gives = { range = {}, bearing = {} }
+measures = { range = {}, bearing = {} }
 """
 
 

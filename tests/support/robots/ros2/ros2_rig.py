@@ -79,7 +79,7 @@ class Ros2Rig(Rig):
         def received() -> bool:
             self.publish(AT_START)
             try:
-                fields = driver.sense(driver.gives)
+                fields = driver.sense(driver.measures)
             except DriverLost:  # one of its topics is late on a machine that is busy
                 return False
             return all(np.isfinite(value).all() for value in fields.values())

@@ -11,7 +11,7 @@ from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.world_radio import AirRadio, _Arrival
 from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
-from swarmwire.comms.packets import BROADCAST, Outcomes, Payloads, SentPackets
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import AirTerms, Pose, encode_air, encode_pose
@@ -67,13 +67,13 @@ class AirReceived(FrameTarget):
         self.terms = AirTerms(row, self.robots, 10, 100, MEASURES, ())
         received = run.received.select(np.flatnonzero(run.received.receiver == row)).compacted()
         assert len(received), "the robot received something"
-        statuses = Outcomes(np.array([row]), np.array([4]), np.array([1]))
+        statuses = TxStatuses(np.array([row]), np.array([4]), np.array([1]))
         nothing = received.select(np.array([], np.int64))
         return [encode_air(11, row, received, statuses), encode_air(12, row, nothing, statuses)]
 
     def feed(self, case: bytes) -> str | None:
         radio = AirRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
-        radio.terms, radio.gives = self.terms, MEASURES
+        radio.terms, radio.measures = self.terms, MEASURES
         radio._inbox.put(_Arrival(case, CLOCK.now_ns(), CLOCK.utc_ns()))
         radio.received(3_000_000_000)
         return " ".join(name for name in radio.counts() if name.startswith("frames_")) or None

@@ -106,7 +106,7 @@ class Epuck2Answers(ByteTarget):
         except DriverLost:
             refused = "lost"
         driver._take(link)
-        for name, value in driver._readings.of(driver._told_sensors, driver.gives).items():
+        for name, value in driver._readings.of(driver._told_sensors, driver.measures).items():
             if value.dtype != np.float64:
                 raise AssertionError(f"{name} of {value.dtype}")
         return refused

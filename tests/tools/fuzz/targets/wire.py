@@ -104,7 +104,7 @@ class WorldFrames(FrameTarget):
     def _roster(self, stage: str) -> Any:
         if stage not in self.rosters:
             parts, terms = list(self.run.parts), Terms(memory=self.run.layouts)
-            made: Any = RealTime(parts, 0.5, 30.0, "stop", terms, quantum=True) if stage == "real time" else None
+            made: Any = RealTime(parts, 0.5, 30.0, "stop", terms, subtick=True) if stage == "real time" else None
             roster = joined(made or Lockstep(parts, terms=terms), ready=stage != "building")
             if stage != "building":
                 self._open_tick(roster)
@@ -112,7 +112,7 @@ class WorldFrames(FrameTarget):
         return self.rosters[stage]
 
     def _open_tick(self, roster: Any) -> None:
-        inputs = (self.run.senses, self.run.received, self.run.outcomes)
+        inputs = (self.run.senses, self.run.received, self.run.tx_status)
         roster.open_tick(*((TICK, 0) if isinstance(roster, RealTime) else (TICK,)), *inputs)
 
 
@@ -168,9 +168,11 @@ class RunnerFrames(FrameTarget):
     def make_samples(self) -> list[bytes]:
         self.run = run = small_run()
         self.host: Host | None = None
-        decoded = decode_tick(frames.decode(run.frames["one"][-1]), run.whole.gives or (), senses_of(run.parts, "one"))
+        decoded = decode_tick(
+            frames.decode(run.frames["one"][-1]), run.whole.measures or (), senses_of(run.parts, "one")
+        )
         self.shapes = _shapes(decoded[0])
-        between = encode_packets(11, 1_150_000_000, 3, run.received, run.outcomes)
+        between = encode_packets(11, 1_150_000_000, 3, run.received, run.tx_status)
         end = frames.encode("end", -1, {}, {"why": "it sent far more than it was asked for"})
         return [*run.frames["one"][-3:], between, end]
 

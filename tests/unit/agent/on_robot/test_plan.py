@@ -26,7 +26,7 @@ from swarmwire.agent.on_robot.plan import (
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.packets import NO_OUTCOMES, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 
 
@@ -50,7 +50,7 @@ def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
     settings = plan.settings
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, seed=1)
     mind = Mind(group, 10, None, plan.limits)
-    assert mind.step(0, {}, ReceivedPackets.none(), NO_OUTCOMES).command.linear_mps == pytest.approx(0.04)
+    assert mind.step(0, {}, ReceivedPackets.none(), NO_TX_STATUSES).command.linear_mps == pytest.approx(0.04)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ UNMET = {
     "positioning": (_offer(tracker=True), "the body epuck2 lacks"),
     "radio.range": (_offer(), 'only a radio tells: expected radio.kind "zenoh" or "air"'),
     "radio.bearing": (_offer(radio="zenoh"), "a real radio does not tell: expected tracker = true"),
-    "radio.outcomes": (_offer(radio="zenoh", tracker=True), "the radio zenoh does not tell: it tells radio.bearing"),
+    "radio.tx_status": (_offer(radio="zenoh", tracker=True), "the radio zenoh does not tell: it tells radio.bearing"),
     "radio.rssi": (_offer(radio="air"), "the radio air does not tell: it tells nothing"),
 }
 

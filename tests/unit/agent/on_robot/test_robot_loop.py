@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import ActuatorSheet
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, ReceivedPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.robot_players import Count
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, RATE_HZ, UTC_NS, Rig, ScriptedRadio, lost
@@ -63,7 +63,7 @@ def test_the_last_command_holds_while_the_agent_gives_none_and_nan_is_none():
 
 
 def test_an_agent_begins_when_each_of_its_senses_was_read():
-    rig = Rig("Driving", gives=(), body="epuck-gps", tracked=("compass",))
+    rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
     rows = rig.run(3)
     assert not any(row.drive for row in rows)
     rig.pose = Pose(0.0, 0.0, 1.0)
@@ -73,7 +73,7 @@ def test_an_agent_begins_when_each_of_its_senses_was_read():
 
 
 def test_an_agent_begins_after_three_seconds_even_if_a_sense_was_never_read():
-    rig = Rig("Driving", gives=(), body="epuck-gps", tracked=("compass",))
+    rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
     rows = rig.run(33)
     assert [row.tick for row in rows if row.drive] == [31, 32]
 
@@ -100,7 +100,7 @@ def test_leds_notes_and_packets_reach_driver_log_and_radio():
 
 
 def test_the_driver_is_asked_for_what_is_needed_and_the_battery_alone():
-    rig = Rig("Driving", gives=("proximity", "ground", "battery"), needs=("proximity",))
+    rig = Rig("Driving", measures=("proximity", "ground", "battery"), needs=("proximity",))
     rows = rig.run(1)
     assert rig.driver.asked == {"proximity", "battery"}
     assert rows[0].charge == rig.loop.status()["charge"] == 0.75
@@ -315,5 +315,5 @@ def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_m
     group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
     mind = Mind(group, RATE_HZ, None, limits_for(body, None, None, ""))
     for tick in range(2):
-        mind.step(tick, {}, ReceivedPackets.none(()), NO_OUTCOMES)
+        mind.step(tick, {}, ReceivedPackets.none(()), NO_TX_STATUSES)
     assert mind.actuations == 6

@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
 from swarmwire.comms.events.selection import Selection, Swarm
-from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
@@ -146,7 +146,7 @@ def test_where_nothing_disturbs_a_jammer_is_refused():
         jammer(at=(0.0, 0.0)).check_radio(Radio(model="log-distance", log_distance=LogDistance()))
 
 
-RADIO = Radio(2.0, loss=0.1, bursts=Bursts(), gives=Gives(range=RangeGiven(0.01)))
+RADIO = Radio(2.0, loss=0.1, bursts=Bursts(), measures=Measures(range=RangeMeasure(0.01)))
 PAIR = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
 
 
@@ -183,9 +183,9 @@ def test_whole_numbers_are_rounded_on_the_way():
 
 
 def test_numbers_within_tables_move_and_nothing_else_does():
-    conditions = under(ramp("radio.gives.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
-    bursts, gives = Bursts(bad_s=2.0), Gives(range=RangeGiven(0.5))
-    assert conditions.radio_at(RADIO, to_ns(1.0)) == replace(RADIO, bursts=bursts, gives=gives)
+    conditions = under(ramp("radio.measures.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
+    bursts, measures = Bursts(bad_s=2.0), Measures(range=RangeMeasure(0.5))
+    assert conditions.radio_at(RADIO, to_ns(1.0)) == replace(RADIO, bursts=bursts, measures=measures)
 
 
 def test_a_ramp_sets_out_from_what_those_before_it_made_and_undone_leaves_that():

@@ -50,25 +50,25 @@ def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float)
 
 def test_rays_end_where_they_first_meet_a_circle() -> None:
     random = np.random.default_rng(1)
-    outcomes = set[str]()
+    tx_status = set[str]()
     for px, py, angle, cx, cy, radius in random.uniform([-3, -3, -4, -3, -3, 0.1], [3, 3, 4, 3, 3, 2], (300, 6)):
         distance = ray_to_circle(px, py, math.cos(angle), math.sin(angle), cx, cy, radius)
         check_ray(distance, circle_depth(cx, cy, radius), px, py, angle)
-        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert outcomes == {"inside", "miss", "hit"}
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
 
 
 def test_rays_end_where_they_first_meet_a_box() -> None:
     random = np.random.default_rng(2)
-    outcomes = set[str]()
+    tx_status = set[str]()
     for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
         cx, cy, half_length, half_width, heading = rest
         box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
         obstacle = Obstacle("box", cx, cy, heading, size_m=(2 * half_length, 2 * half_width))
         distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
         check_ray(distance, box_depth(box), px, py, angle)
-        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert outcomes == {"inside", "miss", "hit"}
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
 
 
 @pytest.mark.parametrize(
@@ -140,15 +140,15 @@ def test_obstacles_of_each_arena_stand_together() -> None:
 
 def test_rays_end_where_they_first_meet_a_polygon() -> None:
     random = np.random.default_rng(4)
-    outcomes = set[str]()
+    tx_status = set[str]()
     for px, py, angle, x, y, heading in random.uniform([-3, -3, -4, -3, -3, -4], [3, 3, 4, 3, 3, 4], (300, 6)):
         around = np.sort(random.uniform(0.0, 2.0 * np.pi, random.integers(3, 9)))  # corners on a circle: convex
         points = tuple((1.5 * math.cos(a), 1.5 * math.sin(a)) for a in around)
         obstacle = Obstacle("polygon", x, y, heading, points_m=points)
         distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
         check_ray(distance, polygon_depth(obstacle), px, py, angle)
-        outcomes.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert outcomes == {"inside", "miss", "hit"}
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
 
 
 def polygon_depth(obstacle: Obstacle) -> Depth:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SendResult, SentPackets
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Accounts, Lives
 from swarmwire.comms.radio.medium import Air
@@ -216,6 +216,6 @@ def test_nor_what_its_senders_learned(over: int):
     _, learned = air.advance_within(TICK_NS // 2)
     assert learned.row.tolist() == [1, 5]
     air.leave(np.arange(2) == over)
-    outcomes = air.advance(TICK_NS).outcomes
-    assert (outcomes.row.tolist(), outcomes.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])
-    assert outcomes.result.tolist() == [int(SendResult.ACKNOWLEDGED)]
+    tx_status = air.advance(TICK_NS).tx_status
+    assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])
+    assert tx_status.result.tolist() == [int(TxResult.ACKNOWLEDGED)]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import ReceivedPackets, SentPackets
-from swarmwire.comms.radio.config.impairments import BearingGiven, Delays, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import Air
@@ -30,7 +30,7 @@ RADIO = Radio(
     jitter_s=0.05,
     bit_rate_bps=3000,
     queue_limit=2,
-    gives=Gives(RangeGiven(0.1), BearingGiven(0.2)),
+    measures=Measures(RangeMeasure(0.1), BearingMeasure(0.2)),
 )
 OBSTACLES = [[Obstacle("cylinder", 0.1 * a, 0.0, radius_m=0.3 + 0.1 * a)] for a in range(3)]
 COLUMNS = ("receiver", "sender", "sequence", "received_at_ns")
@@ -89,7 +89,7 @@ def test_no_stage_shifts_the_draws_of_another():
     pose = scattered(ROBOTS)
     full, bare = (
         run(make_air(radio, ROBOTS), pose, lambda _: two_each(1), 5, 2)
-        for radio in (RADIO, replace(RADIO, gives=Gives()))
+        for radio in (RADIO, replace(RADIO, measures=Measures()))
     )
     for name in COLUMNS:
         np.testing.assert_array_equal(full.received(name), bare.received(name))

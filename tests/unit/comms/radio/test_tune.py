@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, OwnAntenna
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
@@ -14,7 +14,7 @@ from swarmwire.comms.radio.reception.bursts import BurstStates
 from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
 
 PAIR = at((0, 0), (1, 0))
-LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, gives=Gives(range=RangeGiven(0.1)))
+LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, measures=Measures(range=RangeMeasure(0.1)))
 
 
 def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8, ticks: int = 20, seeds: range = range(1)) -> Run:

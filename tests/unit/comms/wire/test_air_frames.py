@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.radio_bridge import (
     MAX_RADIO_FRAME_BYTES,
@@ -24,7 +24,7 @@ from swarmwire.comms.wire.radio_bridge import (
     encode_pose,
 )
 from swarmwire.comms.wire.tick_frames import decode_packets, decode_sent, encode_packets, encode_sent
-from tests.support.agent.hosts import GIVES, received_from
+from tests.support.agent.hosts import MEASURES, received_from
 
 ROW = 4  # of the robot, in the world; in its arena there are two
 TERMS = AirTerms(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
@@ -38,7 +38,7 @@ RECEIVED = ReceivedPackets(
     payload=np.array([0, 0, 1]),
     payloads=Payloads.of([b"abc", b""]),
 )
-OUTCOMES = Outcomes(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
+OUTCOMES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 
 def changed(**arrays: Any) -> bytes:
@@ -55,7 +55,7 @@ def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
 
 
 def test_what_was_received_and_learned_comes_over_whole() -> None:
-    tick, received, outcomes = decode_air(encode_air(3, ROW, RECEIVED, OUTCOMES), TERMS)
+    tick, received, tx_status = decode_air(encode_air(3, ROW, RECEIVED, OUTCOMES), TERMS)
     assert tick == 3
     for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
         assert getattr(received, name).tolist() == getattr(RECEIVED, name).tolist()
@@ -64,13 +64,15 @@ def test_what_was_received_and_learned_comes_over_whole() -> None:
         "bearing_rad": [-1.0, 0.0, 1.0],
     }
     assert [received.payloads.row(at) for at in range(2)] == [b"abc", b""]
-    assert (outcomes.row.tolist(), outcomes.id.tolist(), outcomes.result.tolist()) == ([ROW, ROW], [0, 5], [1, 0])
+    assert (tx_status.row.tolist(), tx_status.id.tolist(), tx_status.result.tolist()) == ([ROW, ROW], [0, 5], [1, 0])
 
 
 def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
-    tick, received, outcomes = decode_air(encode_air(0, ROW, ReceivedPackets.none(TERMS.gives), NO_OUTCOMES), TERMS)
-    assert (tick, len(received), len(outcomes)) == (0, 0, 0)
-    assert set(received.given) == set(TERMS.gives)
+    tick, received, tx_status = decode_air(
+        encode_air(0, ROW, ReceivedPackets.none(TERMS.measures), NO_TX_STATUSES), TERMS
+    )
+    assert (tick, len(received), len(tx_status)) == (0, 0, 0)
+    assert set(received.given) == set(TERMS.measures)
 
 
 @pytest.mark.parametrize(
@@ -91,8 +93,8 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
         ({"received_offset": np.array([1, 3, 3])}, "received/offset"),
         ({"received_offset": np.array([0, 3, 2])}, "received/offset"),
         ({"received_offset": np.array([0, 4, 3])}, "received/offset"),
-        ({"outcomes": np.array([[ROW, 3], [0, 5], [1, 0]])}, "robot's own"),
-        ({"outcomes": np.array([[ROW, 5], [0, 5], [1, 0]])}, "robot's own"),
+        ({"tx_status": np.array([[ROW, 3], [0, 5], [1, 0]])}, "robot's own"),
+        ({"tx_status": np.array([[ROW, 5], [0, 5], [1, 0]])}, "robot's own"),
     ],
     ids=str,
 )
@@ -131,7 +133,7 @@ def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
         decode_air(encode_air(tick, ROW, RECEIVED, OUTCOMES), TERMS)
 
 
-TOLD_TERMS = AirTerms(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.outcomes"))
+TOLD_TERMS = AirTerms(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.tx_status"))
 GOOD = msgpack.unpackb(TOLD_TERMS.encode())
 
 
@@ -155,7 +157,7 @@ def test_what_was_told_is_what_is_learned():
         {"max_payload_bytes": 1.5},
         {"robots": "flock-0"},
         {"robots": [1]},
-        {"gives": None},
+        {"measures": None},
         {"needs": {}},
         {"more": 1},
     ],
@@ -214,11 +216,11 @@ SENT = SentPackets(
 )
 
 
-def test_packets_and_outcomes_come_back_with_time_and_number() -> None:
-    received, outcomes = received_from(SENT, [2, 5]), Outcomes(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
-    frame = frames.decode(encode_packets(7, 712_000_000, 3, received, outcomes))
+def test_packets_and_tx_status_come_back_with_time_and_number() -> None:
+    received, tx_status = received_from(SENT, [2, 5]), TxStatuses(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
+    frame = frames.decode(encode_packets(7, 712_000_000, 3, received, tx_status))
     assert (frame.kind, frame.tick) == ("packets", 7)
-    at_ns, number, got, told = decode_packets(frame, GIVES)
+    at_ns, number, got, told = decode_packets(frame, MEASURES)
     assert (at_ns, number) == (712_000_000, 3)
     for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
         assert getattr(got, name).tolist() == getattr(received, name).tolist()
@@ -229,15 +231,15 @@ def test_packets_and_outcomes_come_back_with_time_and_number() -> None:
 @pytest.mark.parametrize("values", [{}, {"at_ns": 1}, {"at_ns": 1.0, "number": 0}, {"at_ns": 1, "number": "0"}])
 def test_packets_without_time_and_number_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(BadFrame):
-        decode_packets(frames.Frame("packets", 0, {}, values), GIVES)
+        decode_packets(frames.Frame("packets", 0, {}, values), MEASURES)
 
 
 def test_packets_with_a_table_missing_are_refused() -> None:
-    whole = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_OUTCOMES))
+    whole = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_TX_STATUSES))
     for name in ("received/given", "received/data", "received/offset"):
         arrays = {key: array for key, array in whole.arrays.items() if key != name}
         with pytest.raises(BadFrame):
-            decode_packets(frames.Frame("packets", 0, arrays, whole.values), GIVES)
+            decode_packets(frames.Frame("packets", 0, arrays, whole.values), MEASURES)
 
 
 def test_what_was_sent_comes_back_and_says_what_was_missed() -> None:
@@ -246,7 +248,7 @@ def test_what_was_sent_comes_back_and_says_what_was_missed() -> None:
         assert (frame.kind, frame.tick, frame.values) == ("sent", 7, values)
         got = decode_sent(frame, ROWS)
         assert (got.sender.tolist(), got.to.tolist()) == (SENT.sender.tolist(), SENT.to.tolist())
-        assert got.outcome_ids.tolist() == [-1, 0, 7]
+        assert got.tx_status_ids.tolist() == [-1, 0, 7]
         assert [got.payloads.row(i) for i in range(3)] == [b"abc", b"", b"d"]
 
 
@@ -256,10 +258,10 @@ def test_packets_of_robots_that_are_not_the_runners_own_are_refused_and_so_are_n
             decode_sent(frames.decode(data), rows)
 
 
-def test_nothing_received_is_a_frame_of_outcomes_alone() -> None:
-    outcomes = Outcomes(np.array([2]), np.array([0]), np.array([1]))
+def test_nothing_received_is_a_frame_of_tx_status_alone() -> None:
+    tx_status = TxStatuses(np.array([2]), np.array([0]), np.array([1]))
     _, _, received, told = decode_packets(
-        frames.decode(encode_packets(0, 0, 0, ReceivedPackets.none(GIVES), outcomes)), GIVES
+        frames.decode(encode_packets(0, 0, 0, ReceivedPackets.none(MEASURES), tx_status)), MEASURES
     )
     assert (len(received), len(told)) == (0, 1)
 

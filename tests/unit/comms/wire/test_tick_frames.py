@@ -13,13 +13,13 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
-    NO_OUTCOMES,
+    NO_TX_STATUSES,
     UNTOLD,
-    Outcomes,
     Payloads,
     ReceivedPackets,
-    SendResult,
     SentPackets,
+    TxResult,
+    TxStatuses,
 )
 from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire import frames
@@ -49,11 +49,11 @@ def senses_(draw: st.DrawFn) -> Senses:
 
 
 @st.composite
-def received_(draw: st.DrawFn, gives: tuple[str, ...]) -> ReceivedPackets:
+def received_(draw: st.DrawFn, measures: tuple[str, ...]) -> ReceivedPackets:
     payloads = draw(payload_lists)
     k = draw(st.integers(0, 5))
     which = draw(st.lists(st.integers(0, len(payloads) - 1), min_size=k, max_size=k))
-    given_columns = {name: draw(floats(k)) for name in gives}
+    given_columns = {name: draw(floats(k)) for name in measures}
     columns = [np.sort(draw(ints(k))), *(draw(ints(k)) for _ in range(3))]
     return ReceivedPackets(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
 
@@ -64,24 +64,24 @@ def same(one: Any, other: Any) -> bool:
 
 @given(senses_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
 def test_senses_and_received_packets_come_over_whole(
-    senses: Senses, gives: tuple[str, ...], data: st.DataObject
+    senses: Senses, measures: tuple[str, ...], data: st.DataObject
 ) -> None:
     assume(senses)
-    received = data.draw(received_(gives))
-    frame = frames.decode(encode_tick(5, senses, received, NO_OUTCOMES))
-    got_senses, got, outcomes = decode_tick(frame, gives, senses.keys())
-    assert "outcomes" not in frame.arrays
-    assert len(outcomes) == 0
+    received = data.draw(received_(measures))
+    frame = frames.decode(encode_tick(5, senses, received, NO_TX_STATUSES))
+    got_senses, got, tx_status = decode_tick(frame, measures, senses.keys())
+    assert "tx_status" not in frame.arrays
+    assert len(tx_status) == 0
     assert list(got_senses) == list(senses)
     for name, group in senses.items():
         assert same(got_senses[name].rows, group.rows)
         assert list(got_senses[name].fields) == list(group.fields)
         assert all(same(got_senses[name].fields[field], column) for field, column in group.fields.items())
     assert len(got) == len(received)
-    assert set(got.given) == set(gives)
+    assert set(got.given) == set(measures)
     for column in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
         assert same(getattr(got, column), getattr(received, column))
-    assert all(same(got.given[name], received.given[name]) for name in gives)
+    assert all(same(got.given[name], received.given[name]) for name in measures)
     of, got_of = received.payloads, got.payloads
     assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in received.payload]
 
@@ -113,7 +113,7 @@ TWO_RECEIVED = ReceivedPackets(
     ids=repr,
 )
 def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_RECEIVED, NO_OUTCOMES))
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_RECEIVED, NO_TX_STATUSES))
     decode_tick(frame, ("range_m",), {"flock"})
     with pytest.raises(BadFrame) as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, name: wrong}), ("range_m",), {"flock"})
@@ -147,38 +147,38 @@ def test_senses_and_packets_of_other_robots_are_refused(
     assert caught.value.fault == "malformed"
 
 
-def telling(outcomes: Outcomes) -> frames.Frame:
-    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, ReceivedPackets.none(), outcomes))
+def telling(tx_status: TxStatuses) -> frames.Frame:
+    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, ReceivedPackets.none(), tx_status))
 
 
-@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(SendResult)), min_size=1))
-def test_outcomes_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
-    outcomes = Outcomes(*np.array(listed, np.int64).T)
-    _, _, got = decode_tick(telling(outcomes), (), {"flock"})
-    assert all(same(getattr(got, name), getattr(outcomes, name)) for name in ("row", "id", "result"))
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(TxResult)), min_size=1))
+def test_tx_status_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
+    tx_status = TxStatuses(*np.array(listed, np.int64).T)
+    _, _, got = decode_tick(telling(tx_status), (), {"flock"})
+    assert all(same(getattr(got, name), getattr(tx_status, name)) for name in ("row", "id", "result"))
 
 
 def test_senses_of_other_groups_or_none_are_refused() -> None:
     for senses, known in (({"flock": GroupSenses(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
-        frame = frames.decode(encode_tick(5, senses, ReceivedPackets.none(), NO_OUTCOMES))
+        frame = frames.decode(encode_tick(5, senses, ReceivedPackets.none(), NO_TX_STATUSES))
         with pytest.raises(BadFrame, match="expected groups of this runner"):
             decode_tick(frame, (), known)
 
 
-@pytest.mark.parametrize("gives", [(), ("range_m", "bearing_rad")])
-def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(gives: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("measures", [(), ("range_m", "bearing_rad")])
+def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measures: tuple[str, ...]) -> None:
     received = ReceivedPackets(
         *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"])
     )
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, received, NO_OUTCOMES))
+    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, received, NO_TX_STATUSES))
     with pytest.raises(BadFrame):
-        decode_tick(frame, gives, {"flock"})
+        decode_tick(frame, measures, {"flock"})
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        np.array([[4], [0], [len(SendResult)]]),
+        np.array([[4], [0], [len(TxResult)]]),
         np.array([[4], [0], [-1]]),
         np.array([[4], [0]]),
         np.array([4, 0, 0]),
@@ -186,10 +186,10 @@ def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(gives: 
     ],
     ids=repr,
 )
-def test_outcomes_that_are_none_are_refused(wrong: Any) -> None:
-    frame = telling(NO_OUTCOMES)
+def test_tx_status_that_are_none_are_refused(wrong: Any) -> None:
+    frame = telling(NO_TX_STATUSES)
     with pytest.raises(BadFrame, match="from 0 to 4$|outcomes: expected <i8") as caught:
-        decode_tick(replace(frame, arrays={**frame.arrays, "outcomes": wrong}), (), {"flock"})
+        decode_tick(replace(frame, arrays={**frame.arrays, "tx_status": wrong}), (), {"flock"})
     assert caught.value.fault == "malformed"
 
 
@@ -209,8 +209,8 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
         assert same(getattr(got, column), getattr(actions, column))
     assert same(got.sent.sender, sender)
     assert same(got.sent.to, to)
-    assert (got.sent.outcome_id is None) == (sent.outcome_id is None)
-    assert same(got.sent.outcome_ids, sent.outcome_ids)
+    assert (got.sent.tx_status_id is None) == (sent.tx_status_id is None)
+    assert same(got.sent.tx_status_ids, sent.tx_status_ids)
     assert [got.sent.payloads.row(i) for i in range(k)] == payloads
 
 
@@ -261,8 +261,8 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
         ("sent/offset", [0, 2, 2, I64.max]),
         *(("sent", [sender, [0, 0, 0]]) for sender in ([4, 9, 5], [4, 9, -1], [I64.max, 9, 9], [0, 1, 2])),
         *(("sent", [[4, 9, 9], [0, to, 0]]) for to in (-2, I64.min)),
-        *(("sent/outcome_id", ids) for ids in ([0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]])),
-        ("sent/outcome_id", [-1.0, 1.0, 2.0]),
+        *(("sent/tx_status_id", ids) for ids in ([0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]])),
+        ("sent/tx_status_id", [-1.0, 1.0, 2.0]),
         ("leds", [[5], [0], [1]]),  # another's robot
         ("leds", [[4], [-1], [1]]),
         ("leds", [[4], [0], [-1]]),

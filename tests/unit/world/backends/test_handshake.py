@@ -10,7 +10,7 @@ from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.world.backends.join_policy import Refused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from tests.support.agent.hosts import GIVES, assignment, group
+from tests.support.agent.hosts import MEASURES, assignment, group
 from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
 
 Made = Lockstep | RealTime
@@ -35,10 +35,10 @@ def test_an_assignment_comes_over_whole() -> None:
     )
     got = Assignment.from_mapping(msgpack.unpackb(msgpack.packb(sent.as_mapping())))
     assert got.as_mapping() == sent.as_mapping()
-    assert got.gives == GIVES
+    assert got.measures == MEASURES
     assert got.groups[1].body == sent.groups[1].body
     assert got.groups[0].keys.dtype == np.uint64
-    assert Assignment.from_mapping(Assignment((), 10, None).as_mapping()).gives is None
+    assert Assignment.from_mapping(Assignment((), 10, None).as_mapping()).measures is None
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
-from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, spec
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 
 
@@ -58,8 +58,8 @@ def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
     free.start()
     held.start()
     for tick in range(2):
-        expected = free.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(GIVES))
-        got = held.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(GIVES))
+        expected = free.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
+        got = held.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
         assert got.linear_mps.tolist() == expected.linear_mps.tolist()
     assert clock.slept_until == [ORIGIN_NS + 100 * MS, ORIGIN_NS + 200 * MS]
     assert (held.report().factor, held.report().missed_ticks, held.report().late_answers) == (1.0, 0, {})

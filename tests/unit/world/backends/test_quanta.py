@@ -1,4 +1,7 @@
-"""A tick in quanta: packets go on the air when they came, and are handed over when they are due; delays are counted."""
+"""A tick in subticks: packets go on the air when they came, and are handed over when they are due.
+
+Delays are counted.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,11 +11,11 @@ import pytest
 
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.interfaces import Put
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
-from swarmwire.world.subtick import Quanta
-from tests.support.agent.hosts import GIVES, assignment, group, one_group, spec
+from swarmwire.world.subtick import Subticks
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 
@@ -21,7 +24,7 @@ PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"\0\0"]
 
 def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
     """One packet of robot 0 to robot 1."""
-    given = {name: np.zeros(1) for name in GIVES}
+    given = {name: np.zeros(1) for name in MEASURES}
     one = np.zeros(1, np.int64)
     return ReceivedPackets(one + 1, one, one, one + at_ns, given, one, Payloads.of([payload]))
 
@@ -39,11 +42,11 @@ class Air:
         assert put.at_ns >= (self.times_ns or [0])[-1]
         self.puts.append(put)
 
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, Outcomes]:
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         self.times_ns.append(until_ns)
         if self.due_ns and self.due_ns[0] <= until_ns:
-            return received(self.due_ns.pop(0), self.payload), NO_OUTCOMES
-        return ReceivedPackets.none(GIVES), NO_OUTCOMES
+            return received(self.due_ns.pop(0), self.payload), NO_TX_STATUSES
+        return ReceivedPackets.none(MEASURES), NO_TX_STATUSES
 
 
 @dataclass
@@ -60,22 +63,22 @@ class Exchange:
         self.sends_ns = [at_ns for at_ns in self.sends_ns if at_ns > self.clock.time_ns]
         return [Put(at_ns, None, PACKET) for at_ns in came]
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         self.clock.time_ns += self.work_ns
         self.handed.append((tick, at_ns, int(received.received_at_ns[0])))
 
 
-def quanta_of(clock: FakeClock, factor: float = 1.0, quantum_s: float = 0.010) -> tuple[Pace, Quanta]:
+def subticks_of(clock: FakeClock, factor: float = 1.0, subtick_s: float = 0.010) -> tuple[Pace, Subticks]:
     pace = Pace(clock, 10, factor, lambda _: None)
-    return pace, Quanta(clock, pace, 10, quantum_s)
+    return pace, Subticks(clock, pace, 10, subtick_s)
 
 
-def test_the_loop_wakes_every_quantum_and_packets_go_on_the_air_when_they_came() -> None:
+def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came() -> None:
     clock, air = FakeClock(), Air(due_ns=[25 * MS])
-    pace, quanta = quanta_of(clock)
+    pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 12 * MS, ORIGIN_NS + 19 * MS])
     pace.begin()
-    quanta.pass_tick(0, air, exchange)
+    subticks.pass_tick(0, air, exchange)
     assert air.times_ns == [*range(0, 100 * MS, 10 * MS), 100 * MS]
     assert [put.at_ns for put in air.puts] == [12 * MS, 19 * MS]
     assert exchange.handed == [(0, 30 * MS, 25 * MS)]
@@ -85,13 +88,13 @@ def test_the_loop_wakes_every_quantum_and_packets_go_on_the_air_when_they_came()
     assert clock.time_ns == ORIGIN_NS + 100 * MS
 
 
-def test_at_another_pace_quanta_are_of_the_wall_clock_and_times_of_the_simulation() -> None:
+def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulation() -> None:
     clock, air = FakeClock(), Air(due_ns=[130 * MS])
-    pace, quanta = quanta_of(clock, factor=2.0)
+    pace, subticks = subticks_of(clock, factor=2.0)
     exchange = Exchange(clock)
     for tick in range(2):
         pace.begin()
-        quanta.pass_tick(tick, air, exchange)
+        subticks.pass_tick(tick, air, exchange)
     assert air.times_ns[:3] == [0, 20 * MS, 40 * MS]
     assert exchange.handed == [(1, 140 * MS, 130 * MS)]
     delays = pace.delivery.delays()
@@ -99,13 +102,13 @@ def test_at_another_pace_quanta_are_of_the_wall_clock_and_times_of_the_simulatio
     assert delays.worst_s == 0.005
 
 
-def test_a_loop_that_lags_makes_up_for_no_quantum_and_its_air_never_leaves_the_tick() -> None:
+def test_a_loop_that_lags_makes_up_for_no_subtick_and_its_air_never_leaves_the_tick() -> None:
     clock, air = FakeClock(), Air(due_ns=[1 * MS])
-    pace, quanta = quanta_of(clock)
+    pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 250 * MS], work_ns=240 * MS)
     for tick in range(2):
         pace.begin()
-        quanta.pass_tick(tick, air, exchange)
+        subticks.pass_tick(tick, air, exchange)
     assert air.times_ns == [0, 10 * MS, 100 * MS, 200 * MS]
     assert [put.at_ns for put in air.puts] == [100 * MS]  # it came after the tick that is under way for the air
     assert pace.missed_ticks == 2
@@ -113,15 +116,15 @@ def test_a_loop_that_lags_makes_up_for_no_quantum_and_its_air_never_leaves_the_t
 
 def test_what_came_while_the_run_was_paused_is_of_the_tick_that_follows() -> None:
     clock, air = FakeClock(), Air()
-    pace, quanta = quanta_of(clock)
+    pace, subticks = subticks_of(clock)
     exchange = Exchange(clock)
     pace.begin()
-    quanta.pass_tick(0, air, exchange)
+    subticks.pass_tick(0, air, exchange)
     exchange.sends_ns = [clock.time_ns + 500 * MS]
     clock.time_ns += 3000 * MS
     pace.begin_anew(1, 1.0, 3000 * MS)
     pace.begin()
-    quanta.pass_tick(1, air, exchange)
+    subticks.pass_tick(1, air, exchange)
     assert [put.at_ns for put in air.puts] == [100 * MS]
     assert air.times_ns[-1] == 200 * MS
     assert pace.missed_ticks == 0
@@ -129,7 +132,7 @@ def test_what_came_while_the_run_was_paused_is_of_the_tick_that_follows() -> Non
 
 def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> None:
     clock = FakeClock()
-    pace, _ = quanta_of(clock)
+    pace, _ = subticks_of(clock)
     for work_ms in (0, 3, 7):
         clock.time_ns += work_ms * MS
         pace.begin()
@@ -145,17 +148,17 @@ def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> N
 
 def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out_at_once() -> None:
     clock = FakeClock()
-    pace, quanta = quanta_of(clock)
-    backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, quanta)
+    pace, subticks = subticks_of(clock)
+    backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, subticks)
     backend.start()
     air = Air(due_ns=[25 * MS], payload=Word(number=1.0).encode())
-    backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(GIVES), NO_OUTCOMES, air)
+    backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
     of_step, echo = air.puts
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
     assert (echo.at_ns, echo.tick, echo.sent.sender.tolist()) == (30 * MS, None, [1])
     told = backend.report()
-    assert told.quantum_s == 0.010
+    assert told.subtick_s == 0.010
     assert told.delivery is not None
     assert told.delivery.count == 1
-    assert backend.act(1, one_group(1, [0, 1]), ReceivedPackets.none(GIVES)).sent.sender.tolist() == [0, 1]
+    assert backend.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES)).sent.sender.tolist() == [0, 1]
     backend.close()

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, LedChanges, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
@@ -15,7 +15,7 @@ from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, enc
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss, RunnerHealth
-from tests.support.agent.hosts import GIVES, assignment, group, one_group, received_from
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, received_from
 from tests.support.clocks import FakeClock
 
 ROWS = [0, 1, 2, 3]
@@ -37,7 +37,7 @@ def playing(on_loss: OnLoss = "stop", timeout_s: float = 30.0) -> RealTime:
 
 def opened(runners: RealTime, tick: int, received: ReceivedPackets | None = None, rows: list[int] = ROWS) -> list[str]:
     out = runners.open_tick(
-        tick, tick * TICK_NS, one_group(tick, rows), ReceivedPackets.none(GIVES) if received is None else received
+        tick, tick * TICK_NS, one_group(tick, rows), ReceivedPackets.none(MEASURES) if received is None else received
     )
     return [name for name, _ in out]
 
@@ -181,15 +181,15 @@ def test_frames_that_were_passed_over_are_dropped_with_what_was_received_in_them
     assert (runners.frames_dropped, runners.packets_dropped) == (2, 3)
 
 
-def test_outcomes_in_frames_that_were_passed_over_are_counted() -> None:
+def test_tx_status_in_frames_that_were_passed_over_are_counted() -> None:
     runners = playing()
-    told = Outcomes(np.array([0, 0, 2]), np.array([0, 1, 0]), np.array([0, 1, 0]))
+    told = TxStatuses(np.array([0, 0, 2]), np.array([0, 1, 0]), np.array([0, 1, 0]))
     for tick in range(2):
-        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), ReceivedPackets.none(GIVES), told)
-    assert runners.outcomes_dropped == 0
+        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), ReceivedPackets.none(MEASURES), told)
+    assert runners.tx_status_dropped == 0
     owned = sum(row in OWN["a"] for row in told.row.tolist())
     runners.answer("a", said("a", 1, 1.0))
-    assert (runners.frames_dropped, runners.outcomes_dropped) == (1, owned)
+    assert (runners.frames_dropped, runners.tx_status_dropped) == (1, owned)
 
 
 def test_a_robot_without_answers_keeps_its_command_until_the_watchdog_stops_it_once() -> None:
@@ -296,25 +296,25 @@ def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it
     clock, pause_ns = FakeClock(), 3600 * NS_PER_S
     pace = Pace(clock, 10, 1.0, lambda _: None)
     runners = playing("dead", timeout_s=1.0)
-    runners.open_tick(0, pace.begin(), one_group(0, ROWS), ReceivedPackets.none(GIVES))
+    runners.open_tick(0, pace.begin(), one_group(0, ROWS), ReceivedPackets.none(MEASURES))
     pace.hold(0)
     assert taken(runners) == ({}, [])
     clock.time_ns += pause_ns
     pace.begin_anew(1, 1.0, pause_ns)
-    runners.open_tick(1, pace.begin(), one_group(1, ROWS), ReceivedPackets.none(GIVES))
+    runners.open_tick(1, pace.begin(), one_group(1, ROWS), ReceivedPackets.none(MEASURES))
     assert not runners.losses
     for name in OWN:
         runners.answer(name, said(name, 0, 1.0))
     assert taken(runners) == (dict.fromkeys(ROWS, 1.0), [0] * 4)
     assert not runners.watchdog_stops.any()
     clock.time_ns += 2 * NS_PER_S  # not a pause: a loop that lags
-    runners.open_tick(2, pace.begin(), one_group(2, ROWS), ReceivedPackets.none(GIVES))
+    runners.open_tick(2, pace.begin(), one_group(2, ROWS), ReceivedPackets.none(MEASURES))
     assert [loss.reason for loss in runners.losses] == ["no answer for 1 s"] * 2
 
 
-def in_quanta() -> RealTime:
+def in_subticks() -> RealTime:
     parts = [assignment(group("unused:A", own)) for own in OWN.values()]
-    runners = RealTime(parts, 0.5, 30.0, "dead", quantum=True)
+    runners = RealTime(parts, 0.5, 30.0, "dead", subtick=True)
     for name in OWN:
         join(runners, name)
     return runners
@@ -324,29 +324,31 @@ def word(*senders: int) -> SentPackets:
     return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of([bytes(3)] * len(senders)))
 
 
-def test_in_quanta_each_ready_runner_gets_what_its_robots_received_and_numbers_tell_what_it_missed() -> None:
-    runners = in_quanta()
+def test_in_subticks_each_ready_runner_gets_what_its_robots_received_and_numbers_tell_what_it_missed() -> None:
+    runners = in_subticks()
     opened(runners, 0)
-    told = Outcomes(np.array([3]), np.array([0]), np.array([1]))
+    told = TxStatuses(np.array([3]), np.array([0]), np.array([1]))
     for number in range(2):
         out = dict(runners.hand_over(0, 5_000_000, received_from(word(1), [0, 2]), told))
         assert list(out) == ["a", "b"]
-        at_ns, got, received, outcomes = decode_packets(frames.decode(out["a"]), GIVES)
-        assert (at_ns, got, received.receiver.tolist(), len(outcomes)) == (5_000_000, number, [0, 2], 0)
-        _, _, nothing, outcomes = decode_packets(frames.decode(out["b"]), GIVES)
-        assert (len(nothing), outcomes.row.tolist()) == (0, [3])
-    assert runners.hand_over(0, 6_000_000, ReceivedPackets.none(GIVES), Outcomes(*np.empty((3, 0), np.int64))) == []
+        at_ns, got, received, tx_status = decode_packets(frames.decode(out["a"]), MEASURES)
+        assert (at_ns, got, received.receiver.tolist(), len(tx_status)) == (5_000_000, number, [0, 2], 0)
+        _, _, nothing, tx_status = decode_packets(frames.decode(out["b"]), MEASURES)
+        assert (len(nothing), tx_status.row.tolist()) == (0, [3])
+    assert (
+        runners.hand_over(0, 6_000_000, ReceivedPackets.none(MEASURES), TxStatuses(*np.empty((3, 0), np.int64))) == []
+    )
 
 
-def test_in_quanta_packets_of_robots_without_a_runner_are_counted_as_dropped() -> None:
-    runners = RealTime([assignment(group("unused:A", own)) for own in OWN.values()], 0.5, 30.0, "wait", quantum=True)
+def test_in_subticks_packets_of_robots_without_a_runner_are_counted_as_dropped() -> None:
+    runners = RealTime([assignment(group("unused:A", own)) for own in OWN.values()], 0.5, 30.0, "wait", subtick=True)
     join(runners, "a")
-    assert [name for name, _ in runners.hand_over(0, 0, received_from(word(0), [1, 2, 3]), NO_OUTCOMES)] == ["a"]
+    assert [name for name, _ in runners.hand_over(0, 0, received_from(word(0), [1, 2, 3]), NO_TX_STATUSES)] == ["a"]
     assert runners.packets_dropped == 2
 
 
-def test_in_quanta_what_comes_is_given_with_its_time_and_whether_it_is_of_a_step() -> None:
-    runners = in_quanta()
+def test_in_subticks_what_comes_is_given_with_its_time_and_whether_it_is_of_a_step() -> None:
+    runners = in_subticks()
     opened(runners, 0)
     runners.now_ns = 5
     runners.answer("b", said("b", 0, 1.0))
@@ -360,10 +362,10 @@ def test_in_quanta_what_comes_is_given_with_its_time_and_whether_it_is_of_a_step
     assert runners.counts() == {"packets_frames_missed_by_runners": 3}
 
 
-def test_a_sent_frame_is_taken_of_ones_own_robots_alone_and_without_quanta_not_at_all() -> None:
+def test_a_sent_frame_is_taken_of_ones_own_robots_alone_and_without_subticks_not_at_all() -> None:
     for runners, data, fault in (
-        (in_quanta(), encode_sent(0, word(1)), "malformed"),
-        (in_quanta(), frames.encode("sent", 0, {}), "malformed"),
+        (in_subticks(), encode_sent(0, word(1)), "malformed"),
+        (in_subticks(), frames.encode("sent", 0, {}), "malformed"),
         (playing(), encode_sent(0, word(2)), "unexpected_kind"),
     ):
         opened(runners, 0)
@@ -374,10 +376,10 @@ def test_a_sent_frame_is_taken_of_ones_own_robots_alone_and_without_quanta_not_a
 
 
 def test_numbers_of_frames_begin_anew_with_a_new_runner() -> None:
-    runners = RealTime([assignment(group("unused:A", ROWS))], 0.5, 30.0, "wait", quantum=True)
+    runners = RealTime([assignment(group("unused:A", ROWS))], 0.5, 30.0, "wait", subtick=True)
     for _ in range(2):
         join(runners, "a")
         opened(runners, 0)
-        (_, data), *_ = runners.hand_over(0, 0, received_from(word(1), [0]), NO_OUTCOMES)
-        assert decode_packets(frames.decode(data), GIVES)[1] == 0
+        (_, data), *_ = runners.hand_over(0, 0, received_from(word(1), [0]), NO_TX_STATUSES)
+        assert decode_packets(frames.decode(data), MEASURES)[1] == 0
         runners.gone("a", "its link is gone")

@@ -7,13 +7,13 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, Outcomes, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
-from swarmwire.world.subtick import Quanta
-from tests.support.agent.hosts import GIVES, received_from
+from swarmwire.world.subtick import Subticks
+from tests.support.agent.hosts import MEASURES, received_from
 from tests.support.clocks import FakeClock
 from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions
 
@@ -29,14 +29,14 @@ class Inner:
     def start(self) -> None:
         self.given.append("started")
 
-    def act(self, tick, senses, received, outcomes=NO_OUTCOMES) -> Actions:
-        self.given.append((tick, senses, received, outcomes))
+    def act(self, tick, senses, received, tx_status=NO_TX_STATUSES) -> Actions:
+        self.given.append((tick, senses, received, tx_status))
         rows = np.array([0, 1])
         sent = SentPackets(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
         return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
 
-    def receive(self, received, outcomes) -> None:
-        self.given.append(("received", received, outcomes))
+    def receive(self, received, tx_status) -> None:
+        self.given.append(("received", received, tx_status))
 
     def on_receive(self, tick, at_ns) -> SentPackets:
         return SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
@@ -54,8 +54,8 @@ class Air:
     def __init__(self) -> None:
         self.published: list[Any] = []
 
-    def publish(self, tick, received, outcomes) -> None:
-        self.published.append((tick, received, outcomes))
+    def publish(self, tick, received, tx_status) -> None:
+        self.published.append((tick, received, tx_status))
 
     def take(self) -> SentPackets:
         return SentPackets(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
@@ -67,7 +67,7 @@ class Air:
 class Around:
     """A backend of two robots of its own and three behind a gateway, rows 2 to 4."""
 
-    def __init__(self, *, air: bool = True, quantum_s: float | None = None) -> None:
+    def __init__(self, *, air: bool = True, subtick_s: float | None = None) -> None:
         self.clock, self.inner, self.said = FakeClock(), Inner(), []
         self.air = Air() if air else None
         body = load_body("epuck2")
@@ -75,19 +75,27 @@ class Around:
         group = GatewayGroup(Group("b", body, 2, 5), "scripted", self.gateway)
         pace = Pace(self.clock, 10, 1.0, self.said.append)
         self.shown = 0
-        quanta = Quanta(self.clock, pace, 10, quantum_s) if quantum_s else None
-        self.backend = GatewayBackend(self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, quanta)
+        subticks = Subticks(self.clock, pace, 10, subtick_s) if subtick_s else None
+        self.backend = GatewayBackend(
+            self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, subticks
+        )
 
     def show(self) -> None:
         self.shown += 1
 
     def act(
-        self, tick: int, alive: list[int], received: ReceivedPackets | None = None, outcomes: Outcomes = NO_OUTCOMES
+        self,
+        tick: int,
+        alive: list[int],
+        received: ReceivedPackets | None = None,
+        tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> Actions:
         rows = np.array(alive, np.int64)
         fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
         senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
-        return self.backend.act(tick, senses, ReceivedPackets.none(GIVES) if received is None else received, outcomes)
+        return self.backend.act(
+            tick, senses, ReceivedPackets.none(MEASURES) if received is None else received, tx_status
+        )
 
 
 def commands(actions: Actions) -> dict[int, tuple[float, float]]:
@@ -141,8 +149,8 @@ def test_readings_that_were_handed_over_are_never_written_to_again() -> None:
 def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_packets() -> None:
     around = Around()
     sent = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
-    outcomes = Outcomes(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
-    actions = around.act(0, [2, 3, 4], received_from(sent, [1, 2, 4]), outcomes)
+    tx_status = TxStatuses(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
+    actions = around.act(0, [2, 3, 4], received_from(sent, [1, 2, 4]), tx_status)
     _, senses, received, _ = around.inner.given[-1]
     assert list(senses) == ["a"]
     assert len(received) == 3  # a host takes what is for its robots
@@ -163,7 +171,7 @@ def test_without_a_radio_nothing_but_commands_is_taken() -> None:
 def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:
     around = Around()
     around.gateway.drive = {0: (0.1, 0.0)}
-    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, ReceivedPackets.none(GIVES))
+    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, ReceivedPackets.none(MEASURES))
     assert not around.gateway.published
     assert commands(actions)[2] == (0.1, 0.0)
 
@@ -219,19 +227,19 @@ class QuietAir:
         if len(put.sent):
             self.sent.append((put.tick, put.sent.payloads.row(0)))
 
-    def advance(self, until_ns) -> tuple[ReceivedPackets, Outcomes]:
+    def advance(self, until_ns) -> tuple[ReceivedPackets, TxStatuses]:
         due, self.told = not self.told and until_ns >= TICK_NS // 2, self.told or until_ns >= TICK_NS // 2
         sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
-        return received_from(sent, [0, 3] if due else []), NO_OUTCOMES
+        return received_from(sent, [0, 3] if due else []), NO_TX_STATUSES
 
 
-def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
-    around, air = Around(quantum_s=0.010), QuietAir()
+def test_in_subticks_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
+    around, air = Around(subtick_s=0.010), QuietAir()
     rows = np.array([2, 3, 4])
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
     senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
     around.gateway.drive = {1: (0.05, -0.7)}
-    actions = around.backend.act_in_time(0, senses, ReceivedPackets.none(GIVES), NO_OUTCOMES, air)
+    actions = around.backend.act_in_time(0, senses, ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
     assert around.air is not None
     received = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
     assert received == [[3]]
@@ -241,4 +249,4 @@ def test_in_quanta_robots_behind_gateways_are_told_when_it_is_due_and_what_they_
     assert set(air.sent[2:]) == {(None, b"outer"), (None, b"echo")}
     assert not len(actions.sent)
     assert commands(actions)[3] == (0.05, -0.7)
-    assert around.backend.report().quantum_s == 0.010
+    assert around.backend.report().subtick_s == 0.010

@@ -85,7 +85,7 @@ OF_RADIOS: list[tuple[Any, str]] = [
     (ramp("radio.lose"), "events.0.what"),
     (ramp("radio.loss.x"), "events.0.what"),
     (ramp("radio.frame"), "events.0.what"),
-    (ramp("radio.gives"), "events.0.what"),
+    (ramp("radio.measures"), "events.0.what"),
     (ramp("radio.line_of_sight"), "events.0.what"),
     (ramp("radio.bursts.bad_s"), "events.0.what"),
     (ramp("radio.send_offset"), "events.0.what"),

@@ -83,7 +83,7 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({"preset": "nothing"}, "radio.preset"),
     ({"range_m": 2.0, "access": {}}, "radio.access"),
     ({"range_m": 2.0, "reception": {}}, "radio.reception"),
-    ({"range_m": 2.0, "gives": {"rssi": {}}}, "radio.gives.rssi"),
+    ({"range_m": 2.0, "measures": {"rssi": {}}}, "radio.measures.rssi"),
     ({"preset": "disk", "fading": {}}, "radio.fading"),
     ({**SIGNAL, "two_ray": {}}, "radio.two_ray"),
     ({**SIGNAL, "bit_rate_bps": 0}, "radio.bit_rate_bps"),

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.radio.config.impairments import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.file import load_scenario, scenario_from, scenario_schema
 from swarmwire.world.scenario.scenario import Scenario
@@ -80,7 +80,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("robots.flock.place", {"how": "poses", "poses": [[0, 0, 0]]}, "robots.flock"),
     ("radio.loss", 2, "radio.loss"),
     ("radio.model", "x", "radio.model"),
-    ("radio.gives.range.noise_m", -1, "radio.gives.range.noise_m"),
+    ("radio.measures.range.noise_m", -1, "radio.measures.range.noise_m"),
     ("radio.send_offset", "x", "radio.send_offset"),
     ("radio.send_offset", 0.1, "radio.send_offset"),
     ("run.on_runner_loss", "hope", "run.on_runner_loss"),
@@ -114,7 +114,7 @@ def test_the_keys_of_further_faults_are_named_up_to_six() -> None:
 
 def test_the_radio_comes_out_as_the_contract_s_dataclass() -> None:
     radio = scenario_from(SAMPLE, "f").radio
-    assert radio == Radio(range_m=2.0, loss=0.3, gives=Gives(RangeGiven(0.02), BearingGiven(0.0)))
+    assert radio == Radio(range_m=2.0, loss=0.3, measures=Measures(RangeMeasure(0.02), BearingMeasure(0.0)))
     assert scenario_from(without("radio"), "f").radio is None
 
 

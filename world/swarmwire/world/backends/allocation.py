@@ -31,7 +31,7 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
         for group in static.groups
         for rows in [_rows(static, group.start, group.stop)]
     )
-    return Assignment(groups, static.rate_hz, scenario.radio.gives.columns if scenario.radio else None)
+    return Assignment(groups, static.rate_hz, scenario.radio.measures.columns if scenario.radio else None)
 
 
 def split(assignment: Assignment, runners: int) -> list[Assignment]:
@@ -56,7 +56,7 @@ def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
                     keys=group.keys[at],
                 )
             )
-    return Assignment(tuple(groups), assignment.rate_hz, assignment.gives)
+    return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
 
 
 def merged(parts: list[Assignment]) -> Assignment:

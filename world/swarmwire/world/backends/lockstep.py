@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
@@ -72,14 +72,14 @@ def split_received(received: ReceivedPackets, owner: IntArray, slots: int) -> li
     ]
 
 
-def split_outcomes(outcomes: Outcomes, owner: IntArray, slots: int) -> list[Outcomes]:
+def split_tx_status(tx_status: TxStatuses, owner: IntArray, slots: int) -> list[TxStatuses]:
     """What the robots of each of `slots` parts learn of their packets; `owner` is (rows,)."""
-    if not len(outcomes):
-        return [NO_OUTCOMES] * slots
-    slot_of = owner[outcomes.row]
+    if not len(tx_status):
+        return [NO_TX_STATUSES] * slots
+    slot_of = owner[tx_status.row]
     by_slot = np.argsort(slot_of, kind="stable")
     first = np.searchsorted(slot_of[by_slot], np.arange(slots + 1)).tolist()
-    return [outcomes.select(by_slot[a:b]) for a, b in itertools.pairwise(first)]
+    return [tx_status.select(by_slot[a:b]) for a, b in itertools.pairwise(first)]
 
 
 # --- The lockstep hand-shake with runners, without any I/O: bytes and tokens in, bytes and actions out.
@@ -104,7 +104,7 @@ class _Open(NamedTuple):
     tick: int
     senses: Senses
     received: ReceivedPackets
-    outcomes: Outcomes
+    tx_status: TxStatuses
 
 
 class Lockstep(Roster[_Slot]):
@@ -115,13 +115,13 @@ class Lockstep(Roster[_Slot]):
         self._open: _Open | None = None
 
     def open_tick(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> list[tuple[str, bytes]]:
         """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
-        self._tick, self._open = tick, _Open(tick, senses, received, outcomes)
+        self._tick, self._open = tick, _Open(tick, senses, received, tx_status)
         parts = split_senses(senses, self._slots.owner, self._slots.assignments)
         packets = split_received(received, self._slots.owner, len(self._slots))
-        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
+        told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             slot.rows, slot.actions, slot.idle = acting(part), None, not slot.may("is asked")
@@ -154,7 +154,7 @@ class Lockstep(Roster[_Slot]):
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         if self._open is None or self._on_loss in GOES_ON:
             return ()
-        tick, senses, received, outcomes = self._open
+        tick, senses, received, tx_status = self._open
         own = np.full(len(self._slots.owner), NOBODY)
         own[slot.all_rows] = 0
         (part,) = split_senses(senses, own, [slot.assignment])
@@ -162,7 +162,7 @@ class Lockstep(Roster[_Slot]):
         if not part:
             return ()
         slot.move("is asked")
-        return (encode_tick(tick, part, split_received(received, own, 1)[0], split_outcomes(outcomes, own, 1)[0]),)
+        return (encode_tick(tick, part, split_received(received, own, 1)[0], split_tx_status(tx_status, own, 1)[0]),)
 
     def _free(self, slot: _Slot, runner: str, what: What, reason: str) -> None:
         super()._free(slot, runner, what, reason)
@@ -170,8 +170,8 @@ class Lockstep(Roster[_Slot]):
             slot.memory = slot.before
         slot.actions, slot.idle = None, True
 
-    def _to_nobody(self, received: ReceivedPackets, outcomes: Outcomes) -> None:
-        for name, some in (("packets_without_agent", received), ("outcomes_without_agent", outcomes)):
+    def _to_nobody(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+        for name, some in (("packets_without_agent", received), ("tx_status_without_agent", tx_status)):
             if len(some):
                 self._counts[name] += len(some)
 

@@ -10,10 +10,10 @@
 An answer that came after its own tick is late. "At once" is the tick that is open then: its packets are handed to the
 air with those of that tick, so they are sent at that tick's start plus their robot's phase and jitter.
 
-With a quantum packets cross also between these: `packets` frames go out, and "sent" frames come, whenever there are
+With a subtick packets cross also between these: `packets` frames go out, and "sent" frames come, whenever there are
 any. Then `puts` gives, many times in a tick, what came to be sent, and when; `take` has none left.
 
-    quantum   hand_over     a frame "packets" to each ready runner some of whose robots received something
+    subtick   hand_over     a frame "packets" to each ready runner some of whose robots received something
               "sent"        its packets go to the air at once
               "actions"     as above, but its packets wait for their robots' turn only
 
@@ -32,13 +32,13 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.interfaces import Put
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Senses, Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Slot, rows_of
 from swarmwire.world.backends.join_policy import USUAL, Terms
-from swarmwire.world.backends.lockstep import acting, split_outcomes, split_received, split_senses
+from swarmwire.world.backends.lockstep import acting, split_received, split_senses, split_tx_status
 from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, RunnerHealth, What
 
 ANSWERED = -1
@@ -50,7 +50,7 @@ class _Asked(NamedTuple):
     tick: int
     rows: IntArray  # (n,) in the order of the answer
     packets: int  # received, that it carried
-    outcomes: int  # of packets sent
+    tx_status: int  # of packets sent
     at_ns: int  # wall time, pauses left out
 
 
@@ -68,7 +68,7 @@ class RealTime(Roster[_Slot]):
         frames_dropped: frames to runners that were never answered though a later one was, or that were still out when
             their runner was lost: dropped by the network, or passed over by a runner that had a newer one.
         packets_dropped: packets in them, or for robots without a runner: received by a radio, never by an agent.
-        outcomes_dropped: outcomes in them, or for such robots: known to a radio, never to its agent.
+        tx_status_dropped: tx statuses in them, or for such robots: known to a radio, never to its agent.
         now_ns: wall time at which what is answered arrived; set by whoever hands it in.
     """
 
@@ -80,11 +80,11 @@ class RealTime(Roster[_Slot]):
         on_loss: OnLoss,
         terms: Terms = USUAL,
         *,
-        quantum: bool = False,
+        subtick: bool = False,
     ) -> None:
-        """`quantum`: packets cross also between ticks."""
+        """`subtick`: packets cross also between ticks."""
         super().__init__(parts, on_loss, terms)
-        self.quantum = quantum
+        self.subtick = subtick
         rows = len(self._slots.owner)
         self._rate_hz = parts[0].rate_hz
         self._watchdog_ns, self._timeout_ns = to_ns(watchdog_s), to_ns(timeout_s)
@@ -99,7 +99,7 @@ class RealTime(Roster[_Slot]):
         self._own: list[Actuations] = []
         self._values: list[Values] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
-        self.frames_dropped = self.packets_dropped = self.outcomes_dropped = 0
+        self.frames_dropped = self.packets_dropped = self.tx_status_dropped = 0
 
     def health(self) -> RunnerHealth:
         """How the runners are doing."""
@@ -111,14 +111,14 @@ class RealTime(Roster[_Slot]):
         )
 
     def open_tick(
-        self, tick: int, now_ns: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES
+        self, tick: int, now_ns: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> list[tuple[str, bytes]]:
         """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
         parts = split_senses(senses, self._slots.owner, self._slots.assignments)
         packets = split_received(received, self._slots.owner, len(self._slots))
-        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
+        told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
             if slot.asked and now_ns - slot.asked[0].at_ns > self._timeout_ns:
@@ -133,15 +133,15 @@ class RealTime(Roster[_Slot]):
                 out.append((slot.runner or "", encode_tick(tick, part, own, its)))
             elif slot.state != "dead":
                 self.packets_dropped += len(own)
-                self.outcomes_dropped += len(its)
+                self.tx_status_dropped += len(its)
         return out
 
     def hand_over(
-        self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes
+        self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses
     ) -> list[tuple[str, bytes]]:
         """Frames to runners that are ready, at `at_ns` of simulated time, with what robots were told since the last."""
         packets = split_received(received, self._slots.owner, len(self._slots))
-        told = split_outcomes(outcomes, self._slots.owner, len(self._slots))
+        told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
         for slot, own, its in zip(self._slots, packets, told, strict=True):
             if slot.state == "ready" and (len(own) or len(its)):
@@ -150,7 +150,7 @@ class RealTime(Roster[_Slot]):
                 self._numbers[runner] += 1
             elif slot.state != "dead":
                 self.packets_dropped += len(own)
-                self.outcomes_dropped += len(its)
+                self.tx_status_dropped += len(its)
         return out
 
     def puts(self) -> list[Put]:
@@ -194,7 +194,7 @@ class RealTime(Roster[_Slot]):
         self._values.append(actions.values)
 
     def _sent_between(self, slot: _Slot, frame: Frame) -> None:
-        if not self.quantum:
+        if not self.subtick:
             super()._sent_between(slot, frame)
         sent, missed = decode_sent(frame, slot.all_rows), frame.values.get("missed", 0)
         self._sent.append(Put(self.now_ns, None, sent))
@@ -227,7 +227,7 @@ class RealTime(Roster[_Slot]):
     def _drop(self, asked: _Asked) -> None:
         self.frames_dropped += 1
         self.packets_dropped += asked.packets
-        self.outcomes_dropped += asked.outcomes
+        self.tx_status_dropped += asked.tx_status
 
     def _stop(self, rows: IntArray) -> None:
         self._stopped[rows] = self._drive[rows] = True

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.world.backends.inbox import Item, RunnerInbox
 from swarmwire.world.backends.join_policy import USUAL, Door, Terms
@@ -18,7 +18,7 @@ from swarmwire.world.backends.pacing import Delays, Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
 from swarmwire.world.backends.zenoh_backend import Surroundings, ZenohBackend
-from swarmwire.world.subtick import Quanta
+from swarmwire.world.subtick import Subticks
 
 
 @dataclass(frozen=True)
@@ -32,19 +32,19 @@ class RealTimeReport:
     watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # by robot
     frames_dropped: int = 0  # to runners, never acted on: middleware loss
     packets_dropped: int = 0  # in these frames: received by the radio, never by the agent
-    outcomes_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
-    quantum_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
+    tx_status_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
+    subtick_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
     delivery: Delays | None = None  # packets: when they were handed over against when the modelled radio had them
     tick_jitter: Delays | None = None  # ticks: when they began against when the ones before were to end
 
 
-def report_of(pace: Pace, quanta: Quanta | None) -> RealTimeReport:
+def report_of(pace: Pace, subticks: Subticks | None) -> RealTimeReport:
     """How far a loop kept up."""
     return RealTimeReport(
         factor=pace.factor,
         missed_ticks=pace.missed_ticks,
         worst_lag_s=to_s(pace.worst_lag_ns),
-        quantum_s=quanta.quantum_s if quanta else None,
+        subtick_s=subticks.subtick_s if subticks else None,
         delivery=pace.delivery.delays(),
         tick_jitter=pace.jitter.delays(),
     )
@@ -53,30 +53,32 @@ def report_of(pace: Pace, quanta: Quanta | None) -> RealTimeReport:
 class PacedBackend:
     """A backend in this process, paced by the wall clock: an agent that takes too long makes the loop lag."""
 
-    def __init__(self, backend: ReceivingBackend, pace: Pace, quanta: Quanta | None = None) -> None:
-        self._backend, self._pace, self._quanta = backend, pace, quanta
+    def __init__(self, backend: ReceivingBackend, pace: Pace, subticks: Subticks | None = None) -> None:
+        self._backend, self._pace, self._subticks = backend, pace, subticks
         self._puts: list[Put] = []
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
-        actions = self._backend.act(tick, senses, received, outcomes)
+        actions = self._backend.act(tick, senses, received, tx_status)
         self._pace.hold(tick)
         return actions
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with packets handed over when they are due."""
-        assert self._quanta
+        assert self._subticks
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
-        self._backend.receive(received, outcomes)
-        actions = self._backend.act(tick, senses, ReceivedPackets.none(tuple(received.given)), NO_OUTCOMES)
+        self._backend.receive(received, tx_status)
+        actions = self._backend.act(tick, senses, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
-        self._quanta.pass_tick(tick, air, self)
+        self._subticks.pass_tick(tick, air, self)
         return replace(actions, sent=SentPackets.none())
 
     def take_in(self) -> list[Put]:
@@ -84,16 +86,16 @@ class PacedBackend:
         puts, self._puts = self._puts, []
         return puts
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Let agents that read between ticks read."""
-        self._backend.receive(received, outcomes)
+        self._backend.receive(received, tx_status)
         sent = self._backend.on_receive(tick, at_ns)
         if len(sent):
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
     def report(self) -> RealTimeReport:
         """How far the loop kept up."""
-        return report_of(self._pace, self._quanta)
+        return report_of(self._pace, self._subticks)
 
 
 class RealTimeBackend(ZenohBackend[RealTime]):
@@ -113,34 +115,36 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         pace: Pace,
         watchdog_s: float,
         terms: Terms = USUAL,
-        quanta: Quanta | None = None,
+        subticks: Subticks | None = None,
     ) -> None:
-        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, quantum=quanta is not None)
+        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, subtick=subticks is not None)
         super().__init__(door, run_id, roster, timeout_s, clock, around)
-        self._pace, self._assignments, self._quanta = pace, assignments, quanta
+        self._pace, self._assignments, self._subticks = pace, assignments, subticks
         self._rate_hz = assignments[0].rate_hz
-        if quanta:
+        if subticks:
             self._inbox = RunnerInbox(roster.limits, clock.now_ns)
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """A frame to every runner; what has come when the tick is over."""
-        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, received, outcomes))
+        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, received, tx_status))
         self._pace.handed_over(received.received_at_ns)
         self._pace.hold(tick)
         self._take_in()
         return self._roster.take()
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with frames also between ticks, as packets come and are due."""
-        assert self._quanta
+        assert self._subticks
         now_ns = self._pace.begin()
-        self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, outcomes)
+        self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, tx_status)
         self._pace.handed_over(received.received_at_ns)
-        self._quanta.exchange(tick, air, self)  # first what became due since the last tick's end
-        self._send(self._roster.open_tick(tick, now_ns, senses, ReceivedPackets.none(), NO_OUTCOMES))
-        self._quanta.pass_tick(tick, air, self)
+        self._subticks.exchange(tick, air, self)  # first what became due since the last tick's end
+        self._send(self._roster.open_tick(tick, now_ns, senses, ReceivedPackets.none(), NO_TX_STATUSES))
+        self._subticks.pass_tick(tick, air, self)
         return self._roster.take()
 
     def take_in(self) -> list[Put]:
@@ -148,20 +152,20 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         self._take_in()
         return self._roster.puts()
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """A frame to every runner that this concerns."""
-        self._send(self._roster.hand_over(tick, at_ns, received, outcomes))
+        self._send(self._roster.hand_over(tick, at_ns, received, tx_status))
 
     def report(self) -> RealTimeReport:
         """How far loop and runners kept up."""
         roster = self._roster
         return replace(
-            report_of(self._pace, self._quanta),
+            report_of(self._pace, self._subticks),
             late_answers=self._by_robot(roster.late),
             watchdog_stops=self._by_robot(roster.watchdog_stops),
             frames_dropped=roster.frames_dropped,
             packets_dropped=roster.packets_dropped,
-            outcomes_dropped=roster.outcomes_dropped,
+            tx_status_dropped=roster.tx_status_dropped,
         )
 
     def _handle(self, item: Item) -> None:

@@ -293,7 +293,7 @@ class Roster(ABC, Generic[S]):
         """Take an "actions" frame; BadFrame, and nothing changed, if it does not fit."""
 
     def _sent_between(self, slot: S, frame: frames.Frame) -> None:
-        """Take a "sent" frame, which only real time with a quantum knows; BadFrame, and nothing changed, elsewhere."""
+        """Take a "sent" frame, which only real time with a subtick knows; BadFrame, and nothing changed, elsewhere."""
         raise BadFrame("unexpected_kind", frame.kind)
 
     def _memory(self, slot: S, frame: frames.Frame) -> dict[str, list[GroupMemory]]:

@@ -14,7 +14,7 @@ from zenoh.handlers import Callback
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Senses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
@@ -116,7 +116,9 @@ class ZenohBackend(ABC, Generic[R]):
         self._patience_s = self._timeout_s
 
     @abstractmethod
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What every robot does in this tick."""
 
     def counts(self) -> dict[str, int]:
@@ -331,8 +333,10 @@ class LockstepBackend(ZenohBackend[Lockstep]):
     ) -> None:
         super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """One frame to every runner, one answer from each."""
-        self._send(self._roster.open_tick(tick, senses, received, outcomes))
+        self._send(self._roster.open_tick(tick, senses, received, tx_status))
         self._wait()
         return self._roster.take()

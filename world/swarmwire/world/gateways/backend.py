@@ -10,13 +10,13 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
-from swarmwire.comms.packets import NO_OUTCOMES, Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, LedChanges, Senses
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
 from swarmwire.world.gateways.gateway import Gateway
-from swarmwire.world.subtick import Quanta
+from swarmwire.world.subtick import Subticks
 
 
 class GatewayGroup:
@@ -84,7 +84,7 @@ CARRIED = ("packets_to_robots", "packets_from_robots")  # which is no fault
 class RobotsAir(Protocol):
     """The world's air as robots behind gateways have it; `AirBridge` is one."""
 
-    def publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Hand out what these robots received, and learn of packets that they sent."""
         ...
 
@@ -109,7 +109,7 @@ class GatewayBackend:
         rate_hz: int,
         show: Callable[[], None] = lambda: None,
         show_counts: Callable[[], dict[str, int]] = dict,
-        quanta: Quanta | None = None,
+        subticks: Subticks | None = None,
     ) -> None:
         """`inner` plays all other groups; `show` is called at the start of each tick, before anything goes out.
 
@@ -117,31 +117,33 @@ class GatewayBackend:
         whoever opened them.
         """
         self._inner, self._groups, self._air, self._pace, self._show = inner, groups, air, pace, show
-        self._rate_hz, self._show_counts, self._quanta = rate_hz, show_counts, quanta
+        self._rate_hz, self._show_counts, self._subticks = rate_hz, show_counts, subticks
         self._puts: list[Put] = []
         self._names = frozenset(group.name for group in groups)
         self._rows = np.sort(np.concatenate([group.rows for group in groups]))
         self.start, self.close = inner.start, inner.close
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes = NO_OUTCOMES) -> Actions:
+    def act(
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
         """What agents here decided, and what foreign programs told the other robots in this tick."""
-        others = self._begin(tick, senses, received, outcomes)
-        actions = self._inner.act(tick, others, received, outcomes)
+        others = self._begin(tick, senses, received, tx_status)
+        actions = self._inner.act(tick, others, received, tx_status)
         self._pace.hold(tick)
         self._catch_up(tick)
         told = Actions.joined([actions, *(group.take() for group in self._groups)])
         return replace(told, sent=SentPackets.joined([told.sent, self._air.take()])) if self._air else told
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes, air: AirTime
+        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with packets taken when they come and handed over when they are due."""
-        assert self._quanta
-        others = self._begin(tick, senses, received, outcomes)
-        self._inner.receive(received, outcomes)
-        actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_OUTCOMES)
+        assert self._subticks
+        others = self._begin(tick, senses, received, tx_status)
+        self._inner.receive(received, tx_status)
+        actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
-        self._quanta.pass_tick(tick, air, self)
+        self._subticks.pass_tick(tick, air, self)
         self._catch_up(tick)
         still = replace(actions, sent=SentPackets.none())
         return Actions.joined([still, *(group.take() for group in self._groups)])
@@ -151,10 +153,10 @@ class GatewayBackend:
         puts, self._puts = self._puts, []
         return [*puts, Put(self._pace.now_ns(), None, self._air.take())] if self._air else puts
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Tell robots behind gateways, and let agents here that read between ticks read."""
-        self._publish(tick, received, outcomes)
-        self._inner.receive(received, outcomes)
+        self._publish(tick, received, tx_status)
+        self._inner.receive(received, tx_status)
         sent = self._inner.on_receive(tick, at_ns)
         if len(sent):
             self._puts.append(Put(self._pace.now_ns(), None, sent))
@@ -171,22 +173,22 @@ class GatewayBackend:
 
     def report(self) -> RealTimeReport:
         """How far the loop kept up."""
-        return report_of(self._pace, self._quanta)
+        return report_of(self._pace, self._subticks)
 
-    def _begin(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: Outcomes) -> Senses:
+    def _begin(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Senses:
         """A tick begins: all goes out; what the others sense."""
         self._pace.begin()
         self._show()
         for group in self._groups:
             group.publish(tick_start_ns(tick, self._rate_hz), senses)
-        self._publish(tick, received, outcomes)
+        self._publish(tick, received, tx_status)
         self._pace.handed_over(received.received_at_ns)
         return {name: of for name, of in senses.items() if name not in self._names}
 
-    def _publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def _publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         if self._air:
             self._air.publish(
-                tick, received.select(self._own(received.receiver)), outcomes.select(self._own(outcomes.row))
+                tick, received.select(self._own(received.receiver)), tx_status.select(self._own(tx_status.row))
             )
 
     def _catch_up(self, tick: int) -> None:

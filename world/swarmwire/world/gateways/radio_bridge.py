@@ -12,7 +12,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.packets import Outcomes, ReceivedPackets, SentPackets
+from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, encode_air
@@ -33,12 +33,12 @@ class LentAir:
     robots: tuple[str, ...]  # all of the arena, by index
     rate_hz: int
     max_payload_bytes: int
-    gives: tuple[str, ...]  # columns of `ReceivedPackets.given`
+    measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # what of an agent's needs it meets
 
     def terms(self, row: int) -> AirTerms:
         """The terms of the robot of this row."""
-        return AirTerms(row, self.robots, self.rate_hz, self.max_payload_bytes, self.gives, self.needs)
+        return AirTerms(row, self.robots, self.rate_hz, self.max_payload_bytes, self.measures, self.needs)
 
 
 class AirBridge:
@@ -89,12 +89,12 @@ class AirBridge:
         )
         return endpoints_of(session, self._network)
 
-    def publish(self, tick: int, received: ReceivedPackets, outcomes: Outcomes) -> None:
+    def publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """A frame to each robot that received something or learns of its packets; rows of others are left out."""
-        concerned = {*np.unique(received.receiver).tolist(), *np.unique(outcomes.row).tolist()}
+        concerned = {*np.unique(received.receiver).tolist(), *np.unique(tx_status.row).tolist()}
         for row in sorted(concerned & self._publishers.keys()):
             its = received.select(np.flatnonzero(received.receiver == row)).compacted()
-            told = outcomes.select(np.flatnonzero(outcomes.row == row))
+            told = tx_status.select(np.flatnonzero(tx_status.row == row))
             try:
                 self._publishers[row].put(encode_air(tick, row, its, told))
             except zenoh.ZError:  # the session was closed

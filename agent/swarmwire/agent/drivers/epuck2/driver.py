@@ -109,8 +109,8 @@ class Epuck2Driver(Driver):
         return f"{self._host}:{self._port}"
 
     @property
-    def gives(self) -> frozenset[str]:
-        """As `Driver.gives`: all that the sheet and the robot have; the compass only if north is known."""
+    def measures(self) -> frozenset[str]:
+        """As `Driver.measures`: all that the sheet and the robot have; the compass only if north is known."""
         return self._gives
 
     def open(self) -> None:

@@ -107,8 +107,8 @@ class Ros2Driver(Driver):
         return f"{self.address} {options.domain} {options.namespace or self.robot} {options.command_topic}"
 
     @property
-    def gives(self) -> frozenset[str]:
-        """As `Driver.gives`: those of the body that a topic tells of."""
+    def measures(self) -> frozenset[str]:
+        """As `Driver.measures`: those of the body that a topic tells of."""
         senses = (feed.senses for feed in self._feeds.values())
         return frozenset[str]().union(*senses) & self.body.senses.keys()
 

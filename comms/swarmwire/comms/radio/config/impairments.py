@@ -142,33 +142,33 @@ def refuse_negative(delays: Delays, where: str, key: str) -> None:
 
 
 @dataclass(frozen=True)
-class RangeGiven:
+class RangeMeasure:
     """A receiver learns the distance to the sender, in m, between centres."""
 
     noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
 
 
 @dataclass(frozen=True)
-class BearingGiven:
+class BearingMeasure:
     """A receiver learns the direction to the sender in its own frame, in rad, positive to the left."""
 
     noise_rad: float = parameter(0.0, help="standard deviation of the error", unit="rad", at_least=0)
 
 
 @dataclass(frozen=True)
-class RssiGiven:
+class RssiMeasure:
     """A receiver learns the strength of the signal, in dBm; only of a radio that knows one."""
 
     noise_db: float = parameter(0.0, help="standard deviation of the error", unit="dB", at_least=0)
 
 
 @dataclass(frozen=True)
-class Gives:
+class Measures:
     """What a receiver learns with a packet, taken when the packet went on air."""
 
-    range: RangeGiven | None = parameter(None, help="the distance to the sender")
-    bearing: BearingGiven | None = parameter(None, help="the direction to the sender")
-    rssi: RssiGiven | None = parameter(None, help="the strength of the signal; not with the model disk")
+    range: RangeMeasure | None = parameter(None, help="the distance to the sender")
+    bearing: BearingMeasure | None = parameter(None, help="the direction to the sender")
+    rssi: RssiMeasure | None = parameter(None, help="the strength of the signal; not with the model disk")
 
     @property
     def columns(self) -> tuple[str, ...]:

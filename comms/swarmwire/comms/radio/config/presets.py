@@ -73,7 +73,7 @@ DISKS: dict[str, Preset] = {
             "max_payload_bytes": 10,
             "bit_rate_bps": 10**9,
             "send_offset": "tick",
-            "gives": {"range": {}, "bearing": {}},
+            "measures": {"range": {}, "bearing": {}},
         },
     ),
     "infrared-epuck": Preset(
@@ -87,7 +87,7 @@ DISKS: dict[str, Preset] = {
             "max_payload_bytes": 4,
             "bit_rate_bps": 10**9,
             "send_offset": "tick",
-            "gives": {"range": {}, "bearing": {}},
+            "measures": {"range": {}, "bearing": {}},
         },
     ),
 }
@@ -239,7 +239,7 @@ OTHER_MEDIA: dict[str, Preset] = {
             "log_distance": {"reference_loss_db": 40.0},
             "reception": {"model": "threshold", "least_sinr_db": 6.0, "preamble_sinr_db": 6.0},
             "access": {"method": "csma-802154", "acknowledged": False},
-            "gives": {"range": {"noise_m": 0.002}},
+            "measures": {"range": {"noise_m": 0.002}},
         },
         "messages that overlap are lost; carrier sense is that of IEEE 802.15.4, which gives up after 5 tries, where "
         "Kilobots go on trying; strength does not fall with distance, and its dBm tell nothing",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.radio.config.impairments import Bursts, Delays, Gives, refuse_negative
+from swarmwire.comms.radio.config.impairments import Bursts, Delays, Measures, refuse_negative
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (
     Access,
@@ -133,7 +133,7 @@ class Radio:
     bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
     trace: Trace | None = parameter(None, help="measured links are replayed")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
-    gives: Gives = field(default_factory=Gives)
+    measures: Measures = field(default_factory=Measures)
 
     @property
     def is_signal(self) -> bool:
@@ -148,7 +148,7 @@ class Radio:
     @property
     def tells(self) -> tuple[str, ...]:
         """What agents may need of it, by the names that they declare."""
-        return (*self.gives.needs, "radio.outcomes") if self.acknowledges else self.gives.needs
+        return (*self.measures.needs, "radio.tx_status") if self.acknowledges else self.measures.needs
 
     @property
     def needs_line_of_sight(self) -> bool:
@@ -258,8 +258,8 @@ def _check_disk(radio: Radio, where: str) -> None:
     for name in OF_SIGNALS:
         if getattr(radio, name) is not None:
             raise BadInput(where, f"radio.{name}", "expected a model with signals: a disk knows no strength")
-    if radio.gives.rssi is not None:
-        raise BadInput(where, "radio.gives.rssi", "expected a model with signals: a disk knows no strength")
+    if radio.measures.rssi is not None:
+        raise BadInput(where, "radio.measures.rssi", "expected a model with signals: a disk knows no strength")
     if radio.cut_off_db != Radio.cut_off_db:
         raise BadInput(where, "radio.cut_off_db", "expected a model with signals: a disk knows no strength")
 

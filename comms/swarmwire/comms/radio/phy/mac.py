@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.kernels import borrowing
-from swarmwire.comms.packets import Fate, SendResult
+from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
@@ -22,7 +22,7 @@ from swarmwire.comms.radio.phy.state import (
 from swarmwire.comms.truth import NOBODY
 
 RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
-IS_ACKNOWLEDGED, FOUND_BUSY = int(SendResult.ACKNOWLEDGED), int(SendResult.CHANNEL_BUSY)
+IS_ACKNOWLEDGED, FOUND_BUSY = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)
 
 
 @borrowing()

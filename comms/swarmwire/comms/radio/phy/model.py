@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Outcomes, SentPackets
+from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
@@ -38,7 +38,7 @@ class Reports:
     """Makes links of what was told, and takes them through the stages that follow reception."""
 
     def __init__(self, medium: Medium, links: LinksHeld) -> None:
-        self._robots, self._links, self._columns = medium.robots, links, len(medium.radio.gives.columns)
+        self._robots, self._links, self._columns = medium.robots, links, len(medium.radio.measures.columns)
         self.tune(medium)
 
     def tune(self, medium: Medium) -> None:
@@ -133,7 +133,7 @@ class SignalWay(Way):
         self._packets = PacketsHeld()
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._told = 0
-        self._outcomes: list[Outcomes] = []
+        self._tx_status: list[TxStatuses] = []
 
     @property
     def queued(self) -> Transmissions:
@@ -172,7 +172,7 @@ class SignalWay(Way):
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; when they go on air will turn out."""
         if self._rules.acknowledged:
-            self._outcomes.append(sent_in_vain(sent, self._radio.max_payload_bytes))
+            self._tx_status.append(sent_in_vain(sent, self._radio.max_payload_bytes))
         taken = self._intake.take(sent_at_ns, sent, others_alive, epoch)
         self._packets.add(taken, self._radio, self._medium.robots)
         return taken
@@ -205,9 +205,9 @@ class SignalWay(Way):
         tx_queue.switch(self._rules, state, self._events, room, at_ns)
         return self._decided([taken_out(room)], lives)
 
-    def outcomes(self, alive: BoolArray) -> Outcomes:
+    def tx_status(self, alive: BoolArray) -> TxStatuses:
         """What senders have learned since the last call, those `alive` (rows,)."""
-        told, self._outcomes = Outcomes.joined(self._outcomes), []
+        told, self._tx_status = TxStatuses.joined(self._tx_status), []
         return told.select(np.flatnonzero(alive[told.row])) if len(told) else told
 
     def drain(self) -> Transmissions:
@@ -259,7 +259,7 @@ class SignalWay(Way):
         decided = self._reports.decided(parts, packets.queued, packets.table, self._poses, lives)
         if parts:
             if self._rules.acknowledged:
-                self._outcomes.append(learned(packets.table, packets.queued.outcome_id))
+                self._tx_status.append(learned(packets.table, packets.queued.tx_status_id))
             packets.forget_done()
         return decided
 

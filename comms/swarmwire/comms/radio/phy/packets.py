@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.packets import BROADCAST, NO_OUTCOMES, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, UNTOLD, Fate, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.phy.state import NOT_LEARNED, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
@@ -13,29 +13,29 @@ from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import NOBODY
 
 
-def learned(packet: Table, outcome_id: IntArray) -> Outcomes:
+def learned(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     """Of packets that are done, what senders learn who ask; those that died before are not there to learn it."""
     died = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NOT_LEARNED)
-    asked = (packet["is_done"] > 0) & (outcome_id != UNTOLD) & ~died
+    asked = (packet["is_done"] > 0) & (tx_status_id != UNTOLD) & ~died
     index = np.flatnonzero(asked)
     if not len(index):
-        return NO_OUTCOMES
-    return Outcomes(packet["sender"][index], outcome_id[index], packet["result"][index])
+        return NO_TX_STATUSES
+    return TxStatuses(packet["sender"][index], tx_status_id[index], packet["result"][index])
 
 
-def sent_in_vain(sent: SentPackets, max_payload_bytes: int) -> Outcomes:
+def sent_in_vain(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
     """Of packets to robots that are not there, what senders learn who ask: nobody answers."""
-    index = np.flatnonzero((sent.to == NOWHERE) & (sent.outcome_ids != UNTOLD))
+    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_ids != UNTOLD))
     if not len(index):
-        return NO_OUTCOMES
-    return Outcomes(
-        sent.sender[index], sent.outcome_ids[index], result_at_first(sent.payloads.sizes[index], max_payload_bytes)
+        return NO_TX_STATUSES
+    return TxStatuses(
+        sent.sender[index], sent.tx_status_ids[index], result_at_first(sent.payloads.sizes[index], max_payload_bytes)
     )
 
 
 def result_at_first(size_bytes: IntArray, max_payload_bytes: int) -> IntArray:
     """The results of packets (k,) until something better, or worse, comes of them."""
-    return np.where(size_bytes > max_payload_bytes, int(SendResult.TOO_LARGE), int(SendResult.NO_ACKNOWLEDGEMENT))
+    return np.where(size_bytes > max_payload_bytes, int(TxResult.TOO_LARGE), int(TxResult.NO_ACKNOWLEDGEMENT))
 
 
 # --- Packets that wait at their radios or are under way, and their rows in the table that events work on.

@@ -75,7 +75,7 @@ RECEIVED, TOO_WEAK, COLLIDED, JAMMED = int(Fate.RECEIVED), int(Fate.TOO_WEAK), i
 
 
 @borrowing()
-def outcome(rules, losses, state, s, i, log_right):
+def fate_of_frame(rules, losses, state, s, i, log_right):
     """What becomes of the frame that robot s has on air, on link i, if it is right with this probability's logarithm.
 
     By draws keyed by (sender, receiver, sequence), and attempt. The same draw tells why it was not right: COLLIDED if
@@ -185,7 +185,7 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
         for i in range(me.first_link, me.weak_link):
             if link[i].now == RECEIVING:
                 log_right = alone_log_success(rules, link[i].power_mw, me.bits)
-                link[i].now = outcome(rules, losses, state, s, i, log_right)
+                link[i].now = fate_of_frame(rules, losses, state, s, i, log_right)
         me.on_air = SILENT
         return
     # Nothing but noise could take a frame.
@@ -203,7 +203,7 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
             if is_sure and it.log_success == 0.0:
                 link[i].now = RECEIVED
             else:
-                link[i].now = outcome(rules, losses, state, s, np.int64(i), it.log_success)
+                link[i].now = fate_of_frame(rules, losses, state, s, np.int64(i), it.log_success)
             robot[r].trust_from_ns = 0 if link[i].now == RECEIVED else now_ns + rules.distrust_ns
         dcf.sense(rules, state, queue, r, now_ns)
     for i in range(weak, stop):

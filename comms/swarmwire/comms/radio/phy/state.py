@@ -93,7 +93,7 @@ PACKET = _rows(
         ("is_departed", _I),  # it was reported before, and is not done yet
         ("on_air_at_ns", _I),  # of the latest attempt
         ("fate", _I),  # that it had at the sender's radio, or RECEIVED: it was on air
-        ("result", _I),  # SendResult, once it is done: what its sender knows
+        ("result", _I),  # TxResult, once it is done: what its sender knows
     ]
 )
 # Links by sender: to robots that may be told of a frame, and then to those that it only disturbs. In few bytes, since

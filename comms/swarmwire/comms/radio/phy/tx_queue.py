@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.kernels import borrowing
-from swarmwire.comms.packets import Fate, SendResult
+from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results
@@ -26,7 +26,7 @@ from swarmwire.comms.radio.phy.state import (
 )
 from swarmwire.comms.truth import NOBODY
 
-QUEUE_FULL, FOUND_FULL = int(Fate.QUEUE_FULL), int(SendResult.QUEUE_FULL)
+QUEUE_FULL, FOUND_FULL = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")
 
 

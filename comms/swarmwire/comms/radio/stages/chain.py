@@ -19,14 +19,14 @@ with reception there: what weakens signals belongs to `signal/pairs.py`, what ta
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
 from swarmwire.comms.radio.stages.losses import BurstLoss, FixedLoss, Replay
-from swarmwire.comms.radio.stages.measurements import GivenBearing, GivenRange, GivenRssi
+from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
 from swarmwire.comms.radio.stages.stage import Medium, Stage
 
 AFTER_RECEPTION: tuple[type[Stage], ...] = (
     Replay,
-    GivenRange,
-    GivenBearing,
-    GivenRssi,
+    MeasuredRange,
+    MeasuredBearing,
+    MeasuredRssi,
     Latency,
     VaryingDelay,
     PropagationDelay,

@@ -37,7 +37,7 @@ class Given(Stage):
 
     def __init__(self, medium: Medium, column: str, noise: float, measured: Callable[..., FloatArray]) -> None:
         self._keys, self._robots, self._wrap_m = medium.keys, medium.robots, medium.wrap_m
-        self._column = medium.radio.gives.columns.index(column)
+        self._column = medium.radio.measures.columns.index(column)
         self._noise, self._measured = noise, measured
 
     def decide(self, links: Links, pose: FloatArray) -> None:
@@ -54,17 +54,17 @@ class Given(Stage):
 RANGE_NOISE = purpose("range noise")
 
 
-class GivenRange(Given):
+class MeasuredRange(Given):
     """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
 
-    name = "given_range"
-    keys = ("gives.range",)
+    name = "measured_range"
+    keys = ("measures.range",)
 
     @classmethod
     def of(cls, medium: Medium) -> Stage | None:
         """The stage, where the radio gives the range."""
-        asked = medium.radio.gives.range
-        return None if asked is None else GivenRange(medium, asked.noise_m)
+        asked = medium.radio.measures.range
+        return None if asked is None else MeasuredRange(medium, asked.noise_m)
 
     def __init__(self, medium: Medium, noise_m: float) -> None:
         super().__init__(medium, "range_m", noise_m, range_m)
@@ -92,20 +92,20 @@ BEARING_NOISE = purpose("bearing noise")
 TURN = 2.0 * np.pi
 
 
-class GivenBearing(Given):
+class MeasuredBearing(Given):
     """Where the sender was, seen from the receiver's body when the packet went on air, plus a normal error.
 
     In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
     """
 
-    name = "given_bearing"
-    keys = ("gives.bearing",)
+    name = "measured_bearing"
+    keys = ("measures.bearing",)
 
     @classmethod
     def of(cls, medium: Medium) -> Stage | None:
         """The stage, where the radio gives the bearing."""
-        asked = medium.radio.gives.bearing
-        return None if asked is None else GivenBearing(medium, asked.noise_rad)
+        asked = medium.radio.measures.bearing
+        return None if asked is None else MeasuredBearing(medium, asked.noise_rad)
 
     def __init__(self, medium: Medium, noise_rad: float) -> None:
         super().__init__(medium, "bearing_rad", noise_rad, bearing_rad)
@@ -141,21 +141,21 @@ def wrapped(angle):
 RSSI_NOISE = purpose("rssi noise")
 
 
-class GivenRssi(Stage):
+class MeasuredRssi(Stage):
     """The power of the signal at the receiver, fading included, plus a normal error in dB."""
 
-    name = "given_rssi"
-    keys = ("gives.rssi",)
+    name = "measured_rssi"
+    keys = ("measures.rssi",)
 
     @classmethod
     def of(cls, medium: Medium) -> Stage | None:
         """The stage, where the radio gives the strength."""
-        given = medium.radio.gives.rssi
-        return None if given is None else GivenRssi(medium, given.noise_db)
+        given = medium.radio.measures.rssi
+        return None if given is None else MeasuredRssi(medium, given.noise_db)
 
     def __init__(self, medium: Medium, noise_db: float) -> None:
         self._noise_db, self._keys, self._robots = noise_db, medium.keys, medium.robots
-        self._column = medium.radio.gives.columns.index("rssi_dbm")
+        self._column = medium.radio.measures.columns.index("rssi_dbm")
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Fill the column "rssi_dbm"."""

@@ -28,7 +28,7 @@ class Channel:
         self._radio, self._size_m = medium.radio, medium.size_m
         self._arenas, self._running = len(medium.keys), medium.running
         self._find_reach = reach_on_torus if medium.is_torus else reach
-        self._columns = len(medium.radio.gives.columns)
+        self._columns = len(medium.radio.measures.columns)
         self._stages = chain(medium)
         self._known_pose: FloatArray | None = None  # for which it is known who is in range
 
@@ -111,7 +111,7 @@ class DiskWay(Way):
         self._senders = Senders(medium.radio, len(medium.keys) * medium.robots)
         self._channel = Channel(medium)
         self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
-        self._held, self._columns = medium.disruption, len(medium.radio.gives.columns)
+        self._held, self._columns = medium.disruption, len(medium.radio.measures.columns)
         self._now_ns = 0
 
     @property

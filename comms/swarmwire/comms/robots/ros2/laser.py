@@ -103,7 +103,7 @@ WIDEST_RAD = np.pi / 4.0  # to either side: further off, a thing is beside a sen
 
 
 class LaserAsProximity:
-    """Gives each sensor of the sheet the nearest return before it, measured from the rim."""
+    """Measures each sensor of the sheet the nearest return before it, measured from the rim."""
 
     def __init__(self, sheet: Proximity, radius_m: float, at_m: float, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
@@ -141,7 +141,7 @@ SLACK = 1.001  # of half the angle between two rays: angles come as float32
 
 
 class LaserAsScan:
-    """Gives each ray of the sheet the return on the message's ray of the nearest angle.
+    """Measures each ray of the sheet the return on the message's ray of the nearest angle.
 
     Where that one is further away than half the angle between two rays (of the coarser of both), the scanner does not
     look there, and the ray meets nothing.

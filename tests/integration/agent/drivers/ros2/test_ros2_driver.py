@@ -59,7 +59,7 @@ def received_all(fields) -> bool:
 @TRANSPORTS
 def test_what_a_base_tells_is_sensed_in_the_units_and_signs_of_senses(transport):
     with base_and_driver(transport) as (base, driver):
-        assert driver.gives == ALL
+        assert driver.measures == ALL
         tell_everything(base)
         fields = until(lambda: driver.sense(ALL), received_all)
     assert fields.keys() == {
@@ -303,5 +303,5 @@ def test_names_of_topics_that_ros_does_not_have_are_refused():
 
 def test_a_body_without_a_scanner_gives_neither_scan_nor_what_follows_from_it():
     driver = Ros2Driver("tcp/robot:7447", load_body("epuck-gps"), Ros2Options(), WallClock())
-    assert "scan" not in driver.gives
-    assert "positioning" not in driver.gives
+    assert "scan" not in driver.measures
+    assert "positioning" not in driver.measures

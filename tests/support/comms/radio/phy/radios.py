@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from swarmwire.comms.radio.config.impairments import BearingGiven, Bursts, Gives, RangeGiven, RssiGiven
+from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Access, Fading, Noise, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
@@ -24,7 +24,7 @@ WIFI_B = replace(
     noise=Noise(22e6, 7.0),
     reception=Reception("802.11b", preamble_sinr_db=4.0, take_over_s=4e-6),
 )
-ALL_GIVEN = Gives(RangeGiven(0.1), BearingGiven(0.1), RssiGiven(0.5))
+ALL_GIVEN = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
 METHODS = ("none", "aloha", "csma-802154", "dcf")
 
 
@@ -43,5 +43,5 @@ def drawing(method: str) -> Radio:
         shadowing=Shadowing(),
         fading=Fading(),
         bursts=Bursts(0.2, 0.4),
-        gives=ALL_GIVEN,
+        measures=ALL_GIVEN,
     )

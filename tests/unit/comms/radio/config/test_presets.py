@@ -116,8 +116,8 @@ def test_what_is_slow_is_received_later_with_distance(model: str):
 def test_fading_of_sound_goes_by_its_own_wavelength():
     """28 kHz at 1500 m/s have 5.36 cm, as 5.6 GHz have in air: the same strengths, to the last bit."""
     fading = {"distribution": "rayleigh"}
-    sound = preset("acoustic", fading=fading, gives={"rssi": {}}, frequency_hz=30e3, propagation_mps=3e3)
-    like = preset("acoustic", fading=fading, gives={"rssi": {}}, frequency_hz=3e9, propagation_mps=3e8)
+    sound = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=30e3, propagation_mps=3e3)
+    like = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=3e9, propagation_mps=3e8)
     place = at((0, 0), (10, 0), (0, 14))
     strengths = [
         run(make_air(radio, 3), place, lambda _: packets([0], size=4), 1, 20).given("rssi_dbm").tolist()

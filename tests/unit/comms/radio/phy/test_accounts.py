@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.packets import BROADCAST, Fate
-from swarmwire.comms.radio.config.impairments import Bursts, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
@@ -155,7 +155,12 @@ def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
 def test_a_packet_given_up_in_a_later_tick_than_its_last_attempt_still_has_its_place():
     """Every packet is lost, and waits for its acknowledgement across the ends of ticks."""
     radio = replace(
-        with_access("csma-802154"), bit_rate_bps=20_000, loss=1.0, jitter_s=0.1, gives=ALL_GIVEN, send_offset="uniform"
+        with_access("csma-802154"),
+        bit_rate_bps=20_000,
+        loss=1.0,
+        jitter_s=0.1,
+        measures=ALL_GIVEN,
+        send_offset="uniform",
     )
     to = (np.arange(6) + 1) % 6
     told = run(make_air(radio, 6), scattered(6), lambda _: packets(np.arange(6), to), 60, 1)
@@ -225,7 +230,7 @@ def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
 
 def test_ranges_are_those_at_which_frames_went_on_air():
     """Two frames that end in the same tick; one went on air in the tick before, when the robots were nearer."""
-    radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, gives=Gives(RangeGiven(0.0)))
+    radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, measures=Measures(RangeMeasure(0.0)))
     air, alive = make_air(radio, 2), np.ones(2, np.bool_)
     told = Run(air)
     for tick, (x_m, sender, size) in enumerate([(1.0, 0, 90), (2.0, 1, 10), (4.0, 0, 10)]):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.draws import derive_key, purpose, uniform
-from swarmwire.comms.packets import BROADCAST, Fate, SendResult, SentPackets
+from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.losses import passing_share
 from swarmwire.comms.radio.phy.params import rules_of
@@ -164,7 +164,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
     received = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
     assert received == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
-    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(SendResult.ACKNOWLEDGED))
+    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(TxResult.ACKNOWLEDGED))
     assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
     assert 20 < len(acknowledged) < len(received) < 2 * ticks - 20
 
@@ -185,15 +185,15 @@ def asking(senders: list[int]) -> Callable[[int], SentPackets]:
 
 
 def learned(told: Run) -> list[tuple[int, int, int]]:
-    """Outcomes that senders were told, sorted: (id, row, result)."""
+    """TxStatuses that senders were told, sorted: (id, row, result)."""
     found = (
-        zip(one.outcomes.id.tolist(), one.outcomes.row.tolist(), one.outcomes.result.tolist(), strict=True)
+        zip(one.tx_status.id.tolist(), one.tx_status.row.tolist(), one.tx_status.result.tolist(), strict=True)
         for one in told.news
     )
     return sorted(chain.from_iterable(found))
 
 
-def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, SendResult]:
+def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, TxResult]:
     """The fate of a packet from robot 0 to 1, and what its sender learns: frames and answers are lost by draws."""
     fate = Fate.LOST
     for attempt in range(attempts):
@@ -201,8 +201,8 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
             continue
         fate = Fate.RECEIVED
         if uniform(key, 1, 0, sequence, purpose("fixed loss of an acknowledgement") + attempt) >= loss:
-            return fate, SendResult.ACKNOWLEDGED
-    return fate, SendResult.NO_ACKNOWLEDGEMENT
+            return fate, TxResult.ACKNOWLEDGED
+    return fate, TxResult.NO_ACKNOWLEDGEMENT
 
 
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])

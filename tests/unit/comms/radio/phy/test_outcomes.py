@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, Outcomes, SendResult, SentPackets
+from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
@@ -35,17 +35,17 @@ class Asking:
                 ids[k] = self._sent[sender]
                 self.asked.append((sender, int(ids[k])))
             self._sent[sender] += 1
-        return replace(sent, outcome_id=ids)
+        return replace(sent, tx_status_id=ids)
 
 
-def told(of: Run) -> list[Outcomes]:
-    return [one.outcomes for one in of.news]
+def told(of: Run) -> list[TxStatuses]:
+    return [one.tx_status for one in of.news]
 
 
-def listed(outcomes: Outcomes) -> list[tuple[int, int, str]]:
+def listed(tx_status: TxStatuses) -> list[tuple[int, int, str]]:
     """Robot row, id and result."""
-    names = [SendResult(result).name for result in outcomes.result.tolist()]
-    return list(zip(outcomes.row.tolist(), outcomes.id.tolist(), names, strict=True))
+    names = [TxResult(result).name for result in tx_status.result.tolist()]
+    return list(zip(tx_status.row.tolist(), tx_status.id.tolist(), names, strict=True))
 
 
 def results(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
@@ -80,7 +80,7 @@ def mixed(rng: np.random.Generator, rows: int, robots: int) -> SentPackets:
 
 
 @given(radios(), st.integers(1, 2), st.integers(2, 8), st.integers(0, 1000), st.sampled_from([0, 1, 40]))
-def test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight(
+def test_each_addressed_packet_has_one_tx_status_unless_it_is_in_flight(
     radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int
 ):
     rng, rows = np.random.default_rng(seed), arenas * robots
@@ -121,7 +121,7 @@ def test_each_addressed_packet_has_one_outcome_unless_it_is_in_flight(
         (lambda radio: replace(radio, send_offset=0.25), NEAR, 10, ["ACKNOWLEDGED"]),
     ],
 )
-def test_a_lone_packet_has_the_outcome_that_its_sender_sees(
+def test_a_lone_packet_has_the_tx_status_that_its_sender_sees(
     method: str, change: Callable[[Radio], Radio], pose: FloatArray, size: int, expected: list[str]
 ):
     assert results(change(with_access(method)), pose, packets([0], 1, size)) == expected
@@ -159,7 +159,7 @@ def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_ac
     assert abs(acknowledged - 75) < 30
 
 
-def test_the_outcome_comes_in_the_tick_after_it_happened():
+def test_the_tx_status_comes_in_the_tick_after_it_happened():
     for method in ACKNOWLEDGING:
         ask = Asking(2)
         of = run(make_air(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
@@ -224,12 +224,12 @@ def disrupted(alive: np.ndarray, radio_on: np.ndarray) -> Disruption:
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_outcomes_are_the_same_in_any_order_of_senders_and_beside_other_arenas(method: str):
+def test_tx_status_are_the_same_in_any_order_of_senders_and_beside_other_arenas(method: str):
     def of(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
         rows = len(seeds) * ROBOTS
         sender = np.repeat(np.arange(rows), 3)
         sent = packets(sender, (sender + 1) % ROBOTS)
-        numbered = replace(sent, outcome_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
+        numbered = replace(sent, tx_status_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
         pose = np.tile(scattered(ROBOTS) * [20.0, 20.0, 1.0], (len(seeds), 1))
         return [
             listed(one) for one in told(run(make_air(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Fate, SendResult, SentPackets
+from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, Disruption
 from tests.support.comms.radio.phy.radios import with_access
@@ -42,7 +42,7 @@ def departures(out: Run) -> list[tuple[int, int]]:
 
 def results(out: Run) -> list[tuple[int, int]]:
     """Id and result of each outcome."""
-    return [(int(i), int(r)) for one in out.news for i, r in zip(one.outcomes.id, one.outcomes.result, strict=True)]
+    return [(int(i), int(r)) for one in out.news for i, r in zip(one.tx_status.id, one.tx_status.result, strict=True)]
 
 
 @pytest.mark.parametrize("end", ["alive", "radio_on"])
@@ -67,7 +67,7 @@ def test_a_packet_that_was_on_air_out_of_reach_stays_so_when_the_radio_goes_off(
 
 def test_at_low_bit_rates_the_sender_waits_as_long_as_an_acknowledgement_takes():
     out = told(SLOW, lambda _: {})
-    assert results(out) == [(0, SendResult.ACKNOWLEDGED)]
+    assert results(out) == [(0, TxResult.ACKNOWLEDGED)]
 
 
 def test_a_robot_that_was_revived_is_not_told_of_a_packet_from_before():

@@ -9,13 +9,13 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.config.impairments import BearingGiven, Gives, RangeGiven
+from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.runs import RATE_HZ, at, everybody, make_air, packets, run, scattered
 
-GIVES = Gives(RangeGiven(), BearingGiven())
+MEASURES = Measures(RangeMeasure(), BearingMeasure())
 BETWEEN = {
     "cylinder": Obstacle("cylinder", 0.0, 0.0, radius_m=0.2),
     "box": Obstacle("box", 0.0, 0.0, np.pi / 4, size_m=(0.6, 0.1)),
@@ -78,7 +78,7 @@ def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
 
 def test_range_and_bearing_are_exact_without_noise():
     """Robot 1 looks along +y: robot 0, at its west, is at its left; robot 2, at its south, behind it."""
-    radio = Radio(9.0, send_offset="tick", gives=GIVES)
+    radio = Radio(9.0, send_offset="tick", measures=MEASURES)
     told = run(make_air(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
     seen = {
         (int(r), int(s)): (range_m, bearing_rad)
@@ -97,14 +97,14 @@ def test_range_and_bearing_are_exact_without_noise():
 
 
 def test_only_what_the_radio_gives_comes_with_a_packet():
-    for gives in (Gives(), Gives(range=RangeGiven()), Gives(bearing=BearingGiven()), GIVES):
-        told = run(make_air(Radio(9.0, gives=gives), 3), scattered(3), everybody(3), 2, 2)
-        assert all(tuple(one.received.given) == gives.columns for one in told.news)
+    for measures in (Measures(), Measures(range=RangeMeasure()), Measures(bearing=BearingMeasure()), MEASURES):
+        told = run(make_air(Radio(9.0, measures=measures), 3), scattered(3), everybody(3), 2, 2)
+        assert all(tuple(one.received.given) == measures.columns for one in told.news)
 
 
 def test_noise_has_its_standard_deviation_and_stays_in_bounds():
     """10,920 draws each: the mean and the deviation lie within five standard errors (false alarm 1e-6 each)."""
-    radio = Radio(99.0, gives=Gives(RangeGiven(0.1), BearingGiven(0.3)))
+    radio = Radio(99.0, measures=Measures(RangeMeasure(0.1), BearingMeasure(0.3)))
     pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
     told = run(make_air(radio, 40), pose, everybody(40), 7, 2)
     way = pose[told.received("sender"), :2] - pose[told.received("receiver"), :2]
@@ -150,7 +150,7 @@ def test_fate_of_a_link_is_listed_once():
 
 
 SIZE_M = (6.0, 4.0)
-EXACT = Gives(RangeGiven(0.0), BearingGiven(0.0))
+EXACT = Measures(RangeMeasure(0.0), BearingMeasure(0.0))
 
 
 def torus(radio: Radio, robots: int, arenas: int = 1, obstacles: tuple[Obstacle, ...] = ()) -> Air:
@@ -184,7 +184,7 @@ def pairs(receiver: IntArray, sender: IntArray) -> set[tuple[int, int]]:
 def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: float) -> None:
     """Ranges make grids of one, two, four and more cells a side."""
     pose = scattered_torus(80)
-    out = run(torus(Radio(range_m=range_m, gives=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
+    out = run(torus(Radio(range_m=range_m, measures=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
     receiver, sender = out.received("receiver"), out.received("sender")
     sender = sender + receiver // 40 * 40
     found = pairs(receiver, sender)
@@ -200,7 +200,7 @@ def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: floa
 
 def test_an_addressed_packet_crosses_the_seam() -> None:
     pose = np.array([[2.9, 1.9, 0.0], [-2.9, -1.9, 0.0], [0.0, 0.0, 0.0]])
-    radio = Radio(range_m=1.0, gives=EXACT)
+    radio = Radio(range_m=1.0, measures=EXACT)
     out = run(torus(radio, 3), pose, lambda _: packets([0, 0], [1, 2]), ticks=1, quiet_ticks=2)
     assert (out.received("receiver").tolist(), out.received("sender").tolist()) == ([1], [0])
     assert out.given("range_m") == pytest.approx([np.hypot(0.2, 0.2)])
