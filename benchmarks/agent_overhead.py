@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import Clock, WallClock
 from swarmwire.comms.messages import encode_rows
 from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 
 RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 
@@ -36,10 +36,10 @@ def overhead(clock: Clock, robots: int, packets: int, ticks: int) -> Overhead:
 
 
 def _step_us(clock: Clock, backend: LocalBackend, robots: int, received: ReceivedPackets, ticks: int) -> float:
-    senses = {"bots": GroupSenses(np.arange(robots), {"proximity.value": np.zeros((robots, RAYS))})}
+    readings = {"bots": GroupReadings(np.arange(robots), {"proximity.value": np.zeros((robots, RAYS))})}
     start_ns = clock.now_ns()
     for tick in range(ticks):
-        backend.act(tick, senses, received)
+        backend.act(tick, readings, received)
     return (clock.now_ns() - start_ns) / 1e3 / ticks / robots
 
 

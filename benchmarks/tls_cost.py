@@ -19,7 +19,7 @@ from benchmarks.lines import print_line
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire.access_control import RunAccess, agents_access
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import unix_endpoint
@@ -50,14 +50,14 @@ class InTurn:
         """All of them have been started."""
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What the last one says; the others say the same."""
         first = tick % len(KINDS)
         took, actions = dict[str, int](), None
         for kind in (*KINDS[first:], *KINDS[:first]):
             before_ns = self._clock.now_ns()
-            actions = self._backends[kind].act(tick, senses, received, tx_status)
+            actions = self._backends[kind].act(tick, readings, received, tx_status)
             took[kind] = self._clock.now_ns() - before_ns
         self.took_ns.append(took)
         assert actions is not None

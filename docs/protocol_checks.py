@@ -15,7 +15,7 @@ from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
+from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Values
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
 from swarmwire.comms.wire.keys import Keys
@@ -80,7 +80,7 @@ def _joining(page: _Page) -> Iterator[Comparison]:
 def _frames(page: _Page) -> Iterator[Comparison]:
     one, zeros = np.zeros(1, np.int64), np.zeros(2)
     received = ReceivedPackets(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.of([b"abc"]))
-    senses = {"GROUP": GroupSenses(ROWS, {"SENSE.FIELD": np.zeros(2)})}
+    sensors = {"GROUP": GroupReadings(ROWS, {"SENSE.FIELD": np.zeros(2)})}
     sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, Notes(ROWS, np.array([0, 0]), ("x",))),
@@ -88,7 +88,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
         own=Actuations(ROWS, ROWS, zeros),
         values=Values(ROWS, zeros),
     )
-    tick = encode_tick(0, senses, received, TxStatuses(one, one, one))
+    tick = encode_tick(0, sensors, received, TxStatuses(one, one, one))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):
         ours = {array: (value.dtype.str, value.ndim) for array, value in frames.decode(data).arrays.items()}
         yield f"arrays of {name}", page.arrays(name), ours

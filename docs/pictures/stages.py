@@ -9,7 +9,7 @@ import numpy as np
 from docs.pictures.radio.sheet import line_color, panels, say
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import RangedSheet
+from swarmwire.comms.bodies.sensors import RangedSensorSpec
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save
@@ -20,12 +20,12 @@ from swarmwire.world.sensors.sensor import Field, Noise
 TO = Path(__file__).parents[1] / "stages.svg"
 TICK_S, TICKS = 0.1, 60
 NOISE, STEP = Noise("normal", 0.04), 0.1
-SHEETS = {
-    "as it is": (RangedSheet(), Field("value", high=1.0)),
-    "noise, outliers": (RangedSheet(outlier=0.08), Field("value", noise=NOISE, low=0.0, high=1.0)),
-    "steps, drop-out": (RangedSheet(outlier=0.08, drop_out=0.1), Field("value", 0, NOISE, STEP, 0.0, 1.0)),
+SENSOR_SPECS = {
+    "as it is": (RangedSensorSpec(), Field("value", high=1.0)),
+    "noise, outliers": (RangedSensorSpec(outlier=0.08), Field("value", noise=NOISE, low=0.0, high=1.0)),
+    "steps, drop-out": (RangedSensorSpec(outlier=0.08, drop_out=0.1), Field("value", 0, NOISE, STEP, 0.0, 1.0)),
     "5 Hz, 0.3 s late": (
-        RangedSheet(outlier=0.08, drop_out=0.1, rate_hz=5.0, delay_s=0.3),
+        RangedSensorSpec(outlier=0.08, drop_out=0.1, rate_hz=5.0, delay_s=0.3),
         Field("value", 0, NOISE, STEP, 0.0, 1.0),
     ),
 }
@@ -44,10 +44,10 @@ class Wave:
 
 def draw(to: Path = TO) -> None:
     """Write the figure."""
-    figure, row = panels(len(SHEETS), 2.1)
+    figure, row = panels(len(SENSOR_SPECS), 2.1)
     at_s = TICK_S * np.arange(TICKS)
     truth = told("as it is")
-    for i, (axes, title) in enumerate(zip(row, SHEETS, strict=True)):
+    for i, (axes, title) in enumerate(zip(row, SENSOR_SPECS, strict=True)):
         axes.plot(at_s, truth, color=FAINT, lw=1.2)
         axes.plot(at_s, told(title), ".", ms=2.6, color=line_color(i))
         axes.set_ylim(-0.05, 1.05)
@@ -57,10 +57,10 @@ def draw(to: Path = TO) -> None:
 
 def told(name: str) -> FloatArray:
     """What is read in each tick, nan where it is lost, (ticks,)."""
-    sheet, field = SHEETS[name]
+    sheet, field = SENSOR_SPECS[name]
     keys = np.array([derive_key("figure of stages")], np.uint64)
-    sense = Staged("wave", Wave(field), sheet, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
-    return np.array([sense.read(tick)["wave.value"][0] for tick in range(TICKS)])
+    sensor = Staged("wave", Wave(field), sheet, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
+    return np.array([sensor.read(tick)["wave.value"][0] for tick in range(TICKS)])
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.world.custom import Field, Noise, OwnActuator, OwnSensor, Scene, parameter
+from swarmwire.world.custom import CustomActuator, CustomSensor, Field, Noise, Scene, parameter
 
 
 class Leak:
@@ -26,7 +26,7 @@ class Leak:
 
 
 @dataclass
-class Gas(OwnSensor):
+class Gas(CustomSensor):
     """Concentration of the gas where the robot is."""
 
     x_m: float = parameter(help="where it leaks, arena frame", unit="m")
@@ -47,7 +47,7 @@ class Gas(OwnSensor):
 
 
 @dataclass
-class Sealer(OwnActuator):
+class Sealer(CustomActuator):
     """Closes the leak, bit by bit, as long as the robot stands near it: set to how hard it works, 0 to 1."""
 
     x_m: float = parameter(help="where it leaks, arena frame", unit="m")

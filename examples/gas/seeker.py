@@ -19,7 +19,7 @@ class Seeker(Agent):
 
     def step(self, robot: Robot) -> None:
         """Compare with the step before."""
-        smelled = robot.sense("gas").concentration
+        smelled = robot.sensor("gas").concentration
         x, y = robot.proximity.vector_sum()
         self.sealing = smelled >= (self.gone if self.sealing else self.near)
         if self.sealing:

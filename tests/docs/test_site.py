@@ -18,7 +18,7 @@ from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Measures
@@ -94,9 +94,9 @@ def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
     kinds = [kind for kind in vars(readings).values() if isinstance(kind, type) and is_dataclass(kind)]
     read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"sheet", "vector_sum", "of"} <= named
-    assert {*SHEETS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
-    assert {f"[senses.{name}]" for name in SHEETS} <= named
-    assert {of.name for kind in SHEETS.values() for of in fields(kind)} <= named
+    assert {*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
+    assert {f"[sensors.{name}]" for name in SENSOR_SPECS} <= named
+    assert {of.name for kind in SENSOR_SPECS.values() for of in fields(kind)} <= named
 
 
 def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):

@@ -13,7 +13,7 @@ import zenoh
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.world.backends.allocation import split
 from swarmwire.world.backends.lockstep import Lockstep
@@ -39,11 +39,11 @@ class EncodedBackend:
             self._lockstep.answer(name, next(self._runners[name][1]))
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """One frame to every runner, one answer from each, in a random order."""
         answered: list[tuple[str, bytes]] = []
-        for name, data in self._lockstep.open_tick(tick, senses, received, tx_status):
+        for name, data in self._lockstep.open_tick(tick, readings, received, tx_status):
             inbox, its = self._runners[name]
             inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
             answered.append((name, next(its)))

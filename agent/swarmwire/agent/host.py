@@ -18,7 +18,7 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
 
@@ -96,15 +96,15 @@ class Host:
         return SentPackets.joined(sent)
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         if self._waiting:
-            acting_rows = [self._groups[name].group.rows for name in senses]
+            acting_rows = [self._groups[name].group.rows for name in readings]
             # Also what waits for the dead of these groups: it is lost with them.
             its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
             received, tx_status = Told(received, tx_status).followed_by(its) if its else (received, tx_status)
-        acting = ((self._groups[name], group) for name, group in senses.items())
+        acting = ((self._groups[name], group) for name, group in readings.items())
         return Actions.joined(
             [agents.act(self._time(tick, agents.group), group, received, tx_status) for agents, group in acting]
         )
@@ -127,33 +127,33 @@ class Hosted(ABC):
         self.rows: IntArray = group.rows  # that acted last: state is kept for these
         self._sent_before = np.zeros(len(group.rows), np.int64)
         self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that the agent itself sent
-        self._senses: GroupSenses | None = None  # of the last step, for agents that read between steps
+        self._readings: GroupReadings | None = None  # of the last step, for agents that read between steps
         self._hearings = 0  # since it
 
     def act(
         self,
         time: tuple[int, int, int],
-        senses: GroupSenses,
+        readings: GroupReadings,
         received: ReceivedPackets,
         tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> Actions:
-        """What the robots `senses.rows` do; `time` is the tick, its start and the robots' period in ns."""
+        """What the robots `sensors.rows` do; `time` is the tick, its start and the robots' period in ns."""
         # As many rows as the group has are all of them; most ticks are so.
-        everyone = len(senses.rows) == len(self.group.rows)
-        place = slice(None) if everyone else np.searchsorted(self.group.rows, senses.rows)
+        everyone = len(readings.rows) == len(self.group.rows)
+        place = slice(None) if everyone else np.searchsorted(self.group.rows, readings.rows)
         sent_before = self._sent_before[place]
-        if not (everyone and len(self.rows) == len(senses.rows)) and not np.array_equal(senses.rows, self.rows):
-            fresh = np.flatnonzero(~np.isin(senses.rows, self.rows))
+        if not (everyone and len(self.rows) == len(readings.rows)) and not np.array_equal(readings.rows, self.rows):
+            fresh = np.flatnonzero(~np.isin(readings.rows, self.rows))
             self._first_own[np.arange(len(self.group.rows))[place][fresh]] = sent_before[fresh]
-            self.keep(senses.rows)
-            self.rows = senses.rows
+            self.keep(readings.rows)
+            self.rows = readings.rows
         turn = Turn(
             self.group,
             self.needs,
             time,
-            senses,
-            _own(received, senses.rows),
-            self._own_tx_status(tx_status, senses.rows, place),
+            readings,
+            _own(received, readings.rows),
+            self._own_tx_status(tx_status, readings.rows, place),
             self.group.keys[place],
             sent_before,
         )
@@ -161,13 +161,13 @@ class Hosted(ABC):
             self.step(turn)
         self._sent_before[place] = sent_before
         if self.receives:
-            self._senses, self._hearings = senses, 0
+            self._readings, self._hearings = readings, 0
         return turn.end()
 
     def on_receive(self, time: tuple[int, int, int], told: Told) -> SentPackets:
         """What robots send that read, between steps, what they were `told`; `time` is as for `act`, but now."""
-        senses = self._senses
-        if senses is None:
+        readings = self._readings
+        if readings is None:
             raise RuntimeError("whoever has not stepped does not hear between steps")
         place = np.searchsorted(self.group.rows, self.rows)
         sent_before = self._sent_before[place]
@@ -176,7 +176,7 @@ class Hosted(ABC):
             self.group,
             self.needs,
             time,
-            senses,
+            readings,
             _own(told.received, self.rows),
             self._own_tx_status(told.tx_status, self.rows, place),
             self.group.keys[place],
@@ -193,7 +193,7 @@ class Hosted(ABC):
     @property
     def has_stepped(self) -> bool:
         """Whether any robot has: who has not does not hear."""
-        return self._senses is not None
+        return self._readings is not None
 
     def memory(self) -> GroupMemory:
         """What is remembered of every robot of the group."""
@@ -266,12 +266,12 @@ class _Vector(Hosted):
 
     def _call(self, method: Callable[[Robots, State], None], turn: Turn) -> None:
         if self._per_robot:
-            place = np.searchsorted(self.group.rows, turn.senses.rows)
+            place = np.searchsorted(self.group.rows, turn.readings.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
         try:
             method(Robots(turn), self._state)
         except (Exception, SystemExit) as error:
-            place = np.searchsorted(self.group.rows, turn.senses.rows)
+            place = np.searchsorted(self.group.rows, turn.readings.rows)
             raise _failed([self.group.robot_names[at] for at in place], error, turn) from error
 
     def keep(self, rows: IntArray) -> None:
@@ -297,13 +297,13 @@ class _Single(Hosted):
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
     def step(self, turn: Turn) -> None:
-        for at, row in enumerate(cast("list[int]", turn.senses.rows.tolist())):
+        for at, row in enumerate(cast("list[int]", turn.readings.rows.tolist())):
             self._call(self._agents[row].step, turn, at, row)
 
     def listen(self, turn: Turn) -> None:
         told = np.union1d(turn.received.receiver, turn.tx_status_rows)
         for at in cast("list[int]", told.tolist()):
-            row = int(turn.senses.rows[at])
+            row = int(turn.readings.rows[at])
             self._call(self._agents[row].on_receive, turn, at, row)
 
     def _call(self, method: Callable[[Robot], None], turn: Turn, at: int, row: int) -> None:

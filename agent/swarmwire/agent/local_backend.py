@@ -4,7 +4,7 @@ from swarmwire.agent.host import Host
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 
 
 class LocalBackend:
@@ -22,10 +22,10 @@ class LocalBackend:
         self._host = Host(self._assignment)
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What every robot does in this tick."""
-        return self._started().act(tick, _read_only(senses), _received_read_only(received), tx_status)
+        return self._started().act(tick, _read_only(readings), _received_read_only(received), tx_status)
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep this until the robots that it is for step, or hear."""
@@ -58,10 +58,10 @@ def _frozen(array: AnyArray) -> AnyArray:
     return view
 
 
-def _read_only(senses: Senses) -> Senses:
+def _read_only(readings: Readings) -> Readings:
     return {
-        name: GroupSenses(_frozen(group.rows), {field: _frozen(column) for field, column in group.fields.items()})
-        for name, group in senses.items()
+        name: GroupReadings(_frozen(group.rows), {field: _frozen(column) for field, column in group.fields.items()})
+        for name, group in readings.items()
     }
 
 

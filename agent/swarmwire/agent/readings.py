@@ -25,16 +25,16 @@ class Around(Generic[N, S]):
     """Sensors around a body, in the data sheet's order (use the angles, never the indices)."""
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
-    sheet: S
+    spec: S
 
     @property
     def angle_rad(self) -> FloatArray:
         """Where the sensors look in the body's frame, (sensors,)."""
-        return self.sheet.angle_rad
+        return self.spec.angle_rad
 
     def vector_sum(self) -> tuple[N, N]:
         """X and y of the sum of the sensors as vectors, `value` long towards `angle_rad`: where most of it is."""
-        value, (cosine, sine) = self.value, self.sheet.direction
+        value, (cosine, sine) = self.value, self.spec.direction
         if value.ndim == 1:  # once a robot and tick: a faster call than that for any axis
             return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
         return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
@@ -44,7 +44,7 @@ class _AtRim(Around[N, R]):
     @cached_property
     def distance_m(self) -> FloatArray:
         """Distance from the rim at which an ideal sensor answers `value`; the reach if it sees nothing, (…, rays)."""
-        return self.sheet.response.distance_m(self.value)
+        return self.spec.response.distance_m(self.value)
 
 
 class ProximityReading(_AtRim[N, Proximity]):
@@ -173,19 +173,19 @@ class OdometryReading(Generic[N]):
 # --- Readings of senses of the user's own.
 
 
-class OwnReading:
+class CustomReading:
     """What a sense of the user's own reads: each of its fields is an attribute.
 
     For one robot a float, or (width,); for n robots (n,), or (n, width).
     """
 
-    def __init__(self, sense: str, fields: Mapping[str, Any]) -> None:
-        self._sense, self._fields = sense, fields
+    def __init__(self, sensor: str, fields: Mapping[str, Any]) -> None:
+        self._sensor, self._fields = sensor, fields
 
     def __getattr__(self, name: str) -> Any:
         """A field by its name."""
         if name.startswith("_") or name not in self._fields:
-            raise AttributeError(f"the sense {self._sense} has the fields {', '.join(self._fields)}, not {name}")
+            raise AttributeError(f"the sense {self._sensor} has the fields {', '.join(self._fields)}, not {name}")
         return self._fields[name]
 
 
@@ -208,9 +208,9 @@ class ScanReading:
     """The rays of the scanner."""
 
     range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
-    sheet: Scan
+    spec: Scan
 
     @property
     def angle_rad(self) -> FloatArray:
         """Where the rays look in the body's frame, (rays,)."""
-        return self.sheet.angle_rad
+        return self.spec.angle_rad

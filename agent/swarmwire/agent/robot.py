@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packet, TxStatus
-from swarmwire.agent.readings import BumperReading, CameraReading, OwnReading
+from swarmwire.agent.readings import BumperReading, CameraReading, CustomReading
 from swarmwire.agent.robots import Draw, forward_and_turn
-from swarmwire.agent.sensors import Sensing
+from swarmwire.agent.sensors import Sensors
 from swarmwire.agent.step_context import Turn
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.drives import rgb_of
@@ -18,7 +18,7 @@ from swarmwire.comms.packets import TxResult
 M = TypeVar("M", bound=Message)
 
 
-class Robot(Sensing[float]):
+class Robot(Sensors[float]):
     """One robot in one tick. Senses raise NotDeclared unless the agent's `needs` name them."""
 
     __slots__ = ("_draw", "_row", "radio")
@@ -46,10 +46,10 @@ class Robot(Sensing[float]):
         """LEDs of other robots in sight."""
         return CameraReading.of(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
-    def sense(self, name: str) -> OwnReading:
+    def sensor(self, name: str) -> CustomReading:
         """What a sense of your own reads: each field as an attribute, a float or an array (width,)."""
         columns = ((field, values[self._row]) for field, values in self._turn.fields(name).items())
-        return OwnReading(name, {field: value if np.ndim(value) else float(value) for field, value in columns})
+        return CustomReading(name, {field: value if np.ndim(value) else float(value) for field, value in columns})
 
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
         """Wanted forward speed and turn rate (positive to the left); they hold until the next call.
@@ -88,11 +88,11 @@ class Robot(Sensing[float]):
         """
         self._turn.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
-    def _number(self, sense: str, field: str) -> float:
-        return self._turn.field(sense, field).item(self._row)
+    def _number(self, sensor: str, field: str) -> float:
+        return self._turn.field(sensor, field).item(self._row)
 
-    def _numbers(self, sense: str, field: str) -> FloatArray:
-        return self._turn.field(sense, field)[self._row]
+    def _numbers(self, sensor: str, field: str) -> FloatArray:
+        return self._turn.field(sensor, field)[self._row]
 
 
 class RadioPort:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import BumperReadings, CameraReadings, OwnReading
-from swarmwire.agent.sensors import Sensing
+from swarmwire.agent.readings import BumperReadings, CameraReadings, CustomReading
+from swarmwire.agent.sensors import Sensors
 from swarmwire.agent.step_context import Turn
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
@@ -62,7 +62,7 @@ M = TypeVar("M", bound=Message)
 N = TypeVar("N", float, FloatArray)
 
 
-class Robots(Sensing[FloatArray]):
+class Robots(Sensors[FloatArray]):
     """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
 
     __slots__ = ("draw", "radio")
@@ -87,9 +87,9 @@ class Robots(Sensing[FloatArray]):
         """LEDs of other robots in sight: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
         return CameraReadings(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
-    def sense(self, name: str) -> OwnReading:
+    def sensor(self, name: str) -> CustomReading:
         """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
-        return OwnReading(name, self._turn.fields(name))
+        return CustomReading(name, self._turn.fields(name))
 
     def drive(
         self,
@@ -149,11 +149,11 @@ class Robots(Sensing[FloatArray]):
         """
         self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state, value)
 
-    def _number(self, sense: str, field: str) -> FloatArray:
-        return self._turn.field(sense, field)
+    def _number(self, sensor: str, field: str) -> FloatArray:
+        return self._turn.field(sensor, field)
 
-    def _numbers(self, sense: str, field: str) -> FloatArray:
-        return self._turn.field(sense, field)
+    def _numbers(self, sensor: str, field: str) -> FloatArray:
+        return self._turn.field(sensor, field)
 
 
 class RadioRows:

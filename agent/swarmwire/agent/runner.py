@@ -27,7 +27,7 @@ from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Senses
+from swarmwire.comms.tick_io import Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, decode_memory
 from swarmwire.comms.wire.join import JoinRequest, versioned
@@ -154,14 +154,14 @@ class Inbox:
         self,
         assignment: Assignment,
         receive: Callable[[ReceivedPackets, TxStatuses], None] = lambda _received, _tx_status: None,
-    ) -> Iterator[tuple[int, Senses, ReceivedPackets, TxStatuses] | tuple[int, int]]:
+    ) -> Iterator[tuple[int, Readings, ReceivedPackets, TxStatuses] | tuple[int, int]]:
         """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
 
         What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
         """
         measures, rows = assignment.measures or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
-        newest: tuple[int, Senses, ReceivedPackets, TxStatuses] | None = None
+        newest: tuple[int, Readings, ReceivedPackets, TxStatuses] | None = None
         between: tuple[int, int] | None = None
         tick = -1
         while True:
@@ -280,10 +280,10 @@ def answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iter
                     missed, inbox.missed = inbox.missed, 0
                     yield encode_sent(told[0], sent, missed)
                 continue
-            tick, senses, received, tx_status = told
-            actions = host.act(tick, senses, received, tx_status)
+            tick, readings, received, tx_status = told
+            actions = host.act(tick, readings, received, tx_status)
             dropped, inbox.dropped = inbox.dropped, 0
-            yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(senses))
+            yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(readings))
         return
     except AgentFailed as error:
         failure = {"robots": error.robots, "traceback": error.traceback}

@@ -19,7 +19,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.step_context import Turn
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import Sheet
+from swarmwire.comms.bodies.sensors import SensorSpec
 from swarmwire.comms.clock import to_s
 
 
@@ -50,20 +50,20 @@ class Handle:
 # --- What robots sense, the same for one and for n of them: a property per sense of a body.
 
 
-S = TypeVar("S", bound=Sheet)
+S = TypeVar("S", bound=SensorSpec)
 
 
-class Sensing(Handle, Generic[N]):
+class Sensors(Handle, Generic[N]):
     """The senses of one robot, or of n with a leading axis n, here written …; but for those that differ in form."""
 
     __slots__ = ()  # what is set on a handle by mistake is refused
 
     @abstractmethod
-    def _number(self, sense: str, field: str) -> N:
+    def _number(self, sensor: str, field: str) -> N:
         """A field that has one number for a robot."""
 
     @abstractmethod
-    def _numbers(self, sense: str, field: str) -> FloatArray:
+    def _numbers(self, sensor: str, field: str) -> FloatArray:
         """A field that has several, (…, width)."""
 
     @property
@@ -117,8 +117,8 @@ class Sensing(Handle, Generic[N]):
         return GroundReading(self._numbers("ground", "shade"))
 
 
-def _had(sheet: S | None) -> S:
+def _had(spec: S | None) -> S:
     """The data sheet of a sense that the body has (needs are checked before a run)."""
-    if sheet is None:
+    if spec is None:
         raise AttributeError("the body does not have this sense")
-    return sheet
+    return spec

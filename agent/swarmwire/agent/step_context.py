@@ -17,7 +17,7 @@ from swarmwire.comms.tick_io import (
     NO_VALUES,
     Actions,
     Actuations,
-    GroupSenses,
+    GroupReadings,
     LedChanges,
     Notes,
     Values,
@@ -30,7 +30,7 @@ NOT_SWITCHED = -1
 
 
 class Turn:
-    """The robots `senses.rows` of a group in one tick.
+    """The robots `sensors.rows` of a group in one tick.
 
     `received.receiver` and `tx_status.row` count these rows from 0.
     """
@@ -40,7 +40,7 @@ class Turn:
         group: GroupAssignment,
         needs: tuple[str, ...],
         time: tuple[int, int, int],
-        senses: GroupSenses,
+        readings: GroupReadings,
         received: ReceivedPackets,
         tx_status: TxStatuses,
         keys: KeyArray,
@@ -50,11 +50,11 @@ class Turn:
         self.first_draw = first_draw  # of the tick that it does not share with those before it
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
-        self.senses, self.received = senses, received
+        self.readings, self.received = readings, received
         self._tx_status, self._asks = tx_status, OUTCOMES in needs
         self.tx_status_rows = tx_status.row  # (k,) places of robots that there is an outcome for
         self.keys = keys  # (n,) of the robots' draws
-        self.n = len(senses.rows)
+        self.n = len(readings.rows)
         self.drive = np.zeros(self.n, np.bool_)
         self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent up to now; written to
@@ -67,16 +67,16 @@ class Turn:
         self._packets: dict[type[Message], Packets[Any]] = {}
         self._lists: ReceivedLists | None = None
 
-    def field(self, sense: str, name: str) -> FloatArray:
+    def field(self, sensor: str, name: str) -> FloatArray:
         """A field of a sense, (n, …); NotDeclared if the agent's needs do not name the sense."""
-        self._require(sense)
-        return self.senses.fields[f"{sense}.{name}"]
+        self._require(sensor)
+        return self.readings.fields[f"{sensor}.{name}"]
 
-    def fields(self, sense: str) -> dict[str, FloatArray]:
+    def fields(self, sensor: str) -> dict[str, FloatArray]:
         """All fields of a sense, (n, …) each, by name; NotDeclared if the agent's needs do not name the sense."""
-        self._require(sense)
-        of = f"{sense}."
-        return {name.removeprefix(of): values for name, values in self.senses.fields.items() if name.startswith(of)}
+        self._require(sensor)
+        of = f"{sensor}."
+        return {name.removeprefix(of): values for name, values in self.readings.fields.items() if name.startswith(of)}
 
     def tx_status(self) -> TxStatuses:
         """What became of packets that these robots sent; NotDeclared if the agent's needs do not name it."""
@@ -125,7 +125,7 @@ class Turn:
         self._sent_before[place] += 1
         # Whoever does not ask is not told, and nothing of it crosses the wire.
         tx_status_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
-        self._outbox.append(SentPackets(self.senses.rows[place], receiver, payloads, tx_status_id))
+        self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
         return ids
 
     def send_one(self, place: int, to: int | None, payload: bytes) -> int:
@@ -139,7 +139,7 @@ class Turn:
         id_ = self._sent_before.item(place)
         self._sent_before[place] = id_ + 1
         tx_status_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
-        sender = self.senses.rows[place : place + 1]
+        sender = self.readings.rows[place : place + 1]
         self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
         return id_
 
@@ -200,7 +200,7 @@ class Turn:
             raise NotFitted(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
         given, width = np.asarray(values, np.float64), body.actuators[name].width
         if self._own is None:
-            self._own = np.full((self.n, sum(sheet.width for sheet in body.actuators.values())), np.nan)
+            self._own = np.full((self.n, sum(spec.width for spec in body.actuators.values())), np.nan)
         of = self._own[rows, body.actuator_places[name]]
         if given.ndim == 1 and width == 1:
             given = given[:, None]  # (n,) is one number for each robot
@@ -235,7 +235,7 @@ class Turn:
         sent = SentPackets.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
         return Actions(
-            self.senses.rows,
+            self.readings.rows,
             self.drive,
             *command,
             sent,
@@ -251,16 +251,16 @@ class Turn:
 
     def _led_changes(self, leds: IntArray) -> LedChanges:
         place, which = np.nonzero(leds != NOT_SWITCHED)
-        return LedChanges(self.senses.rows[place], which, leds[place, which])
+        return LedChanges(self.readings.rows[place], which, leds[place, which])
 
     def _actuations(self, own: FloatArray) -> Actuations:
         at, place = np.nonzero(~np.isnan(own))
-        return Actuations(self.senses.rows[at], place, own[at, place])
+        return Actuations(self.readings.rows[at], place, own[at, place])
 
     def _notes(self, state: IntArray) -> Notes:
         noted = np.flatnonzero(state >= 0)
-        return Notes(self.senses.rows[noted], state[noted], tuple(self._states))
+        return Notes(self.readings.rows[noted], state[noted], tuple(self._states))
 
     def _values(self, value: FloatArray) -> Values:
         told = np.flatnonzero(~np.isnan(value))
-        return Values(self.senses.rows[told], value[told])
+        return Values(self.readings.rows[told], value[told])

@@ -11,10 +11,10 @@ from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.bodies.sensors import Camera, GroundColour, OwnSheet
+from swarmwire.comms.bodies.sensors import Camera, CustomSensorSpec, GroundColour
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import NO_TX_STATUSES, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Trial:
     params: dict[str, Any] | None = None  # as in a scenario: a list has a value for each robot
 
     @cached_property
-    def sheet(self) -> Body:
+    def spec(self) -> Body:
         """The body's data sheet."""
         return load_body(self.body) if isinstance(self.body, str) else self.body
 
@@ -86,24 +86,24 @@ class Given(NamedTuple):
     """What a group is given in a tick: time (its number, start and length in ns), senses, packets and tx statuses."""
 
     time: tuple[int, int, int]
-    senses: GroupSenses
+    readings: GroupReadings
     received: ReceivedPackets
     tx_status: TxStatuses
 
 
 def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
-    key, body = draws.derive_key("inputs", trial.seed), trial.sheet
+    key, body = draws.derive_key("inputs", trial.seed), trial.spec
     ether = _Ether(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
-        senses = GroupSenses(rows, _senses(body, key, tick, rows))
-        yield Given(time, senses, ether.received(tick, rows), ether.tx_status(tick)), ether.show
+        sensors = GroupReadings(rows, _readings(body, key, tick, rows))
+        yield Given(time, sensors, ether.received(tick, rows), ether.tx_status(tick)), ether.show
 
 
-def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
+def _readings(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
     n, fields = len(rows), dict[str, FloatArray]()
     if body.proximity is not None:
         value = _uniform(key, tick, "proximity", (n, len(body.proximity.angles_deg)))
@@ -115,20 +115,20 @@ def _senses(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatA
             fields[f"odometry.{side}"] = tick * 0.01 + _uniform(key, tick, side, (n,)) * 0.01
     if body.light is not None:
         fields["light.value"] = _uniform(key, tick, "light", (n, len(body.light.angles_deg)))
-    if "bumper" in body.senses:
+    if "bumper" in body.sensors:
         fields["bumper.pressed"] = np.round(_uniform(key, tick, "bumper", (n,)))
-    if "positioning" in body.senses:
+    if "positioning" in body.sensors:
         for axis in ("x_m", "y_m"):
             fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
-    if "imu" in body.senses:
+    if "imu" in body.sensors:
         for name in ("forward_mps2", "left_mps2", "turn_radps"):
             fields[f"imu.{name}"] = _uniform(key, tick, name, (n,)) * 2.0 - 1.0
-    if "battery" in body.senses:
+    if "battery" in body.sensors:
         charge = _uniform(key, tick, "battery", (n,))
         fields["battery.charge"], fields["battery.voltage_v"] = charge, 3.4 + 0.8 * charge
-    for name, sheet in body.senses.items():
-        if isinstance(sheet, OwnSheet):
-            for field, width in sheet.fields.items():
+    for name, spec in body.sensors.items():
+        if isinstance(spec, CustomSensorSpec):
+            for field, width in spec.fields.items():
                 fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
     fields.update(_seen(body, key, tick, n))
     return fields
@@ -143,7 +143,7 @@ def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
     if body.scan is not None:
         share = _uniform(key, tick, "scan", (n, body.scan.rays))
         fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
-    ground, camera = body.senses.get("ground"), body.senses.get("camera")
+    ground, camera = body.sensors.get("ground"), body.sensors.get("camera")
     if isinstance(ground, GroundColour):
         fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
     if isinstance(camera, Camera):

@@ -20,7 +20,7 @@ from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, SentPackets
-from swarmwire.comms.tick_io import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupReadings
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 
@@ -56,7 +56,7 @@ def _shown(actions: Actions) -> Iterator[Deed]:
 
 
 def _actuated(actions: Actions, body: Body) -> Iterator[Deed]:
-    places = [f"{name}[{at}]" for name, sheet in body.actuators.items() for at in range(sheet.width)]
+    places = [f"{name}[{at}]" for name, spec in body.actuators.items() for at in range(spec.width)]
     rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
     for robot, at, number in zip(rows, place, value, strict=True):
         yield robot, f"actuate: {places[at]}", repr(number)
@@ -132,7 +132,7 @@ def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial
     trial = trial or Trial()
     one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
     names = single.__name__, vector.__name__
-    comparison = Comparison(f"{single.__name__} and {vector.__name__} differ", names, trial.sheet)
+    comparison = Comparison(f"{single.__name__} and {vector.__name__} differ", names, trial.spec)
     for tick, (given, show) in enumerate(inputs(trial)):
         first = one.act(*given)
         comparison.check(tick, first, other.act(*given))
@@ -144,7 +144,7 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
     trial = trial or Trial()
     together = _host(vector, trial, np.arange(trial.robots))
     alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
-    comparison = Comparison(f"rows of {vector.__name__} are not independent", ("together", "alone"), trial.sheet)
+    comparison = Comparison(f"rows of {vector.__name__} are not independent", ("together", "alone"), trial.spec)
     for tick, (given, show) in enumerate(inputs(trial)):
         first = together.act(*given)
         comparison.check(tick, first, Actions.joined([host.act(*_only(row, given)) for row, host in enumerate(alone)]))
@@ -155,11 +155,11 @@ def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
     params = params_of(trial.params or {}, rows)
-    return hosted(GroupAssignment("trial", "", params, trial.sheet, rows, names, keys), kind)
+    return hosted(GroupAssignment("trial", "", params, trial.spec, rows, names, keys), kind)
 
 
 def _only(row: int, given: Given) -> Given:
-    at = np.flatnonzero(given.senses.rows == row)
-    own = GroupSenses(given.senses.rows[at], {name: column[at] for name, column in given.senses.fields.items()})
+    at = np.flatnonzero(given.readings.rows == row)
+    own = GroupReadings(given.readings.rows[at], {name: column[at] for name, column in given.readings.fields.items()})
     received = given.received.select(np.flatnonzero(given.received.receiver == row))
     return Given(given.time, own, received, given.tx_status.select(np.flatnonzero(given.tx_status.row == row)))

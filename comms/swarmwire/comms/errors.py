@@ -3,7 +3,7 @@
 SwarmwireError
 ├── BadInput            a scenario, a body, an option: refused at the door (exit code 2)
 ├── AgentFailed         the user's agent raised (exit code 1)
-├── OwnCodeFailed       the user's sensor, actuator or metric raised (exit code 1)
+├── CustomCodeFailed       the user's sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
 ├── RunGone             the run that a view is to follow does not answer (exit code 1); in deploy
 ├── Refused             what a run that is controlled from elsewhere does not do (exit code 1); in deploy
@@ -59,7 +59,7 @@ class AgentFailed(SwarmwireError):
         super().__init__(f"the agent of {robots} failed:\n{traceback}")
 
 
-class OwnCodeFailed(SwarmwireError):
+class CustomCodeFailed(SwarmwireError):
     """A sensor, actuator or metric of the user's own raised, or told what it should not: `what` names it."""
 
     def __init__(self, what: str, traceback: str) -> None:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 
 
@@ -15,7 +15,7 @@ class AgentBackend(Protocol):
         """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
+    def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         """What every robot does in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 
@@ -80,7 +80,7 @@ class TimedBackend(AgentBackend, Protocol):
     """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """What every robot does in this tick, but for packets, which were put on the air.
 

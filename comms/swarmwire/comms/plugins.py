@@ -165,7 +165,7 @@ def _load_file(path: Path) -> Any:
 K = TypeVar("K")
 
 
-def own_class(base: type[K], spec: str, where: str, key: str) -> type[K]:
+def custom_class(base: type[K], spec: str, where: str, key: str) -> type[K]:
     """The whole dataclass below `base` that a spec names, as `load_named` reads it; else BadInput at `key`."""
     try:
         found = load_named(spec)

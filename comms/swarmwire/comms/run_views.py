@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.tick_io import GroupSenses, Senses
+from swarmwire.comms.tick_io import GroupReadings, Readings
 from swarmwire.comms.truth import Departed, Finished, Static, Tally, Truth
 
 
@@ -21,8 +21,8 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
     if static.arenas == 1:
         return truth
     rows = slice(arena * static.robots, (arena + 1) * static.robots)
-    within = senses_within(truth.senses, rows)
-    senses = {name: GroupSenses(group.rows - rows.start, group.fields) for name, group in within.items()}
+    within = readings_within(truth.readings, rows)
+    readings = {name: GroupReadings(group.rows - rows.start, group.fields) for name, group in within.items()}
     edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
     movable, value = truth.movable, truth.value
     if edges is not None:
@@ -36,7 +36,7 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
         command=truth.command[rows],
         state=truth.state[rows],
         leds=truth.leds[rows],
-        senses=senses,
+        readings=readings,
         contact_onsets=truth.contact_onsets[arena : arena + 1],
         edges=edges,
         tally=None if tally is None else _tally_of(tally, arena),
@@ -48,14 +48,14 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
     )
 
 
-def senses_within(senses: Senses, rows: slice) -> Senses:
+def readings_within(readings: Readings, rows: slice) -> Readings:
     """The senses of these robots alone."""
-    found: Senses = {}
-    for name, group in senses.items():
+    found: Readings = {}
+    for name, group in readings.items():
         first, last = np.searchsorted(group.rows, [rows.start, rows.stop])
         if first < last:
-            columns = {sense: column[first:last] for sense, column in group.fields.items()}
-            found[name] = GroupSenses(group.rows[first:last], columns)
+            columns = {sensor: column[first:last] for sensor, column in group.fields.items()}
+            found[name] = GroupReadings(group.rows[first:last], columns)
     return found
 
 

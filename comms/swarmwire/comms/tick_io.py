@@ -135,14 +135,14 @@ NO_VALUES = Values(np.empty(0, np.int64), np.empty(0))  # nobody tells any
 
 
 @dataclass(frozen=True, slots=True)
-class GroupSenses:
+class GroupReadings:
     """The senses of the robots of one group, a row per robot."""
 
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
     fields: dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width), C-contiguous
 
 
-Senses = dict[str, GroupSenses]  # by group
+Readings = dict[str, GroupReadings]  # by group
 
 
 @dataclass(frozen=True, slots=True)

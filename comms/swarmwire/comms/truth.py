@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads, offsets
-from swarmwire.comms.tick_io import Senses
+from swarmwire.comms.tick_io import Readings
 
 NOBODY = -1  # in place of a robot; of a receiver: all that the packet was meant for
 Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side
@@ -270,7 +270,7 @@ class Truth:
     state: IntArray  # (rows,) what the agent says it is at, a place in `states`; 0: it has said nothing
     states: tuple[str, ...]  # named so far, in that order; the first is empty
     leds: IntArray  # (rows, most LEDs of a robot) 0xRRGGBB as switched in this tick; 0: dark, or not there
-    senses: Senses  # by group, of the robots that act in this tick: what they sensed at its start
+    readings: Readings  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
     tally: Tally | None  # None without a radio

@@ -38,8 +38,8 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
             if need not in of_radio:
                 text = f"{kind.__name__} needs {need!r}, which {_untold(need, scenario)}"
                 raise BadInput(where, f"robots.{name}.agent", text)
-        elif need not in body.senses:
-            text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.senses)}"
+        elif need not in body.sensors:
+            text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.sensors)}"
             raise BadInput(where, f"robots.{name}.agent", text)
     return kind
 

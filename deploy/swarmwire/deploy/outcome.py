@@ -68,7 +68,7 @@ def outcome(
         stop=tuple(parts.get("stop", ())),
         arenas=tuple(arena_result(*arena) for arena in arenas),
         events=tuple(EventResult(**event) for event in parts["events"]),
-        global_senses=_global_senses(static),
+        global_sensors=_global_sensors(static),
         counts={**counts, **_dropped_rows(record)},
         cpu=origin.cpu,
         versions=dict(origin.versions),
@@ -85,12 +85,12 @@ def outcome(
     )
 
 
-def _global_senses(static: Static) -> dict[str, list[str]]:
+def _global_sensors(static: Static) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for body in (group.body for group in static.groups):  # two of one name, by sheets of users' own, are told together
         own = found.setdefault(body.name, [])
-        own += [name for name, sheet in body.senses.items() if sheet.is_global and name not in own]
-    return {body: senses for body, senses in found.items() if senses}
+        own += [name for name, sheet in body.sensors.items() if sheet.is_global and name not in own]
+    return {body: sensors for body, sensors in found.items() if sensors}
 
 
 def _dropped_rows(record: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:

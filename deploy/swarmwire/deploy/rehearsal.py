@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
@@ -43,7 +43,7 @@ class _Extras:
         """They are ready."""
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """The same in every tick."""
         return self._actions

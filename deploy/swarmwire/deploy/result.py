@@ -95,7 +95,7 @@ class Result:
     wall_time_s: float  # of the loop
     start_time_s: float  # from the call to the first tick
     arenas: tuple[ArenaResult, ...]
-    global_senses: dict[str, list[str]]  # bodies that know more than their surroundings, and by which sense
+    global_sensors: dict[str, list[str]]  # bodies that know more than their surroundings, and by which sense
     events: tuple[EventResult, ...]  # in order
     counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
     cpu: str
@@ -161,7 +161,7 @@ class Result:
             "radio": radios[0] if one else radios,
             "metrics": metrics[0] if one else metrics,
             "events": events,
-            "global_senses": self.global_senses,
+            "global_senses": self.global_sensors,
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
             "runner_changes": [asdict(change) for change in self.runner_changes],

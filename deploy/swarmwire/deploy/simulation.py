@@ -59,7 +59,7 @@ from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.live_events import Interventions
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.bodies import bodies_of, own_code
+from swarmwire.world.scenario.bodies import bodies_of, custom_code
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
 from swarmwire.world.world import World
@@ -125,7 +125,7 @@ class Simulation:
         stops = conditions(self.scenario)
         self._stop = StopJudge(self.metrics, stops) if stops else None
         self.judge: Judge | None = self._stop
-        self.code = tuple(dict.fromkeys([*self.agents.values(), *own_code(self.world.static), *measures.code]))
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *custom_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self.inputs = replay.inputs if replay else None
@@ -345,7 +345,7 @@ class Simulation:
     def _new_world(self, seed: int | None, seeds: SeedsGiven | None) -> World:
         """Every arena at its start, with the senses that its agents need."""
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
-        needs = self._behind.senses(needs, bodies_of(self.scenario, self.scenario.source))
+        needs = self._behind.sensors(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)
 
     def _recorders(self, what: Recording, listening: Listening | None) -> Sequence[Observer]:

@@ -31,19 +31,19 @@ def body_sources() -> str:
 
 def body_keys() -> str:
     """The keys that stand in a sheet before its first table."""
-    tables = ("drive", "leds", "senses", "actuators")
+    tables = ("drive", "leds", "sensors", "actuators")
     rows = [row for row in parameter_rows(Body) if row[0].strip("`").partition(".")[0] not in tables]
     like = (code("like"), "", "a body's name", NOTHING, "Body that this one starts from.")
     return table(HEAD, [like, *rows])
 
 
 def _figures(body: Body) -> Iterator[Figure]:
-    yield from _of(body, "", skipped=("name", "source", "senses"))
+    yield from _of(body, "", skipped=("name", "source", "sensors"))
     yield "fastest ahead", "m/s", body.max_linear_mps
     yield "fastest turn", "rad/s", body.max_angular_radps
-    for name, sheet in body.senses.items():
-        yield f"senses.{name}", "", "yes"
-        yield from _of(sheet, f"senses.{name}.")
+    for name, sheet in body.sensors.items():
+        yield f"sensors.{name}", "", "yes"
+        yield from _of(sheet, f"sensors.{name}.")
 
 
 def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figure]:

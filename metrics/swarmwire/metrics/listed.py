@@ -7,8 +7,8 @@ from typing import Any
 
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.custom_metrics import own_kind
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.own_metrics import own_kind
 from swarmwire.metrics.plug_ins import plug_ins
 from swarmwire.metrics.registry import METRICS, standard
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.errors import BadInput, OwnCodeFailed
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -32,7 +32,7 @@ class Metrics:
         self.metrics = chosen(metrics)
 
     def begin(self, static: Static) -> None:
-        """Start afresh; BadInput if a metric's parameters do not go with the run, OwnCodeFailed if it raises."""
+        """Start afresh; BadInput if a metric's parameters do not go with the run, CustomCodeFailed if it raises."""
         shape = (len(self.metrics), static.arenas)
         self._static = static
         self._measures: list[Measure] = [self._begun(metric) for metric in self.metrics]
@@ -44,7 +44,7 @@ class Metrics:
         self._latest: FloatArray = np.full(shape, np.nan)
 
     def see(self, truth: Truth) -> None:
-        """Measure a tick; OwnCodeFailed names a metric that raises, or has no value per arena."""
+        """Measure a tick; CustomCodeFailed names a metric that raises, or has no value per arena."""
         moment = Moment(self._static, truth)
         value = np.empty_like(self._sum)
         for row, (metric, measure) in enumerate(zip(self.metrics, self._measures, strict=True)):
@@ -88,8 +88,8 @@ class Metrics:
         }
 
 
-def _failed(metric: Metric) -> OwnCodeFailed:
-    return OwnCodeFailed(f"the metric {metric.name} ({type(metric).__name__})", traceback.format_exc())
+def _failed(metric: Metric) -> CustomCodeFailed:
+    return CustomCodeFailed(f"the metric {metric.name} ({type(metric).__name__})", traceback.format_exc())
 
 
 @njit(cache=True)

@@ -8,8 +8,8 @@ from importlib.metadata import EntryPoint
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import entry_points_of
+from swarmwire.metrics.custom_metrics import own_kind
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.own_metrics import own_kind
 
 GROUP = "swarmwire.metrics"  # of entry points
 

@@ -19,7 +19,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.comms.wire.tick_frames import encode_tick
-from tests.support.agent.hosts import MEASURES, senses, spec
+from tests.support.agent.hosts import MEASURES, readings, spec
 from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world
 
 END = frames.encode("end", -1, {})
@@ -28,7 +28,7 @@ SHORT_S = 0.3
 
 def ticks_of(*numbers: int) -> list[bytes]:
     return [
-        encode_tick(tick, {"flock": senses(tick, [0, 1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+        encode_tick(tick, {"flock": readings(tick, [0, 1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
         for tick in numbers
     ]
 

@@ -255,7 +255,7 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
             continue
         assert not truth.alive[rows].any()
         assert np.array_equal(truth.pose[rows], last.pose[rows])
-        assert all((group.rows >= 7).all() for group in truth.senses.values())
+        assert all((group.rows >= 7).all() for group in truth.readings.values())
         assert not truth.contact_onsets[0].any()
         edges, tally, finished, departed = truth.edges, truth.tally, truth.finished, truth.departed
         assert edges is not None

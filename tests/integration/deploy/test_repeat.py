@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli import app
 from swarmwire.deploy.record.inputs import RecordedBackend
@@ -288,7 +288,7 @@ class Standing:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: TxStatuses) -> Actions:
+    def act(self, tick: int, readings: Readings, received: ReceivedPackets, outcomes: TxStatuses) -> Actions:
         return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
 
     def counts(self) -> dict[str, int]:

@@ -8,21 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from tests.support.robots.made_up_readings import readings
 from tests.support.robots.rig import Rig
 from tests.support.robots.rigs import ON_ONE_RIG, RIGS
 
 
-def with_sense(name: str) -> pytest.MarkDecorator:
+def with_sensor(name: str) -> pytest.MarkDecorator:
     """Only rigs that do not lack it."""
     return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name not in kind.lacks], indirect=True)
 
 
 def test_a_driver_gives_all_senses_but_those_that_it_is_known_to_lack(connected: Rig) -> None:
-    assert connected.driver.measures == SHEETS.keys() - connected.lacks
-    assert connected.driver.measures <= connected.body.senses.keys()
-    assert connected.driver.measures <= connected.gateway.senses
+    assert connected.driver.measures == SENSOR_SPECS.keys() - connected.lacks
+    assert connected.driver.measures <= connected.body.sensors.keys()
+    assert connected.driver.measures <= connected.gateway.sensors
 
 
 @ON_ONE_RIG
@@ -37,7 +37,7 @@ def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:
     assert connected.driver.sense(frozenset()) == {}
 
 
-@with_sense("proximity")
+@with_sensor("proximity")
 def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
     proximity = connected.body.proximity
     assert proximity is not None
@@ -47,14 +47,14 @@ def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
     assert (sensed["proximity.value"][0, ~on_the_left] < 0.1).all()
 
 
-@with_sense("compass")
+@with_sensor("compass")
 @pytest.mark.parametrize("heading_rad", [0.0, 0.5 * pi, -0.5 * pi, 3.0])
 def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig, heading_rad: float) -> None:
     sensed = connected.come_back({"compass.heading_rad": np.array([heading_rad])})
     assert sensed["compass.heading_rad"][0] == pytest.approx(heading_rad, abs=1e-5)
 
 
-@with_sense("odometry")
+@with_sensor("odometry")
 @ON_ONE_RIG
 @given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
 def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list[tuple[float, float]]) -> None:

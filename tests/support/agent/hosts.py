@@ -11,7 +11,7 @@ from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")
@@ -37,7 +37,7 @@ def assignment(*groups: GroupAssignment) -> Assignment:
     return Assignment(groups, 10, MEASURES)
 
 
-def senses(tick: int, rows: list[int], rays: int = 8) -> GroupSenses:
+def readings(tick: int, rows: list[int], rays: int = 8) -> GroupReadings:
     """What robots sense: different for each robot and tick, the same whoever else is there."""
     row = np.array(rows, np.int64)
     fields = {
@@ -46,7 +46,7 @@ def senses(tick: int, rows: list[int], rays: int = 8) -> GroupSenses:
         "odometry.left_m": 0.1 * tick + row,
         "odometry.right_m": 0.2 * tick - row,
     }
-    return GroupSenses(row, fields)
+    return GroupReadings(row, fields)
 
 
 def received_from(sent: SentPackets, receivers: list[int]) -> ReceivedPackets:
@@ -75,8 +75,8 @@ def plain(actions: Actions) -> list[Any]:
     return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads, leds]
 
 
-def one_group(tick: int, rows: list[int]) -> Senses:
-    return {"flock": senses(tick, rows)}
+def one_group(tick: int, rows: list[int]) -> Readings:
+    return {"flock": readings(tick, rows)}
 
 
 def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
@@ -88,7 +88,7 @@ def step(
     host: Hosted, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: TxStatuses = NO_TX_STATUSES
 ) -> Actions:
     """One step of the robots in these rows."""
-    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), senses(tick, rows), received, told)
+    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, told)
 
 
 def words(*senders: int) -> SentPackets:

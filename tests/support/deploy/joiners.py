@@ -17,7 +17,7 @@ from swarmwire.agent.host import layout_of
 from swarmwire.agent.runner import Inbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
@@ -161,12 +161,12 @@ class EncodedJoiners:
             self._do(*line.split())
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, outcomes: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, outcomes: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         lines = [line.split() for line in self._script.get(tick, ())]
         for _, name in (line for line in lines if line[0] == "mute"):
             del self._runners[name]
-        self._deliver(self.roster.open_tick(tick, senses, received, outcomes))
+        self._deliver(self.roster.open_tick(tick, readings, received, outcomes))
         for line in lines:
             self._do(*line)
         assert not self.roster.waiting, self.roster.missing

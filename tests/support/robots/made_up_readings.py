@@ -13,9 +13,9 @@ from tests.support.robots.rig import Fields
 _SHARE = st.floats(0.0, 1.0)
 
 
-def readings(body: Body, senses: frozenset[str]) -> st.SearchStrategy[Fields]:
+def readings(body: Body, readings: frozenset[str]) -> st.SearchStrategy[Fields]:
     """Fields of these senses, (1,) or (1, width) each; not of odometry, which cannot jump."""
-    made = [_OF[name](body) for name in sorted(senses) if name in _OF]
+    made = [_OF[name](body) for name in sorted(readings) if name in _OF]
     return st.tuples(*made).map(lambda parts: {name: value for part in parts for name, value in part.items()})
 
 
@@ -30,25 +30,25 @@ def _numbers(**of: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
 
 
 def _proximity(body: Body) -> st.SearchStrategy[Fields]:
-    sheet = body.senses["proximity"]
+    sheet = body.sensors["proximity"]
     assert isinstance(sheet, Proximity)
     return _wide("proximity.value", len(sheet.angles_deg), _SHARE)
 
 
 def _light(body: Body) -> st.SearchStrategy[Fields]:
-    sheet = body.senses["light"]
+    sheet = body.sensors["light"]
     assert isinstance(sheet, Light)
     return _wide("light.value", len(sheet.angles_deg), _SHARE)
 
 
 def _ground(body: Body) -> st.SearchStrategy[Fields]:
-    sheet = body.senses["ground"]
+    sheet = body.sensors["ground"]
     assert isinstance(sheet, GroundColour)
     return _wide("ground.shade", len(sheet.points_m), _SHARE)
 
 
 def _scan(body: Body) -> st.SearchStrategy[Fields]:
-    sheet = body.senses["scan"]
+    sheet = body.sensors["scan"]
     assert isinstance(sheet, Scan)
     ranges = st.one_of(st.floats(sheet.range_min_m, 0.999 * sheet.range_m), st.just(inf))
     return _wide("scan.range_m", sheet.rays, ranges)
@@ -60,7 +60,7 @@ def _imu(body: Body) -> st.SearchStrategy[Fields]:
 
 
 def _battery(body: Body) -> st.SearchStrategy[Fields]:
-    sheet = body.senses["battery"]
+    sheet = body.sensors["battery"]
     assert isinstance(sheet, Battery)
 
     def fields(charge: float) -> Fields:

@@ -94,13 +94,13 @@ class Rig(ABC):
     def come_back(self, fields: Fields) -> Fields:
         """What the driver senses of these readings once they have come; fails if they do not."""
         expected = {name: self.expected(name, value) for name, value in fields.items()}
-        senses = frozenset(name.partition(".")[0] for name in fields)
+        readings = frozenset(name.partition(".")[0] for name in fields)
         sensed: Fields = {}
 
         def came() -> bool:
             self.publish(fields)  # anew, as a world does: a topic may drop one
             try:
-                sensed.update(self.driver.sense(senses))
+                sensed.update(self.driver.sense(readings))
             except DriverLost:  # a machine that is busy holds up both ends, and it is found again by the next
                 return False
             return all(self.near(name, sensed[name], value) for name, value in expected.items())

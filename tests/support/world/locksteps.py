@@ -7,12 +7,12 @@ import numpy as np
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from tests.support.agent.hosts import MEASURES, assignment, group, senses
+from tests.support.agent.hosts import MEASURES, assignment, group, readings
 
 R = TypeVar("R", Lockstep, RealTime)
 GROUPS = {"flock", "scouts", "lone"}
@@ -61,8 +61,8 @@ def playing() -> Lockstep:
     return ready(joined(two(), "a", "b"), "a", "b")
 
 
-def all_senses(tick: int = 0) -> Senses:
-    return {"flock": senses(tick, FLOCK), "scouts": senses(tick, SCOUTS), "lone": senses(tick, [3, 7])}
+def all_readings(tick: int = 0) -> Readings:
+    return {"flock": readings(tick, FLOCK), "scouts": readings(tick, SCOUTS), "lone": readings(tick, [3, 7])}
 
 
 def actions(rows: list[int]) -> Actions:

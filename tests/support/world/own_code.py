@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.world.custom import Field, Noise, OwnActuator, OwnSensor, parameter
+from swarmwire.world.custom import CustomActuator, CustomSensor, Field, Noise, parameter
 
 
 @dataclass
-class Paint(OwnSensor):
+class Paint(CustomSensor):
     """How far the robot's painter has got, and its tick in three cells."""
 
     scale: float = parameter(1.0, help="by which what is told is multiplied", above=0)
@@ -33,7 +33,7 @@ class Paint(OwnSensor):
 
 
 @dataclass
-class Painter(OwnActuator):
+class Painter(CustomActuator):
     """Adds up what it is set to; set to a negative first number it stops the robot."""
 
     gain: float = parameter(1.0, help="of what is added", above=0)
@@ -51,7 +51,7 @@ class Painter(OwnActuator):
 
 
 @dataclass(frozen=True)
-class Frozen(OwnSensor):
+class Frozen(CustomSensor):
     """Cannot be told its scene."""
 
     @property
@@ -63,7 +63,7 @@ class Frozen(OwnSensor):
 
 
 @dataclass
-class Alone(OwnSensor):
+class Alone(CustomSensor):
     """A single field needs no tuple."""
 
     @property
@@ -111,7 +111,7 @@ class TellsNan(Alone):
 
 
 @dataclass
-class NoTruth(OwnSensor):
+class NoTruth(CustomSensor):
     @property
     def fields(self) -> Any:
         return (Field("x"),)
@@ -163,13 +163,13 @@ class TooWide(Painter):
 
 
 @dataclass
-class Breaks(OwnActuator):
+class Breaks(CustomActuator):
     def act(self, tick: int, rows: Any, values: Any) -> None:
         raise RuntimeError("jammed")
 
 
 @dataclass
-class Bursts(OwnActuator):
+class Bursts(CustomActuator):
     """Writes what is not finite to where robot 1 reads what it should do, or to its charge."""
 
     where: str = parameter(help="target or charge")
@@ -181,7 +181,7 @@ class Bursts(OwnActuator):
 
 
 @dataclass
-class Flashes(OwnActuator):
+class Flashes(CustomActuator):
     """Switches the first LED of whoever sets it."""
 
     def act(self, tick: int, rows: Any, values: Any) -> None:

@@ -30,8 +30,8 @@ SAMPLE: dict[str, Any] = {
     },
     "radio": {"range_m": 2.0, "loss": 0.3, "measures": {"range": {"noise_m": 0.02}, "bearing": {}}},
 }
-SENSES = ("proximity", "compass", "odometry", "light", "bumper")
-ALL_SENSES = {"flock": SENSES, "big": SENSES}
+SENSORS = ("proximity", "compass", "odometry", "light", "bumper")
+ALL_SENSORS = {"flock": SENSORS, "big": SENSORS}
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:

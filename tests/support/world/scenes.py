@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import Sheet
+from swarmwire.comms.bodies.sensors import SensorSpec
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle
@@ -44,12 +44,12 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
     )
 
 
-def staged(looked_at: Scene, body: Body, name: str, sheet: Sheet) -> Staged:
+def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> Staged:
     """A sense of all robots of a scene, by this sheet, with all its stages."""
     group = Group("a", body, 0, looked_at.state.shape[1])
-    return Staged(name, SENSORS[name](looked_at, group, sheet), sheet, looked_at.keys, group, looked_at.tick_s)
+    return Staged(name, SENSORS[name](looked_at, group, spec), spec, looked_at.keys, group, looked_at.tick_s)
 
 
-def read(looked_at: Scene, body: Body, name: str, sheet: Sheet, tick: int = 0) -> dict[str, FloatArray]:
+def read(looked_at: Scene, body: Body, name: str, spec: SensorSpec, tick: int = 0) -> dict[str, FloatArray]:
     """What the robots of a scene read in a tick."""
-    return staged(looked_at, body, name, sheet).read(tick)
+    return staged(looked_at, body, name, spec).read(tick)

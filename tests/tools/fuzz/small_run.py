@@ -11,7 +11,7 @@ from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import Host, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, Notes, Senses, Values
+from swarmwire.comms.tick_io import Actions, Actuations, Notes, Readings, Values
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
@@ -81,7 +81,7 @@ class SmallRun:
         self.whole = whole(scenario, self.world.static, agents)
         self.parts: Sequence[Assignment] = split(self.whole, len(RUNNERS))
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}
-        self.senses: Senses = {}
+        self.readings: Readings = {}
         self.received = ReceivedPackets.none()
         self.tx_status: TxStatuses = NO_TX_STATUSES
         self.frames: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
@@ -97,12 +97,12 @@ class SmallRun:
         return self.loop.step()
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         if self.given is not None:
             return self.given
-        self.senses, self.received, self.tx_status = senses, received, tx_status
-        for runner, data in self._roster.open_tick(tick, senses, received, tx_status):
+        self.readings, self.received, self.tx_status = readings, received, tx_status
+        for runner, data in self._roster.open_tick(tick, readings, received, tx_status):
             self.frames[runner].append(data)
             answer = self._answer(runner, data)
             self.answers[runner].append(answer)
@@ -115,9 +115,9 @@ class SmallRun:
 
     def _answer(self, runner: str, data: bytes) -> bytes:
         host, frame = self._hosts[runner], frame_codec.decode(data)
-        senses, received, tx_status = decode_tick(frame, self.whole.measures or (), senses_of(self.parts, runner))
-        actions = host.act(frame.tick, senses, received, tx_status)
-        return encode_actions(frame.tick, with_all(actions), memory=host.memory(senses))
+        readings, received, tx_status = decode_tick(frame, self.whole.measures or (), readings_of(self.parts, runner))
+        actions = host.act(frame.tick, readings, received, tx_status)
+        return encode_actions(frame.tick, with_all(actions), memory=host.memory(readings))
 
 
 @cache
@@ -145,6 +145,6 @@ def with_all(actions: Actions) -> Actions:
     return replace(actions, notes=note, own=own, values=Values(one, np.array([1.5])))
 
 
-def senses_of(parts: Sequence[Assignment], runner: str) -> set[str]:
+def readings_of(parts: Sequence[Assignment], runner: str) -> set[str]:
     """The groups of a runner's robots."""
     return {group.name for group in parts[RUNNERS.index(runner)].groups}

@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.run_views import Glimpse, Scene
-from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Values
+from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Values
 from swarmwire.comms.truth import Finished, Happened, Tally, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
@@ -65,7 +65,7 @@ def text() -> str:
         "join, asked": _map(JoinRequest(1, None, {"*": "a"}, "a").encode(), JoinRequest(None, ("a",)).encode()),
         "join, answered": lines_of(paths_of({**_assignment().as_mapping(), "v": frames.VERSION, "memory": b""})),
         "offer, answered": _map(_offer(1.0).encode(), _offer(None).encode()),
-        "tick": _frame(encode_tick(1, _senses(), _received(), TxStatuses(*_ints(3, OUTCOMES)))),
+        "tick": _frame(encode_tick(1, _readings(), _received(), TxStatuses(*_ints(3, OUTCOMES)))),
         "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
         "packets": _frame(encode_packets(1, 1, 1, _received(), TxStatuses(*_ints(3, OUTCOMES)))),
         "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
@@ -104,8 +104,8 @@ def _floats(*shape: int) -> Any:
     return np.zeros(shape)
 
 
-def _senses() -> dict[str, GroupSenses]:
-    return {"GROUP": GroupSenses(_ints(TOLD_OF), {"SENSE.FIELD": _floats(TOLD_OF, WIDE)})}
+def _readings() -> dict[str, GroupReadings]:
+    return {"GROUP": GroupReadings(_ints(TOLD_OF), {"SENSE.FIELD": _floats(TOLD_OF, WIDE)})}
 
 
 def _received() -> ReceivedPackets:
@@ -157,7 +157,7 @@ def _glimpse() -> Glimpse:
         state=_ints(rows),
         states=("",),
         leds=_ints(rows, LEDS),
-        senses=_senses(),
+        readings=_readings(),
         contact_onsets=_ints(ARENAS, 2),
         edges=_ints(EDGES, 2),
         tally=Tally(*_ints(3, ARENAS), _ints(ARENAS, len(Fate))),

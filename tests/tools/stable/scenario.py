@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import ActuatorSheet
+from swarmwire.comms.bodies.custom import CustomActuatorSpec
 from swarmwire.comms.bodies.drives import DRIVES, Leds
-from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.entry import Parameter
 from swarmwire.deploy.catalogue.scenario_keys import all_keys
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
@@ -14,8 +14,8 @@ from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 def text() -> str:
     """A key a line, by its path; a body's sheet after the scenario."""
     tables = {f"drive, kind = {name}": kind for name, kind in DRIVES.items()}
-    tables |= {"leds": Leds, "actuators.*": ActuatorSheet}
-    tables |= {f"senses.{name}": kind for name, kind in SHEETS.items()}
+    tables |= {"leds": Leds, "actuators.*": CustomActuatorSpec}
+    tables |= {f"sensors.{name}": kind for name, kind in SENSOR_SPECS.items()}
     of_body = (of for of in parameters_of_dataclass(Body) if of.name.partition(".")[0] not in ("drive", "leds"))
     parts = ["# a scenario", *_lines(all_keys()), "# a body's sheet", *_lines(of_body)]
     for title, kind in tables.items():

@@ -14,18 +14,18 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import Actions
-from tests.support.agent.hosts import MEASURES, group, senses
+from tests.support.agent.hosts import MEASURES, group, readings
 
 ROWS = [1, 4, 6]
 EPUCK_BASE_M = 0.053
 FLOATING = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
 
 
-def acted(kind: type[Any], **sheet: Any) -> Actions:
+def acted(kind: type[Any], **spec: Any) -> Actions:
     """What three robots of this body do in their first step."""
-    body = body_from({"like": "epuck", "name": "mine", **sheet}, "mine.toml")
+    body = body_from({"like": "epuck", "name": "mine", **spec}, "mine.toml")
     host = hosted(replace(group("", ROWS), body=body), kind)
-    return host.act((0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(MEASURES))
+    return host.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
 def single(does: Callable[[Robot], None]) -> type[Agent]:
@@ -103,7 +103,7 @@ def test_a_body_without_leds_says_so() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
     with pytest.raises(AgentFailed, match="NotFitted: the body epuck has no LEDs"):
         hosted(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
-            (0, 0, 100_000_000), senses(0, ROWS), ReceivedPackets.none(MEASURES)
+            (0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES)
         )
 
 

@@ -13,7 +13,7 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from tests.support.agent.hosts import group
 
 FOOTBOT = load_body("footbot")
@@ -46,7 +46,7 @@ def command(
     received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
     fields = {"proximity.value": value[None, :], "compass.heading_rad": np.array([heading])}
     host = hosted(group("", [0], body="footbot", params=dict(params)), kind)
-    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received)
+    actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received)
     assert actions.drive.all()
     return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

@@ -65,11 +65,11 @@ def test_the_mean_is_over_the_packets_of_each_robot_and_nothing_without_any() ->
 
 
 def test_rays_push_away_from_what_answers() -> None:
-    sheet = load_body("epuck").proximity
-    assert sheet is not None
+    spec = load_body("epuck").proximity
+    assert spec is not None
     value = np.zeros((2, 8))
     value[1, 1] = 0.5  # at 50 degrees
-    away = repulsion_of_rays(ProximityReading(value, sheet))
+    away = repulsion_of_rays(ProximityReading(value, spec))
     assert away.length.tolist() == pytest.approx([0.0, 0.5])
     assert away.angle_rad[1] == pytest.approx(np.deg2rad(-130.0))
 

@@ -8,7 +8,7 @@ from swarmwire.agent.host import Host, _Single
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
-from tests.support.agent.hosts import SILENCE, assignment, group, received_from, senses, spec, words
+from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, spec, words
 from tests.support.agent.players import Word
 
 
@@ -20,7 +20,7 @@ def numbers(sent: SentPackets) -> list[tuple[int, float]]:
 
 def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> Host:
     host = Host(assignment(group(spec(agent), rows, name)))
-    host.act(tick, {name: senses(tick, rows)}, SILENCE)
+    host.act(tick, {name: readings(tick, rows)}, SILENCE)
     return host
 
 
@@ -31,7 +31,7 @@ def test_a_packet_is_received_between_steps_or_in_the_next_and_never_in_both(age
     assert numbers(host.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
     assert numbers(host.on_receive(0, 20)) == []
     host.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
-    assert numbers(host.act(1, {"flock": senses(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
+    assert numbers(host.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
     assert numbers(host.on_receive(1, 30)) == []
 
 
@@ -40,7 +40,7 @@ def test_packets_wait_for_the_step_of_those_that_hear_only_then() -> None:
     host.receive(received_from(words(7), [0]), NO_TX_STATUSES)
     assert len(host.on_receive(0, 10)) == 0
     assert host._waiting is not None
-    host.act(1, {"flock": senses(1, [0, 1])}, SILENCE)
+    host.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
     assert not host._waiting
 
 
@@ -48,23 +48,23 @@ def test_whoever_has_not_stepped_yet_hears_in_its_first_step() -> None:
     host = Host(assignment(group(spec("Echo"), [0, 1])))
     host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert len(host.on_receive(0, 10)) == 0
-    assert numbers(host.act(0, {"flock": senses(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
+    assert numbers(host.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
 
 
 def test_the_dead_hear_nothing_and_what_waits_for_them_is_lost() -> None:
     host = stepped("Echo", [0, 1])
-    host.act(1, {"flock": senses(1, [1])}, SILENCE)
+    host.act(1, {"flock": readings(1, [1])}, SILENCE)
     host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert numbers(host.on_receive(1, 10)) == [(1, 1.0)]
-    host.act(2, {"flock": senses(2, [1])}, SILENCE)
-    assert numbers(host.act(3, {"flock": senses(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
+    host.act(2, {"flock": readings(2, [1])}, SILENCE)
+    assert numbers(host.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
 
 
 def test_packets_of_a_group_that_does_not_act_now_wait_for_it() -> None:
     host = Host(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
     host.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
-    host.act(0, {"often": senses(0, [0])}, SILENCE)
-    assert numbers(host.act(1, {"seldom": senses(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
+    host.act(0, {"often": readings(0, [0])}, SILENCE)
+    assert numbers(host.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
 
 
 def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() -> None:
@@ -77,14 +77,14 @@ def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() ->
             told.append((robot.radio.send(Word(number=1.0), to=9), -1))
 
         def on_receive(self, robot: Robot) -> None:
-            assert robot.compass.heading_rad == float(senses(0, [3]).fields["compass.heading_rad"][0])
+            assert robot.compass.heading_rad == float(readings(0, [3]).fields["compass.heading_rad"][0])
             assert robot.time_s == 0.02
             for tx_status in robot.radio.tx_status:
                 told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
     host = stepped("Counter", [3])
     host._groups["flock"] = _Single(group("", [3]), Insistent)
-    host.act(0, {"flock": senses(0, [3])}, SILENCE)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
     for id_ in (0, 1):
         host.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
         assert len(host.on_receive(0, 20_000_000)) == 1
@@ -103,7 +103,7 @@ def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
 
     host = stepped("Counter", [3])
     host._groups["flock"] = _Single(group("", [3]), Drawing)
-    host.act(0, {"flock": senses(0, [3])}, SILENCE)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
     for at_ns in (10, 20):
         host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
         host.on_receive(0, at_ns)
@@ -121,7 +121,7 @@ def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str
 
     host = stepped("Counter", [3])
     host._groups["flock"] = _Single(group("", [3]), Doing)
-    host.act(0, {"flock": senses(0, [3])}, SILENCE)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
     host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
     with pytest.raises(AgentFailed, match="flock-3") as caught:
         host.on_receive(0, 10)
@@ -133,6 +133,6 @@ def test_a_crew_in_this_process_hands_on_what_its_agents_may_not_write_to() -> N
     with pytest.raises(RuntimeError, match="has not been started"):
         backend.on_receive(0, 0)
     backend.start()
-    backend.act(0, {"flock": senses(0, [0, 1])}, SILENCE)
+    backend.act(0, {"flock": readings(0, [0, 1])}, SILENCE)
     backend.receive(received_from(words(1), [0]), NO_TX_STATUSES)
     assert numbers(backend.on_receive(0, 10)) == [(0, 1.0)]

@@ -22,8 +22,8 @@ from tests.support.agent.hosts import (
     host_of,
     one_group,
     plain,
+    readings,
     received_from,
-    senses,
     spec,
     step,
     words,
@@ -49,24 +49,24 @@ READS = {
 
 
 @pytest.mark.parametrize("sense", sorted(READS))
-def test_a_sense_that_was_not_declared_cannot_be_read(sense: str) -> None:
+def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
     class Reads(Agent):
-        needs = tuple(READS.keys() - {sense})
+        needs = tuple(READS.keys() - {sensor})
 
         def step(self, robot: Robot) -> None:
-            READS[sense](robot)
+            READS[sensor](robot)
 
     class Rows(VectorAgent):
         needs = Reads.needs
 
         def step(self, robots: Robots, state: State) -> None:
-            READS[sense](robots)
+            READS[sensor](robots)
 
     single, vector = failure(Reads), failure(Rows)
     assert single.robots == "flock-2"
     assert vector.robots == "flock-2, flock-5"
     for error in (single, vector):
-        assert f"NotDeclared: reads '{sense}', which its needs do not name" in error.traceback
+        assert f"NotDeclared: reads '{sensor}', which its needs do not name" in error.traceback
         assert re.search(r"test_host\.py.*in step", error.traceback)
 
 
@@ -83,7 +83,7 @@ def test_declared_senses_are_those_of_the_robot_itself() -> None:
             assert (robot.time_s, robot.period_s, robot.body.name) == (0.4, 0.1, "epuck")
 
     once(Reads, [2, 5], tick=4)
-    fields = senses(4, [2, 5]).fields
+    fields = readings(4, [2, 5]).fields
     columns = (fields["proximity.value"][:, 3], *(fields[n] for n in list(fields)[1:]))
     assert seen == list(zip(*(column.tolist() for column in columns), strict=True))
 

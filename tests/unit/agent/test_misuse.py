@@ -11,7 +11,7 @@ from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import hosted
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets, SentPackets
-from tests.support.agent.hosts import group, received_from, senses
+from tests.support.agent.hosts import group, readings, received_from
 from tests.support.agent.players import Word
 
 TIME = (3, 300_000_000, 100_000_000)
@@ -21,9 +21,9 @@ NOTHING: ReceivedPackets = received_from(SentPackets.none(), [])
 def failure(kind: AgentClass, steps: int = 1) -> str:
     host = hosted(group("", [0, 1, 2]), kind)
     for _ in range(steps - 1):
-        host.act(TIME, senses(3, [0, 1, 2]), NOTHING)
+        host.act(TIME, readings(3, [0, 1, 2]), NOTHING)
     with pytest.raises(AgentFailed) as caught:
-        host.act(TIME, senses(3, [0, 1, 2]), NOTHING)
+        host.act(TIME, readings(3, [0, 1, 2]), NOTHING)
     return str(caught.value)
 
 

@@ -11,11 +11,11 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.custom import ActuatorSheet
-from swarmwire.comms.bodies.sensors import Battery, Imu, OwnSheet
+from swarmwire.comms.bodies.custom import CustomActuatorSpec
+from swarmwire.comms.bodies.sensors import Battery, CustomSensorSpec, Imu
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
-from tests.support.agent.hosts import MEASURES, group, senses
+from tests.support.agent.hosts import MEASURES, group, readings
 
 
 class Moth(Agent):
@@ -133,10 +133,10 @@ def test_one_robot_and_many_read_the_same() -> None:
 
 
 @pytest.mark.parametrize("sense", ["light", "bumper", "positioning"])
-def test_a_sense_that_is_not_declared_is_refused(sense: str) -> None:
+def test_a_sense_that_is_not_declared_is_refused(sensor: str) -> None:
     class Peeks(VectorAgent):
         def step(self, robots, state) -> None:
-            getattr(robots, sense)
+            getattr(robots, sensor)
 
     with pytest.raises(AgentFailed, match="NotDeclared"):
         assert_rows_independent(Peeks, Trial(body="epuck-gps"))
@@ -145,13 +145,13 @@ def test_a_sense_that_is_not_declared_is_refused(sense: str) -> None:
 EPUCK = load_body("epuck")
 BODY = replace(
     EPUCK,
-    senses={
-        **EPUCK.senses,
-        "gas": OwnSheet(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
+    readings={
+        **EPUCK.readings,
+        "gas": CustomSensorSpec(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
         "imu": Imu(),
         "battery": Battery(capacity_wh=1.0),
     },
-    actuators={"horn": ActuatorSheet("a:C", {}, 1), "arm": ActuatorSheet("a:D", {}, 3)},
+    actuators={"horn": CustomActuatorSpec("a:C", {}, 1), "arm": CustomActuatorSpec("a:D", {}, 3)},
 )
 TRIAL = Trial(body=BODY)
 
@@ -162,7 +162,7 @@ class Sniffer(Agent):
     needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
 
     def step(self, robot) -> None:
-        gas, imu = robot.sense("gas"), robot.imu
+        gas, imu = robot.sensor("gas"), robot.imu
         assert type(gas.level) is type(imu.turn_radps) is type(robot.battery.charge) is float
         assert gas.cells.shape == (3,)
         robot.drive(0.01 * gas.level * robot.battery.voltage_v, imu.forward_mps2 + imu.left_mps2 + imu.turn_radps)
@@ -177,7 +177,7 @@ class VectorSniffer(VectorAgent):
     needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
 
     def step(self, robots, state) -> None:
-        gas, imu = robots.sense("gas"), robots.imu
+        gas, imu = robots.sensor("gas"), robots.imu
         assert gas.cells.shape == (robots.n, 3)
         turn = imu.forward_mps2 + imu.left_mps2 + imu.turn_radps
         robots.drive(0.01 * gas.level * robots.battery.voltage_v, turn)
@@ -193,8 +193,8 @@ def test_one_robot_and_many_do_the_same() -> None:
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda robots: robots.sense("gas").colour, "the sense gas has the fields level, cells, not colour"),
-        (lambda robots: robots.sense("compass"), "NotDeclared"),
+        (lambda robots: robots.sensor("gas").colour, "the sense gas has the fields level, cells, not colour"),
+        (lambda robots: robots.sensor("compass"), "NotDeclared"),
         (lambda robots: robots.actuate("leg", 1.0), "NotFitted.* no actuator 'leg' of its own: it has horn, arm"),
         (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
@@ -253,7 +253,7 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
 
         rows = [2, 3, 5]
         host = hosted(replace(group("", rows), body=BODY), Some)
-        own = host.act((0, 0, 100_000_000), senses(0, rows), ReceivedPackets.none(MEASURES)).own
+        own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).own
         return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
 
     arm = [1.0, 2.0, 3.0]

@@ -15,7 +15,7 @@ from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, Receive
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import MEASURES, assignment, group, received_from, senses
+from tests.support.agent.hosts import MEASURES, assignment, group, readings, received_from
 
 
 @dataclass
@@ -39,7 +39,7 @@ def inbox_of(*arrived: Any) -> Inbox:
 
 
 def tick(number: int) -> bytes:
-    return encode_tick(number, {"flock": senses(number, [0])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+    return encode_tick(number, {"flock": readings(number, [0])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
 
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
@@ -51,8 +51,8 @@ def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted()
     ticks = inbox.ticks(ASSIGNMENT)
     assert next(ticks)[0] == 2
     assert inbox.dropped == 2
-    strange = encode_tick(9, {"others": senses(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
-    of_others = encode_tick(9, {"flock": senses(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+    strange = encode_tick(9, {"others": readings(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+    of_others = encode_tick(9, {"flock": readings(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
     for data in (tick(2), tick(1), b"\xc1", strange, of_others, tick(3), tick(5), tick(4)):
         inbox.put_frame(Sample(Bytes(data)))
     assert next(ticks)[0] == 5

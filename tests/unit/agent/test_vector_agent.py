@@ -25,7 +25,7 @@ from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of
 from swarmwire.comms.packets import ReceivedPackets
-from tests.support.agent.hosts import group, senses
+from tests.support.agent.hosts import group, readings
 from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
 
 rows_ = st.lists(st.integers(0, 9), unique=True).map(sorted)
@@ -149,7 +149,7 @@ class Lanes(VectorAgent):
 
 def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
     host = hosted(group("", rows, params=params), Lanes)
-    actions = host.act((0, 0, 10**8), senses(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
+    actions = host.act((0, 0, 10**8), readings(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
     assert len(actions.linear_mps) == len(acting)
     return actions.angular_radps.tolist()
 

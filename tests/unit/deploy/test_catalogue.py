@@ -13,7 +13,7 @@ from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
-from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.config import limits_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
@@ -37,7 +37,7 @@ EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for k
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 HELD = {
     "bodies": [*body_names()],
-    "senses": [*SHEETS, *(f"radio.{of.name}" for of in fields(Measures)), OUTCOMES],
+    "sensors": [*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures)), OUTCOMES],
     "behaviours": behaviours.__all__,
     "drives": [*DRIVES],
     "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],
@@ -46,7 +46,7 @@ HELD = {
     "stages": [kind.name for kind in ORDER],
     "fates": [*FATE_NAMES],
 }
-REGISTRIES = {"drive": DRIVES, "sense": SHEETS, "event": EVENTS, "metric": METRICS}
+REGISTRIES = {"drive": DRIVES, "sense": SENSOR_SPECS, "event": EVENTS, "metric": METRICS}
 CLASSES: dict[str, Any] = {
     "radio": Radio,
     "leds": Leds,
@@ -144,7 +144,10 @@ def test_a_behaviour_tells_its_needs_and_parameters(name):
 def test_a_body_tells_the_figures_of_its_sheet(name):
     body, text = load_body(name), printed(find(f"body:{name}"))
     assert all(part in text for part in (body.source, f"{body.radius_m}", f"{body.max_linear_mps:.4g} m/s"))
-    for title, sheet in [("drive", body.drive), *((f"sense: {sense}", body.senses[sense]) for sense in body.senses)]:
+    for title, sheet in [
+        ("drive", body.drive),
+        *((f"sense: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
+    ]:
         plain = [of for of in fields(sheet) if not is_dataclass(getattr(sheet, of.name))]
         figures = [(of.name, limits_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
         assert_tells(text[text.index(f"\n{title}\n") :], figures)
@@ -226,7 +229,7 @@ def test_a_name_of_nothing_or_of_several_things_is_refused_with_what_to_try(aske
 
 
 def test_a_body_and_an_agent_of_ones_own_are_described_as_those_that_come_along(tmp_path, monkeypatch):
-    (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[senses.proximity]\nnoise = 0.25\n')
+    (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[sensors.proximity]\nnoise = 0.25\n')
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
     of = [[value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")]

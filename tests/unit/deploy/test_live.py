@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy.commands.view import view_command
 from swarmwire.deploy.live import viewer_program
 from swarmwire.deploy.live.evened import Evened
@@ -21,13 +21,15 @@ VIEWER = pytest.mark.skipif(find_spec("rerun") is None, reason="needs the extra 
 
 def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets():
     of = static(300)
-    senses = {"flock": GroupSenses(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
-    full = truth(of, edges=edges((0, 1)), senses=senses, finished=finished([0] * 2001, [1] * 2001))
+    sensors = {"flock": GroupReadings(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
+    full = truth(of, edges=edges((0, 1)), sensors=sensors, finished=finished([0] * 2001, [1] * 2001))
     sampling, values = Sampling(of, 0, of.robot_names[7]), np.zeros((1, 1))
     shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
     assert sum(glimpse.edges is not None for glimpse in shown) == 5
     assert (
-        shown[0].senses["flock"].rows.tolist() == shown[0].senses["flock"].fields["compass.heading_rad"].tolist() == [7]
+        shown[0].sensors["flock"].rows.tolist()
+        == shown[0].sensors["flock"].fields["compass.heading_rad"].tolist()
+        == [7]
     )
     assert shown[0].finished is None
     few = finished([0] * 2000, [1] * 2000)

@@ -125,7 +125,7 @@ def test_senses_of_light_touch_and_place_are_alike_in_every_layout_and_global_on
     (tmp_path / "seeker.py").write_text(SEEKER)
     (tmp_path / "lit.toml").write_text(LIT)
     alone = run(tmp_path / "lit.toml", seed=2)
-    assert alone.global_senses == {"epuck-gps": ["compass", "positioning"]}
+    assert alone.global_sensors == {"epuck-gps": ["compass", "positioning"]}
     assert run_spread(tmp_path / "lit.toml", 3, seed=2).trajectory_sha256 == alone.trajectory_sha256
     many = run(tmp_path / "lit.toml", seeds=[1, 2])
     assert many.arenas[1].trajectory_sha256 == alone.arenas[0].trajectory_sha256
@@ -134,8 +134,8 @@ def test_senses_of_light_touch_and_place_are_alike_in_every_layout_and_global_on
 def test_groups_of_one_body_whose_sheets_the_scenario_changes_do_not_hide_each_others_global_senses(tmp_path):
     (tmp_path / "seeker.py").write_text(SEEKER)
     stones = 'body = "kilobot"\ncount = 2\nagent = "seeker.py:Stone"\n'
-    placed = f"[robots.placed]\n{stones}sheet.senses.positioning = {{}}\n"
+    placed = f"[robots.placed]\n{stones}sheet.sensors.positioning = {{}}\n"
     heavy = f"[robots.heavy]\n{stones}sheet.mass_kg = 1.0\n"
     (tmp_path / "stones.toml").write_text(LIT[: LIT.index("[robots.moths]")] + placed + heavy)
     result = run(tmp_path / "stones.toml", overrides=["duration_s=0.1"])
-    assert result.global_senses == {"kilobot of placed": ["positioning"]}
+    assert result.global_sensors == {"kilobot of placed": ["positioning"]}

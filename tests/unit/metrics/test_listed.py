@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput, OwnCodeFailed
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.metrics.custom_metrics import own_kind
 from swarmwire.metrics.listed import Item, listed
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.own_metrics import own_kind
 from swarmwire.metrics.plug_ins import GROUP, PlugIn, plug_ins
 from swarmwire.metrics.registry import METRICS, standard
 from tests.support.metrics.packages import CODE, install
@@ -229,7 +229,7 @@ def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
 
 @pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
 def test_one_that_fails_is_named(kind, said):
-    with pytest.raises(OwnCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
+    with pytest.raises(CustomCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
         _measure(kind())
 
 

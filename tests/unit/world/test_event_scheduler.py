@@ -10,7 +10,7 @@ from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.loop import Loop
@@ -42,8 +42,8 @@ class Ahead:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        rows = np.concatenate([group.rows for group in senses.values()])
+    def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
+        rows = np.concatenate([group.rows for group in readings.values()])
         self.rows.append(rows.tolist())
         n = len(rows)
         return Actions(rows, np.ones(n, np.bool_), np.full(n, self.linear_mps), *np.zeros((2, n)))

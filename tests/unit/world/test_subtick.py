@@ -11,7 +11,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.new_air import new_air
 from swarmwire.world.loop import Loop
@@ -137,12 +137,12 @@ class Sender:
         """Ready."""
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         raise AssertionError("a backend that takes its time is asked in time")
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
@@ -207,7 +207,7 @@ class FromBoth(Sender):
     """Robot 0 of each arena sends late in each tick, also where the arena is over."""
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):

@@ -8,11 +8,11 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import Actions
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import ALL_SENSES, SAMPLE, changed, commanded, posed, wandering
+from tests.support.world.samples import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
 
 
 def sample_world(*seeds: int) -> World:
-    return World(scenario_from(SAMPLE, "f"), seeds, ALL_SENSES)
+    return World(scenario_from(SAMPLE, "f"), seeds, ALL_SENSORS)
 
 
 def test_an_arena_runs_alike_alone_and_beside_seven_others() -> None:
@@ -20,16 +20,16 @@ def test_an_arena_runs_alike_alone_and_beside_seven_others() -> None:
     alone = [sample_world(seed) for seed in (2, 7)]
     robots = many.static.robots
     for tick in range(60):
-        senses = many.sense(tick)
+        readings = many.sense(tick)
         onsets = many.move(wandering(many, tick))
         for world, arena in zip(alone, (2, 7), strict=True):
             rows = slice(arena * robots, (arena + 1) * robots)
             for group, own in world.sense(tick).items():
-                of_arena = senses[group].rows // robots == arena
-                assert np.array_equal(senses[group].rows[of_arena] - arena * robots, own.rows)
-                assert own.fields.keys() == senses[group].fields.keys()
+                of_arena = readings[group].rows // robots == arena
+                assert np.array_equal(readings[group].rows[of_arena] - arena * robots, own.rows)
+                assert own.fields.keys() == readings[group].fields.keys()
                 for field, values in own.fields.items():
-                    assert np.array_equal(senses[group].fields[field][of_arena], values), (field, tick)
+                    assert np.array_equal(readings[group].fields[field][of_arena], values), (field, tick)
             assert np.array_equal(world.move(wandering(world, tick))[0], onsets[arena])
             assert np.array_equal(world.pose, many.pose[rows])
             assert np.array_equal(world.velocity, many.velocity[rows])
@@ -45,10 +45,10 @@ def test_contacts_happen_in_that_run() -> None:
 
 def test_senses_have_a_row_per_robot_of_the_group_over_all_arenas() -> None:
     world = sample_world(1, 2)
-    senses = world.sense(0)
-    assert senses["flock"].rows.tolist() == [*range(12), *range(15, 27)]
-    assert senses["big"].rows.tolist() == [12, 13, 14, 27, 28, 29]
-    shapes = {name: field.shape for name, field in senses["big"].fields.items()}
+    readings = world.sense(0)
+    assert readings["flock"].rows.tolist() == [*range(12), *range(15, 27)]
+    assert readings["big"].rows.tolist() == [12, 13, 14, 27, 28, 29]
+    shapes = {name: field.shape for name, field in readings["big"].fields.items()}
     assert shapes == {
         "proximity.value": (6, 24),
         "compass.heading_rad": (6,),
@@ -57,7 +57,7 @@ def test_senses_have_a_row_per_robot_of_the_group_over_all_arenas() -> None:
         "light.value": (6, 24),
         "bumper.pressed": (6,),
     }
-    for name, field in senses["flock"].fields.items():
+    for name, field in readings["flock"].fields.items():
         assert field.flags.c_contiguous, name
         assert field.dtype == np.float64, name
 
@@ -65,9 +65,9 @@ def test_senses_have_a_row_per_robot_of_the_group_over_all_arenas() -> None:
 def test_only_what_is_needed_is_sensed() -> None:
     scenario = scenario_from(SAMPLE, "f")
     world = World(scenario, [1], {"flock": ("compass", "radio.range"), "big": ()})
-    senses = world.sense(0)
-    assert list(senses["flock"].fields) == ["compass.heading_rad"]
-    assert senses["big"].fields == {}
+    readings = world.sense(0)
+    assert list(readings["flock"].fields) == ["compass.heading_rad"]
+    assert readings["big"].fields == {}
 
 
 def test_a_sense_that_the_body_lacks_is_refused() -> None:

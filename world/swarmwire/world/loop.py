@@ -12,7 +12,7 @@ from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBacke
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.world.event_scheduler import Events
 from swarmwire.world.live_events import Interventions
@@ -121,8 +121,8 @@ class Loop:
         self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.air)
         news, packets, tx_status = self._receive(start_ns)
-        senses = world.sense(tick)
-        actions = self._act(start_ns, senses, packets, tx_status)
+        readings = world.sense(tick)
+        actions = self._act(start_ns, readings, packets, tx_status)
         received = news.received if news else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
         onsets = world.move(actions)
@@ -142,7 +142,7 @@ class Loop:
             state=world.states.code,
             states=world.states.names,
             leds=world.actuators.leds.told,
-            senses=senses,
+            readings=readings,
             contact_onsets=onsets,
             edges=edges,
             tally=tally,
@@ -212,14 +212,14 @@ class Loop:
         tx_status = self._mailbox.hand_over_tx_status(tick, news.tx_status if news else NO_TX_STATUSES, alive)
         return news, packets, tx_status
 
-    def _act(self, start_ns: int, senses: Senses, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
+    def _act(self, start_ns: int, readings: Readings, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         """What the robots do in a tick; what they send is the air's."""
         world, tick = self.world, self.ticks_done
         if self.air:
             self.air.hold(world.pose, world.alive.copy())
         if self._timed and self._in_time:
-            return self._timed.act_in_time(tick, senses, packets, tx_status, self._in_time)
-        actions = self.backend.act(tick, senses, packets, tx_status)
+            return self._timed.act_in_time(tick, readings, packets, tx_status, self._in_time)
+        actions = self.backend.act(tick, readings, packets, tx_status)
         if self.air:
             self.air.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):

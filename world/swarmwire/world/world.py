@@ -9,19 +9,19 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import OwnSheet, Sheet
+from swarmwire.comms.bodies.sensors import CustomSensorSpec, SensorSpec
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.phy.propagation import range_of
-from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.annotations import States, ToldValues
-from swarmwire.world.custom.loading import OwnActuators, made_sensor
-from swarmwire.world.custom.sensors import AskedSensor
+from swarmwire.world.custom.loading import CustomActuators, made_sensor
+from swarmwire.world.custom.sensors import CheckedSensor
 from swarmwire.world.engines.physics import Physics, engines_of
 from swarmwire.world.placement.maps import Layout, read_layout
 from swarmwire.world.placement.placement import Placed, place
@@ -29,7 +29,7 @@ from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import TrueSense, led_places_m
+from swarmwire.world.sensors.sensor import Sensor, led_places_m
 
 LOWEST = np.nextafter(-np.pi, 0.0)
 
@@ -102,7 +102,7 @@ class World:
         self.rows_running: BoolArray = np.ones_like(self.alive)
         self.scene = self._scene_of(tick_s)
         self.sensors = _sensors(scenario, self.scene, groups, needs)
-        self._own = OwnActuators(groups, self.scene)
+        self._own = CustomActuators(groups, self.scene)
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.states = States(self.static.arenas, self.static.robots)
@@ -153,9 +153,9 @@ class World:
         dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
         self._physics.braked[:] = dead | self.actuators.failed.motors
 
-    def sense(self, tick: int) -> Senses:
+    def sense(self, tick: int) -> Readings:
         """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
-        senses: Senses = {}
+        readings: Readings = {}
         every_row_alive = bool(self.alive.all())
         for group in self.static.groups:
             sensors = self.sensors[group.name].values()
@@ -169,8 +169,8 @@ class World:
             if not every_row_alive:
                 here = self.alive[rows]
                 rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
-            senses[group.name] = GroupSenses(rows, fields)
-        return senses
+            readings[group.name] = GroupReadings(rows, fields)
+        return readings
 
     def move(self, actions: Actions) -> IntArray:
         """Move by one tick. Robots without a new command keep the last one; one that is not finite is none.
@@ -270,17 +270,17 @@ def _sensors(
         for need in needs.get(group.name, ()):
             if need.startswith("radio.") or need in made[group.name]:
                 continue
-            if need not in group.body.senses:
-                has = ", ".join(group.body.senses) or "none"
+            if need not in group.body.sensors:
+                has = ", ".join(group.body.sensors) or "none"
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
-            sheet = group.body.senses[need]
-            truth = _truth(need, sheet, scene, group)
-            made[group.name][need] = Staged(need, truth, sheet, scene.keys, group, scene.tick_s, scene.running)
+            spec = group.body.sensors[need]
+            truth = _truth(need, spec, scene, group)
+            made[group.name][need] = Staged(need, truth, spec, scene.keys, group, scene.tick_s, scene.running)
     return made
 
 
-def _truth(name: str, sheet: Sheet, scene: Scene, group: Group) -> TrueSense:
-    if isinstance(sheet, OwnSheet):
-        return AskedSensor(name, made_sensor(sheet), sheet, scene, group)
-    return SENSORS[name](scene, group, sheet)
+def _truth(name: str, spec: SensorSpec, scene: Scene, group: Group) -> Sensor:
+    if isinstance(spec, CustomSensorSpec):
+        return CheckedSensor(name, made_sensor(spec), spec, scene, group)
+    return SENSORS[name](scene, group, spec)

@@ -129,10 +129,10 @@ class MinimalistFlocking(VectorAgent[Turning]):
         """Straight ahead, or a turn on the spot."""
         things, mates = Sectors.of(robots.proximity), Sectors.of(robots.infrared)
         diameter_m = 2.0 * robots.body.radius_m
-        avoid = _answer_at(robots.proximity.sheet, self.avoid_diameters * diameter_m)
-        close = _answer_at(robots.infrared.sheet, self.separation_diameters * diameter_m)
-        astray = mates.weaker_than(_answer_at(robots.infrared.sheet, self.lateral_diameters * diameter_m))
-        behind = mates.weaker_than(_answer_at(robots.infrared.sheet, self.rear_diameters * diameter_m))
+        avoid = _answer_at(robots.proximity.spec, self.avoid_diameters * diameter_m)
+        close = _answer_at(robots.infrared.spec, self.separation_diameters * diameter_m)
+        astray = mates.weaker_than(_answer_at(robots.infrared.spec, self.lateral_diameters * diameter_m))
+        behind = mates.weaker_than(_answer_at(robots.infrared.spec, self.rear_diameters * diameter_m))
         to_left, to_right = astray.count(mates.left), astray.count(mates.right)
 
         def kept(side: IntArray | int) -> IntArray:
@@ -159,6 +159,6 @@ class MinimalistFlocking(VectorAgent[Turning]):
         robots.drive(linear_mps=linear, angular_radps=self.turn_radps * side)
 
 
-def _answer_at(sheet: Rim, distance_m: float) -> float:
+def _answer_at(spec: Rim, distance_m: float) -> float:
     """What an ideal ray answers to a thing so far from the rim."""
-    return float(sheet.response.value(np.array(distance_m)))
+    return float(spec.response.value(np.array(distance_m)))

@@ -62,8 +62,8 @@ class Driver(ABC):
         """Connect, anew if it was lost, with the motors at rest; DriverLost if nobody answers in time."""
 
     @abstractmethod
-    def sense(self, senses: frozenset[str]) -> dict[str, FloatArray]:
-        """The newest readings of these senses: "sense.field" -> (1,) or (1, width), as in `GroupSenses.fields`.
+    def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
+        """The newest readings of these senses: "sense.field" -> (1,) or (1, width), as in `GroupReadings.fields`.
 
         It returns within a tenth of a second, or so; DriverLost if the robot has been silent for too long.
         """

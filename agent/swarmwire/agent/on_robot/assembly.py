@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.on_robot import reporting
-from swarmwire.agent.on_robot.controller import Mind, SensesOnRobot, group_of
+from swarmwire.agent.on_robot.controller import Mind, RobotSensors, group_of
 from swarmwire.agent.on_robot.log import RobotLog, new_log
 from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
 from swarmwire.agent.on_robot.network_check import Presence
@@ -234,8 +234,8 @@ def _assembled(
     measures = None if settings.radio.kind == "none" else network.radio.measures
     mind = Mind(group, settings.rate_hz, measures, plan.limits)
     needs = frozenset(need for need in plan.agent.needs if not need.startswith("radio."))
-    senses = SensesOnRobot(plan.driver, needs, tracked(plan.agent.needs, offer), network.own_pose)
-    parts = RobotParts(plan.driver, network.radio, mind, senses, motors, watchdog, clock)
+    sensors = RobotSensors(plan.driver, needs, tracked(plan.agent.needs, offer), network.own_pose)
+    parts = RobotParts(plan.driver, network.radio, mind, sensors, motors, watchdog, clock)
     watchdog.start()  # before the driver, so that the guard is there when motors can move
     closing.callback(plan.driver.close)
     plan.driver.open()

@@ -16,14 +16,14 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupReadings
 from swarmwire.comms.wire.radio_bridge import Pose
 
 NOT_SEEN = Pose(nan, nan, nan)  # as emulated senses read when a reading is lost
 BATTERY = "battery"
 
 
-class SensesOnRobot:
+class RobotSensors:
     """The senses that the agent needs, and the battery for whoever looks on, if the driver tells it.
 
     Attributes:
@@ -107,8 +107,8 @@ class Mind:
         self, tick: int, fields: dict[str, FloatArray], received: ReceivedPackets, tx_status: TxStatuses
     ) -> Decision:
         """One step of the agent; AgentFailed with its traceback if it raises."""
-        senses = {self._group.name: GroupSenses(self._group.rows, fields)}
-        actions = self._host.act(tick, senses, received, tx_status)
+        readings = {self._group.name: GroupReadings(self._group.rows, fields)}
+        actions = self._host.act(tick, readings, received, tx_status)
         drive = bool(actions.drive[0])
         if drive:
             self._follow(actions)

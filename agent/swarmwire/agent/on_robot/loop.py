@@ -7,7 +7,7 @@ from math import ceil
 from typing import Any, Protocol
 
 from swarmwire.agent.drivers.driver import STOP, Driver, DriverLost
-from swarmwire.agent.on_robot.controller import Decision, Mind, SensesOnRobot
+from swarmwire.agent.on_robot.controller import Decision, Mind, RobotSensors
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, End, Motors, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
@@ -112,7 +112,7 @@ class RobotParts:
     driver: Driver
     radio: RobotRadio
     mind: Mind
-    senses: SensesOnRobot
+    readings: RobotSensors
     motors: Motors
     watchdog: Watchdog
     clock: DatedClock
@@ -185,7 +185,7 @@ class RobotLoop:
             "tick": self._tick,
             "late_ticks": self._pacer.late,
             "watchdog_stops": parts.watchdog.stops,
-            "charge": parts.senses.charge,
+            "charge": parts.readings.charge,
             "agent_state": parts.mind.state,
             "counts": self._all_counts(),
         }
@@ -206,7 +206,7 @@ class RobotLoop:
 
     def _step(self, tick: int, late: bool) -> TickRow:
         parts = self._parts
-        fields = parts.senses.read()
+        fields = parts.readings.read()
         received, tx_status = parts.radio.received(self._pacer.since_start_ns())
         self._tick = tick
         decision = NOTHING
@@ -215,12 +215,12 @@ class RobotLoop:
         elif self._begins(tick):
             decision = parts.mind.step(tick, fields, received, tx_status)
             self._do(decision)
-        utc_ns, told = parts.clock.utc_ns(), (parts.mind.state, parts.mind.value, parts.senses.charge)
-        return TickRow(tick, utc_ns, late, parts.senses.pose, decision.drive, decision.command, *told)
+        utc_ns, told = parts.clock.utc_ns(), (parts.mind.state, parts.mind.value, parts.readings.charge)
+        return TickRow(tick, utc_ns, late, parts.readings.pose, decision.drive, decision.command, *told)
 
     def _begins(self, tick: int) -> bool:
         """Whether the agent is stepped: in emulation none begins before each of its senses was read."""
-        self._begun = self._begun or self._parts.senses.complete or tick > BLIND_S * self._rate_hz
+        self._begun = self._begun or self._parts.readings.complete or tick > BLIND_S * self._rate_hz
         return self._begun
 
     def _do(self, decision: Decision) -> None:

@@ -55,8 +55,8 @@ def tracked(needs: tuple[str, ...], offer: Offer) -> frozenset[str]:
 
 def _of_robot(need: str, offer: Offer) -> str | None:
     body = offer.body
-    if need not in body.senses:
-        return f"the body {body.name} lacks: it has {', '.join(body.senses) or 'no senses'}"
+    if need not in body.sensors:
+        return f"the body {body.name} lacks: it has {', '.join(body.sensors) or 'no sensors'}"
     if need in offer.driver_gives or need in tracked((need,), offer):
         return None
     measures = ", ".join(sorted(offer.driver_gives)) or "nothing"

@@ -11,9 +11,25 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.custom import ActuatorSheet, actuator_sheet, own_sheet, told_actuator_sheet, told_own_sheet
+from swarmwire.comms.bodies.custom import (
+    CustomActuatorSpec,
+    custom_actuator_spec,
+    custom_sensor_spec,
+    read_custom_actuator_spec,
+    read_custom_sensor_spec,
+)
 from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.sensors import SHEETS, Compass, Infrared, Light, Odometry, OwnSheet, Proximity, Scan, Sheet
+from swarmwire.comms.bodies.sensors import (
+    SENSOR_SPECS,
+    Compass,
+    CustomSensorSpec,
+    Infrared,
+    Light,
+    Odometry,
+    Proximity,
+    Scan,
+    SensorSpec,
+)
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import one_of, parameter
 from swarmwire.comms.errors import BadInput
@@ -33,16 +49,16 @@ def fault_of_body(body: "Body") -> tuple[str, str] | None:
         return "drive.wheel_base_m", expected
     if body.leds is not None and (fault := _fault_of_leds(body.leds, body.radius_m, body.height_m)):
         return fault
-    unfit = unfit_senses(body.drive.kind, body.altitude_m)
-    for name, sheet in body.senses.items():
+    unfit = unsupported_sensors(body.drive.kind, body.altitude_m)
+    for name, spec in body.sensors.items():
         if name in unfit:
-            return f"senses.{name}", unfit[name]
-        if fault := sheet.fault(body.radius_m):
-            return f"senses.{name}.{fault[0]}", fault[1]
+            return f"sensors.{name}", unfit[name]
+        if fault := spec.fault(body.radius_m):
+            return f"sensors.{name}.{fault[0]}", fault[1]
     return None
 
 
-def unfit_senses(drive: object, altitude_m: object) -> Mapping[str, str]:
+def unsupported_sensors(drive: object, altitude_m: object) -> Mapping[str, str]:
     """The senses that a body with this kind of drive, at this altitude, cannot have, and why."""
     unfit: dict[str, str] = {}
     if drive == "holonomic":
@@ -70,7 +86,7 @@ def _fault_of_leds(leds: Leds, radius_m: float, height_m: float) -> tuple[str, s
 # name of its own it goes by its file's.
 
 
-S = TypeVar("S", bound=Sheet)
+S = TypeVar("S", bound=SensorSpec)
 HERE = Path()
 MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that can fail as senses can: no sense is named so
 
@@ -92,51 +108,51 @@ class Body:
     altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
     contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
     leds: Leds | None = None
-    senses: dict[str, Sheet] = field(default_factory=dict[str, Sheet])
-    actuators: dict[str, ActuatorSheet] = field(default_factory=dict[str, ActuatorSheet])  # of the user's own
+    sensors: dict[str, SensorSpec] = field(default_factory=dict[str, SensorSpec])
+    actuators: dict[str, CustomActuatorSpec] = field(default_factory=dict[str, CustomActuatorSpec])  # of the user's own
 
     @cached_property
     def proximity(self) -> Proximity | None:
         """The proximity sensor's sheet."""
-        return self._sheet(Proximity)
+        return self._spec(Proximity)
 
     @cached_property
     def compass(self) -> Compass | None:
         """The compass's sheet."""
-        return self._sheet(Compass)
+        return self._spec(Compass)
 
     @cached_property
     def odometry(self) -> Odometry | None:
         """The wheel encoders' sheet."""
-        return self._sheet(Odometry)
+        return self._spec(Odometry)
 
     @cached_property
     def light(self) -> Light | None:
         """The photocells' sheet."""
-        return self._sheet(Light)
+        return self._spec(Light)
 
     @cached_property
     def infrared(self) -> Infrared | None:
         """The passive infrared sensor's sheet."""
-        return self._sheet(Infrared)
+        return self._spec(Infrared)
 
     @cached_property
     def scan(self) -> Scan | None:
         """The laser scanner's sheet."""
-        return self._sheet(Scan)
+        return self._spec(Scan)
 
     @cached_property
     def actuator_places(self) -> dict[str, slice]:
         """Where the numbers of each own actuator stand among those of all of them, by its name."""
         places: dict[str, slice] = {}
         start = 0
-        for name, sheet in self.actuators.items():
-            places[name] = slice(start, start + sheet.width)
-            start += sheet.width
+        for name, spec in self.actuators.items():
+            places[name] = slice(start, start + spec.width)
+            start += spec.width
         return places
 
-    def _sheet(self, kind: type[S]) -> S | None:
-        return next((sheet for sheet in self.senses.values() if isinstance(sheet, kind)), None)
+    def _spec(self, kind: type[S]) -> S | None:
+        return next((spec for spec in self.sensors.values() if isinstance(spec, kind)), None)
 
     @property
     def wheels(self) -> Wheels | Twist:
@@ -172,9 +188,9 @@ class Body:
         Keys may tell of the arena, and where a file lies tells of the machine that it lies on.
         """
         hidden: dict[str, Any] = {"kind": "", "params": {}}
-        senses = {n: replace(s, **hidden) if isinstance(s, OwnSheet) else s for n, s in self.senses.items()}
-        actuators = {name: replace(sheet, **hidden) for name, sheet in self.actuators.items()}
-        return replace(self, senses=senses, actuators=actuators)
+        sensors = {n: replace(s, **hidden) if isinstance(s, CustomSensorSpec) else s for n, s in self.sensors.items()}
+        actuators = {name: replace(spec, **hidden) for name, spec in self.actuators.items()}
+        return replace(self, sensors=sensors, actuators=actuators)
 
     def as_mapping(self) -> dict[str, Any]:
         """The sheet as `body_from_mapping` reads it back."""
@@ -193,12 +209,12 @@ def load_body(name: str) -> Body:
     return body_from(_shipped(name, "", "body"), where=f"{name}.toml")
 
 
-def body_from(sheet: Mapping[str, Any], where: str, beside: Path = HERE) -> Body:
+def body_from(spec: Mapping[str, Any], where: str, beside: Path = HERE) -> Body:
     """The body of a data sheet; BadInput names `where` and the key of what is wrong.
 
     Files of the user's own senses and actuators lie in the folder `beside`.
     """
-    like, rest = sheet.get("like"), {key: value for key, value in sheet.items() if key != "like"}
+    like, rest = spec.get("like"), {key: value for key, value in spec.items() if key != "like"}
     if like is not None:
         base = _shipped(like, where, "like")
         base["name"] = Path(where).stem  # not the other's: a record could not tell the two apart
@@ -221,8 +237,8 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
     """The body of a whole sheet, or, with nothing `beside`, of one that `as_mapping` wrote down."""
-    senses = mapping_of(where, "senses", rest.pop("senses", {}))
-    rest["senses"] = {name: _sense(name, table, where, beside) for name, table in senses.items()}
+    sensors = mapping_of(where, "sensors", rest.pop("sensors", {}))
+    rest["sensors"] = {name: _sensor(name, table, where, beside) for name, table in sensors.items()}
     actuators = mapping_of(where, "actuators", rest.pop("actuators", {}))
     rest["actuators"] = {name: _actuator(name, table, where, beside) for name, table in actuators.items()}
     if "drive" in rest:
@@ -239,36 +255,42 @@ def _body(rest: dict[str, Any], where: str, beside: Path | None) -> Body:
 def _like(base: dict[str, Any], rest: Mapping[str, Any]) -> dict[str, Any]:
     """`base` with what `rest` says; senses that do not go with it any more are not taken over."""
     both = merged(base, rest)
-    own = rest.get("senses", {})
-    if isinstance(both.get("senses"), dict):
-        for name in unfit_senses(_kind_of(both), both.get("altitude_m", 0.0)):
+    own = rest.get("sensors", {})
+    if isinstance(both.get("sensors"), dict):
+        for name in unsupported_sensors(_kind_of(both), both.get("altitude_m", 0.0)):
             if name not in own:
-                both["senses"].pop(name, None)
+                both["sensors"].pop(name, None)
     return both
 
 
-def _sense(name: str, table: object, where: str, beside: Path | None) -> Sheet:
-    key = f"senses.{name}"
+def _sensor(name: str, table: object, where: str, beside: Path | None) -> SensorSpec:
+    key = f"sensors.{name}"
     if name in (MOTORS, *WHEELS):
         raise BadInput(where, key, f"expected another name: {name} is a part of the drive, which the event fail names")
-    if name in SHEETS:
-        return built(SHEETS[name], table, where, key)
+    if name in SENSOR_SPECS:
+        return built(SENSOR_SPECS[name], table, where, key)
     if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
-        expected = f'expected {one_of(SHEETS, name)}, or a kind = "file.py:Class" of your own'
+        expected = f'expected {one_of(SENSOR_SPECS, name)}, or a kind = "file.py:Class" of your own'
         raise BadInput(where, key, f"unknown sense; {expected}")
-    return told_own_sheet(table, where, key) if beside is None else own_sheet(table, where, key, beside)
+    return (
+        read_custom_sensor_spec(table, where, key) if beside is None else custom_sensor_spec(table, where, key, beside)
+    )
 
 
-def _actuator(name: str, table: object, where: str, beside: Path | None) -> ActuatorSheet:
+def _actuator(name: str, table: object, where: str, beside: Path | None) -> CustomActuatorSpec:
     key = f"actuators.{name}"
     if not name.isidentifier():
         raise BadInput(where, key, "expected a name of letters, digits and _, which does not start with a digit")
-    return told_actuator_sheet(table, where, key) if beside is None else actuator_sheet(table, where, key, beside)
+    return (
+        read_custom_actuator_spec(table, where, key)
+        if beside is None
+        else custom_actuator_spec(table, where, key, beside)
+    )
 
 
-def _kind_of(sheet: Mapping[str, Any], otherwise: object = "wheels") -> object:
+def _kind_of(spec: Mapping[str, Any], otherwise: object = "wheels") -> object:
     """The kind of drive that a sheet names."""
-    drive: object = sheet.get("drive")
+    drive: object = spec.get("drive")
     return cast("Mapping[str, object]", drive).get("kind", otherwise) if isinstance(drive, Mapping) else otherwise
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.bodies.spec import RangedSheet
+from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import check_plain, parameter
 from swarmwire.comms.errors import BadInput
@@ -15,7 +15,7 @@ MAX_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
 
 
 @dataclass(frozen=True)
-class OwnSheet(RangedSheet):
+class CustomSensorSpec(RangedSensorSpec):
     """A sense whose class is the user's own; what is not listed here are keys of that class. Sense: its fields."""
 
     kind: str = parameter(
@@ -25,13 +25,13 @@ class OwnSheet(RangedSheet):
     fields: dict[str, int] = parameter(help="the class's fields and their widths; 0: a number per robot")
 
 
-def own_sheet(value: object, where: str, key: str, beside: Path) -> OwnSheet:
+def custom_sensor_spec(value: object, where: str, key: str, beside: Path) -> CustomSensorSpec:
     """The sheet of a user's table, which has a `kind`; its fields are known once the class is."""
     table = mapping_of(where, key, value)
-    shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSheet)] if name in table}
+    shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSensorSpec)] if name in table}
     kind = kind_of(table, where, key, beside)
     check_plain(table, where, key)
-    return built(OwnSheet, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
+    return built(CustomSensorSpec, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
 
 
 def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
@@ -43,7 +43,7 @@ def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
     return resolve(kind, beside)
 
 
-def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
+def read_custom_sensor_spec(value: object, where: str, key: str) -> CustomSensorSpec:
     """The sheet that `asdict` made into this table; only that knows `params` and `fields` from keys of the class."""
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
@@ -51,14 +51,14 @@ def told_own_sheet(value: object, where: str, key: str) -> OwnSheet:
     known = cast("Mapping[str, object]", widths).values()
     if not all(type(width) is int and 0 <= width <= MAX_WIDE for width in known):
         raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MAX_WIDE}, got {widths!r}")
-    return built(OwnSheet, table, where, key)
+    return built(CustomSensorSpec, table, where, key)
 
 
 # --- An actuator of the user's own: what its table in a body's sheet says, and what its class tells agents.
 
 
 @dataclass(frozen=True)
-class ActuatorSheet:
+class CustomActuatorSpec:
     """An actuator whose class is the user's own; agents set it by `robot.actuate(name, …)`."""
 
     kind: str = parameter(
@@ -68,21 +68,21 @@ class ActuatorSheet:
     width: int = parameter(0, help="how many numbers it takes; 0: not known yet")
 
 
-def actuator_sheet(value: object, where: str, key: str, beside: Path) -> ActuatorSheet:
+def custom_actuator_spec(value: object, where: str, key: str, beside: Path) -> CustomActuatorSpec:
     """The sheet of a user's table, which has a `kind`; its width is known once the class is."""
     table = mapping_of(where, key, value)
     if "kind" not in table:
         raise BadInput(where, f"{key}.kind", "is missing")
     kind = kind_of(table, where, key, beside)
     check_plain(table, where, key)
-    return built(ActuatorSheet, {"kind": kind, "params": table}, where, key)
+    return built(CustomActuatorSpec, {"kind": kind, "params": table}, where, key)
 
 
-def told_actuator_sheet(value: object, where: str, key: str) -> ActuatorSheet:
+def read_custom_actuator_spec(value: object, where: str, key: str) -> CustomActuatorSpec:
     """The sheet that `asdict` made into this table; only that knows `params` and `width` from keys of the class."""
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     width = table.get("width")
     if type(width) is not int or not 0 <= width <= MAX_WIDE:
         raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MAX_WIDE}, got {width!r}")
-    return built(ActuatorSheet, table, where, key)
+    return built(CustomActuatorSpec, table, where, key)

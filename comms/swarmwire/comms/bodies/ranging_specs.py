@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.spec import RangedSheet
+from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import parameter
 
 
@@ -18,7 +18,7 @@ def within_a_turn(angle_rad: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Ring(RangedSheet):
+class Ring(RangedSensorSpec):
     """Sensors around the body that look outwards."""
 
     angles_deg: tuple[float, ...] = parameter(help="where each sensor looks, counter-clockwise from ahead", unit="deg")
@@ -91,7 +91,7 @@ class Rim(Ring):
     noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `Sheet.fault`."""
+        """As `SensorSpec.fault`."""
         told = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
         if np.any(np.diff(told) > 0.0) or told[0] <= told[-1]:
             return "response", "expected a curve that falls from the rim to reach_m"
@@ -134,7 +134,7 @@ FULL_DEG = 360.0
 
 
 @dataclass(frozen=True)
-class Scan(RangedSheet):
+class Scan(RangedSensorSpec):
     """A laser scanner that turns at one height. Sense: range_m (n, rays), inf where nothing is within the range."""
 
     rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
@@ -153,7 +153,7 @@ class Scan(RangedSheet):
     noise_relative: float = parameter(0.0, help="and that share of the distance", at_least=0, at_most=1)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `Sheet.fault`."""
+        """As `SensorSpec.fault`."""
         if self.range_min_m >= self.range_m:
             return "range_min_m", f"expected less than range_m, got {self.range_min_m!r}"
         if abs(self.at_m) > radius_m:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from math import hypot, radians, tan
 from typing import ClassVar
 
-from swarmwire.comms.bodies.spec import RangedSheet, Sheet
+from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 from swarmwire.comms.config import parameter
 
 
 @dataclass(frozen=True)
-class Battery(Sheet):
+class Battery(SensorSpec):
     """What the robot runs on; when it is empty, the robot is dead. Sense: charge (n,), 0 to 1, and voltage_v (n,).
 
     It gives `idle_w`, `drive_w_per_mps` times the mean speed at which the wheels are told to run (of a body without
@@ -27,7 +27,7 @@ class Battery(Sheet):
     noise_v: float = parameter(0.0, help="standard deviation of the voltage's error", unit="V", at_least=0)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `Sheet.fault`."""
+        """As `SensorSpec.fault`."""
         if self.empty_v > self.full_v:
             return "empty_v", f"expected at most full_v, {self.full_v:g} V; got {self.empty_v!r}"
         return None
@@ -37,7 +37,7 @@ class Battery(Sheet):
 
 
 @dataclass(frozen=True)
-class Bumper(Sheet):
+class Bumper(SensorSpec):
     """A touch-sensitive rim. Sense: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
 
 
@@ -45,7 +45,7 @@ class Bumper(Sheet):
 
 
 @dataclass(frozen=True)
-class Camera(Sheet):
+class Camera(SensorSpec):
     """A camera that looks down all around and tells the blobs of light that it sees, the nearest first.
 
     Sense: distance_m, bearing_rad, colour (n, most_blobs), nan where there is no further blob.
@@ -69,7 +69,7 @@ class Camera(Sheet):
 
 
 @dataclass(frozen=True)
-class Compass(RangedSheet):
+class Compass(RangedSensorSpec):
     """The heading in the arena's frame. Sense: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
 
     is_global: ClassVar[bool] = True
@@ -81,7 +81,7 @@ class Compass(RangedSheet):
 
 
 @dataclass(frozen=True)
-class GroundColour(RangedSheet):
+class GroundColour(RangedSensorSpec):
     """Sensors that look down at the floor. Sense: shade (n, points), 0 black to 1 white."""
 
     points_m: tuple[tuple[float, float], ...] = parameter(
@@ -90,7 +90,7 @@ class GroundColour(RangedSheet):
     noise: float = parameter(0.0, help="half width of the uniform noise", at_least=0, at_most=1)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `Sheet.fault`."""
+        """As `SensorSpec.fault`."""
         for i, (ahead_m, left_m) in enumerate(self.points_m):
             if hypot(ahead_m, left_m) > radius_m:
                 expected = f"expected a point under the body, whose radius is {radius_m:g} m; got {[ahead_m, left_m]}"
@@ -102,7 +102,7 @@ class GroundColour(RangedSheet):
 
 
 @dataclass(frozen=True)
-class Imu(Sheet):
+class Imu(SensorSpec):
     """Accelerometer and gyro, with white noise, a constant bias of each robot's own, and a bias that drifts.
 
     Sense: forward_mps2, left_mps2, turn_radps (n,), in the body's frame, means over the tick before.
@@ -132,7 +132,7 @@ class Imu(Sheet):
 
 
 @dataclass(frozen=True)
-class Odometry(Sheet):
+class Odometry(SensorSpec):
     """Encoders on the two wheels. Sense: left_m, right_m (n,), travelled since the start, in whole encoder steps.
 
     Each wheel has an error of its own that stays (its diameter), and slips anew in each tick. What heading and place
@@ -150,7 +150,7 @@ class Odometry(Sheet):
 
 
 @dataclass(frozen=True)
-class Positioning(RangedSheet):
+class Positioning(RangedSensorSpec):
     """The position in the arena's frame, as a tracking camera tells it. Sense: x_m, y_m (n,)."""
 
     is_global: ClassVar[bool] = True

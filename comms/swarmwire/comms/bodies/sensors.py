@@ -1,9 +1,9 @@
 """Data sheets of the senses a body may have: what agents may know of their own sensors, and the world emulates.
 
-A file per sense. A new one: its sheet in a file here, and its line in `SHEETS`.
+A file per sense. A new one: its sheet in a file here, and its line in `SENSOR_SPECS`.
 """
 
-from swarmwire.comms.bodies.custom import OwnSheet
+from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, ResponseCurve, Rim, Ring, Scan
 from swarmwire.comms.bodies.sensor_specs import (
     Battery,
@@ -15,10 +15,10 @@ from swarmwire.comms.bodies.sensor_specs import (
     Odometry,
     Positioning,
 )
-from swarmwire.comms.bodies.spec import RangedSheet, Sheet
+from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 
 # By the name that a sheet and an agent's `needs` have for the sense.
-SHEETS: dict[str, type[Sheet]] = {
+SENSOR_SPECS: dict[str, type[SensorSpec]] = {
     "proximity": Proximity,
     "compass": Compass,
     "odometry": Odometry,
@@ -34,23 +34,23 @@ SHEETS: dict[str, type[Sheet]] = {
 }
 
 __all__ = [
-    "SHEETS",
+    "SENSOR_SPECS",
     "Battery",
     "Bumper",
     "Camera",
     "Compass",
+    "CustomSensorSpec",
     "GroundColour",
     "Imu",
     "Infrared",
     "Light",
     "Odometry",
-    "OwnSheet",
     "Positioning",
     "Proximity",
-    "RangedSheet",
+    "RangedSensorSpec",
     "ResponseCurve",
     "Rim",
     "Ring",
     "Scan",
-    "Sheet",
+    "SensorSpec",
 ]

@@ -7,7 +7,7 @@ from swarmwire.comms.config import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sheet:
+class SensorSpec:
     """The data sheet of a sense; these keys all senses have, and each has its own beside them.
 
     A reading passes through these stages, in this order: the truth, taken at `rate_hz`; noise; outliers; rounding to
@@ -31,7 +31,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RangedSheet(Sheet):
+class RangedSensorSpec(SensorSpec):
     """The data sheet of a sense whose readings lie within a known range."""
 
     outlier: float = parameter(

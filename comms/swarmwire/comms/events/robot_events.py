@@ -95,7 +95,7 @@ class Fail(LastingEvent):
         """Raise BadInput for a part that a body of these robots does not have."""
         for group in self.robots.groups(groups):
             body = bodies[group]
-            has = [BATTERY, MOTORS, *(() if isinstance(body.drive, Holonomic) else WHEELS), *body.senses]
+            has = [BATTERY, MOTORS, *(() if isinstance(body.drive, Holonomic) else WHEELS), *body.sensors]
             if self.part not in has:
                 raise BadInput(
                     "", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}"

@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.geometry.floor import FloorImage
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import Glimpse, Scene
-from swarmwire.comms.tick_io import MAX_STATE, GroupSenses, Senses
+from swarmwire.comms.tick_io import MAX_STATE, GroupReadings, Readings
 from swarmwire.comms.truth import Finished, Happened, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array
@@ -164,10 +164,10 @@ def _arrays(glimpse: Glimpse) -> dict[str, AnyArray]:
         "contact_onsets": truth.contact_onsets,
         "values": glimpse.values,
     }
-    for name, group in truth.senses.items():
+    for name, group in truth.readings.items():
         arrays[f"sense/{name}/rows"] = group.rows
-        for sense, column in group.fields.items():
-            arrays[f"sense/{name}/{sense}"] = column
+        for sensor, column in group.fields.items():
+            arrays[f"sense/{name}/{sensor}"] = column
     if truth.movable is not None:
         arrays["movable"] = truth.movable.reshape(len(truth.movable), -1)
     if truth.edges is not None:
@@ -205,7 +205,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
         state=state,
         states=states,
         leds=leds,
-        senses=_senses(frame, static),
+        readings=_readings(frame, static),
         contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
         edges=_edges(frame, n),
         tally=_tally(frame, static.arenas),
@@ -293,21 +293,21 @@ def _event(item: object, changed: AnyArray) -> Happened:
     raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
 
 
-def _senses(frame: Frame, static: Static) -> Senses:
+def _readings(frame: Frame, static: Static) -> Readings:
     """The senses of some robots; of which groups and in which shapes must agree, which senses is the bodies' affair."""
     found: dict[str, dict[str, AnyArray]] = {}
     for key in frame.arrays:
         if key.startswith("sense/"):
-            _, name, sense = (*key.split("/", 2), "")[:3]
-            found.setdefault(name, {})[sense] = frame.arrays[key]
+            _, name, sensor = (*key.split("/", 2), "")[:3]
+            found.setdefault(name, {})[sensor] = frame.arrays[key]
     if not found.keys() <= {group.name for group in static.groups}:
         raise BadFrame("malformed", "sense: expected groups of this run")
-    senses: Senses = {}
+    readings: Readings = {}
     for name, columns in found.items():
         rows = checked_array(frame, f"sense/{name}/rows", "<i8", (None,))
         _within(f"sense/{name}/rows", rows, static.arenas * static.robots)
         del columns["rows"]
         if any(column.dtype != np.float64 or len(column) != len(rows) for column in columns.values()):
             raise BadFrame("malformed", f"sense/{name}: expected a row of numbers for each robot")
-        senses[name] = GroupSenses(rows, columns)
-    return senses
+        readings[name] = GroupReadings(rows, columns)
+    return readings

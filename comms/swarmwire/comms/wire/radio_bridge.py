@@ -13,7 +13,7 @@ import numpy as np
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import MAX_BYTES, VERSION
 from swarmwire.comms.wire.join import versioned
@@ -63,7 +63,7 @@ LAST_NS = 2**62  # no run comes so far; later times do not fit those that are to
 
 def encode_air(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """The frame to the robot of this row: what it received, and what became of its packets."""
-    return encode_tick(tick, {GROUP: GroupSenses(np.array([row]), {})}, received, tx_status)
+    return encode_tick(tick, {GROUP: GroupReadings(np.array([row]), {})}, received, tx_status)
 
 
 def decode_air(data: bytes, terms: AirTerms) -> tuple[int, ReceivedPackets, TxStatuses]:

@@ -26,10 +26,10 @@ from swarmwire.comms.tick_io import (
     NO_VALUES,
     Actions,
     Actuations,
-    GroupSenses,
+    GroupReadings,
     LedChanges,
     Notes,
-    Senses,
+    Readings,
     Values,
     checked_state,
 )
@@ -40,13 +40,13 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
 
 
-def encode_tick(tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
+def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """A `tick` frame: what a runner's robots sense and received, and what became of packets that they sent."""
     arrays: dict[str, AnyArray] = {}
-    for name, group in senses.items():
+    for name, group in readings.items():
         arrays[f"sense/{name}/rows"] = group.rows
-        for sense, column in group.fields.items():
-            arrays[f"sense/{name}/{sense}"] = column
+        for sensor, column in group.fields.items():
+            arrays[f"sense/{name}/{sensor}"] = column
     return frames.encode("tick", tick, arrays | told_arrays(received, tx_status))
 
 
@@ -65,7 +65,9 @@ def told_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, A
     return arrays
 
 
-def decode_tick(frame: Frame, measures: tuple[str, ...], known: Set[str]) -> tuple[Senses, ReceivedPackets, TxStatuses]:
+def decode_tick(
+    frame: Frame, measures: tuple[str, ...], known: Set[str]
+) -> tuple[Readings, ReceivedPackets, TxStatuses]:
     """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known.
 
     Whose senses they are, and who received, `check_rows` tells.
@@ -74,25 +76,25 @@ def decode_tick(frame: Frame, measures: tuple[str, ...], known: Set[str]) -> tup
     try:
         for key, array in frame.arrays.items():
             if key.startswith("sense/"):
-                _, name, sense = key.split("/", 2)
-                groups.setdefault(name, {})[sense] = array
-        senses = {name: GroupSenses(fields.pop("rows"), fields) for name, fields in groups.items()}
-        if not senses or not senses.keys() <= known:
+                _, name, sensor = key.split("/", 2)
+                groups.setdefault(name, {})[sensor] = array
+        readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in groups.items()}
+        if not readings or not readings.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
-        return senses, *told_of(frame, measures)
+        return readings, *told_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
-def check_rows(senses: Senses, received: ReceivedPackets, rows: Mapping[str, IntArray]) -> None:
+def check_rows(readings: Readings, received: ReceivedPackets, rows: Mapping[str, IntArray]) -> None:
     """BadFrame unless senses are numbers of robots among the `rows` of their group, and receivers are robots of any."""
-    for name, group in senses.items():
+    for name, group in readings.items():
         own, n = group.rows, len(group.rows)
         if own.ndim != 1 or own.dtype != np.int64 or np.count_nonzero(own[1:] <= own[:-1]) or not _own(own, rows[name]):
             raise BadFrame("malformed", f"sense/{name}/rows: expected robots of this runner, rising")
-        for sense, column in group.fields.items():
+        for sensor, column in group.fields.items():
             if column.dtype != np.float64 or len(column) != n:
-                raise BadFrame("malformed", f"sense/{name}/{sense}: expected numbers of {n} robots")
+                raise BadFrame("malformed", f"sense/{name}/{sensor}: expected numbers of {n} robots")
     if len(received):
         last = max(int(of[-1]) for of in rows.values() if len(of))
         if received.receiver[0] < 0 or received.receiver[-1] > last:

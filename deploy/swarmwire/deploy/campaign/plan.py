@@ -16,7 +16,7 @@ from swarmwire.deploy.campaign.whole_numbers import whole_numbers
 from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.world.scenario.bodies import bodies_of, own_code_of
+from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
@@ -111,7 +111,7 @@ def _code(scenario: Scenario) -> list[str]:
     check_agents(scenario, agents)
     scenario_traces(scenario)
     bodies = bodies_of(scenario, scenario.source)
-    return [*agents.values(), *own_code_of(bodies.values()), *measuring(scenario).code]
+    return [*agents.values(), *custom_code_of(bodies.values()), *measuring(scenario).code]
 
 
 def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:

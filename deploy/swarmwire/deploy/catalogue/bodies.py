@@ -7,7 +7,7 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.sensors import OwnSheet, RangedSheet
+from swarmwire.comms.bodies.sensors import CustomSensorSpec, RangedSensorSpec
 from swarmwire.comms.config import limits_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
@@ -32,15 +32,15 @@ def _body(body: Body, named: str) -> Entry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
-    senses = [
-        _own_sense(name, of) if isinstance(of, OwnSheet) else _sheet(f"sense: {name}", type(of), asdict(of))
-        for name, of in body.senses.items()
+    sensors = [
+        _custom_sensor(name, of) if isinstance(of, CustomSensorSpec) else _sheet(f"sense: {name}", type(of), asdict(of))
+        for name, of in body.sensors.items()
     ]
     actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]
     return Entry(
         kind="body",
         name=body.name,
-        help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; senses: {', '.join(body.senses)}",
+        help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; senses: {', '.join(body.sensors)}",
         facts=(
             ("in a scenario", f'body = "{named}" in [robots.GROUP]'),
             ("fastest ahead", f"{body.max_linear_mps:.4g} m/s"),
@@ -51,7 +51,7 @@ def _body(body: Body, named: str) -> Entry:
             ParameterTable("geometry", tuple(_with_values(geometry, sheet)), "value"),
             _sheet("drive", type(body.drive), sheet["drive"]),
             *leds,
-            *senses,
+            *sensors,
             *actuators,
         ),
     )
@@ -61,14 +61,14 @@ def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTabl
     return ParameterTable(title, tuple(_with_values(parameters_of_dataclass(kind), values)), "value")
 
 
-def _own_sense(name: str, sheet: OwnSheet) -> ParameterTable:
-    shared = _with_values(parameters_of_dataclass(RangedSheet), asdict(sheet))
+def _custom_sensor(name: str, sheet: CustomSensorSpec) -> ParameterTable:
+    shared = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet))
     return _own(f"sense: {name}, which reads {', '.join(sheet.fields)}", sheet.kind, made_sensor(sheet), shared)
 
 
 def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:
     """What `kind` leads to, the keys shared with others, and those of the class of the user's own."""
-    told = next(limits_of(of).help for of in fields(OwnSheet) if of.name == "kind")
+    told = next(limits_of(of).help for of in fields(CustomSensorSpec) if of.name == "kind")
     limits = {of.name: limits_of(of) for of in fields(made)}
     keys = [Parameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()]
     return ParameterTable(title, (Parameter("kind", told, value=kind), *shared, *keys), "value")

@@ -15,7 +15,7 @@ from swarmwire.deploy.catalogue.presets import presets
 from swarmwire.deploy.catalogue.radio_stages import radio_stages
 from swarmwire.deploy.catalogue.robot_protocols import drivers, gateways
 from swarmwire.deploy.catalogue.scenario_keys import keys, radio_keys
-from swarmwire.deploy.catalogue.senses import senses
+from swarmwire.deploy.catalogue.sensors import sensors
 from swarmwire.deploy.catalogue.sheet_keys import sheet_keys
 
 
@@ -33,7 +33,7 @@ KINDS = (
     Kind("bodies", "body", "kinds of robot: size, drive and senses", bodies),
     Kind("drives", "drive", "what may move a body, with the keys of its sheet's table", drives),
     Kind("sheets", "sheet", "keys of a body's data sheet; its drive and senses are kinds of their own", sheet_keys),
-    Kind("senses", "sense", "what an agent may read of its robot and of packets, if its needs name it", senses),
+    Kind("sensors", "sense", "what an agent may read of its robot and of packets, if its needs name it", sensors),
     Kind("behaviours", "behaviour", "agents that come with swarmwire, with their parameters", behaviours),
     Kind("events", "event", "what may happen to robots and radios on the way", events),
     Kind("metrics", "metric", "what can be measured of a run; the standard ones are in every run", metrics),

@@ -6,7 +6,7 @@ from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 
-TABLES = ("drive", "leds", "senses", "actuators")  # have entries of their own, or one below
+TABLES = ("drive", "leds", "sensors", "actuators")  # have entries of their own, or one below
 
 
 def sheet_keys() -> list[Entry]:

@@ -50,9 +50,9 @@ class Behind:
             expected = 'expected "none" with --gateway: agents of groups without a gateway are in this process'
             raise BadInput("--runners", "", expected)
 
-    def senses(self, needs: Mapping[str, Sequence[str]], bodies: Mapping[str, Body]) -> dict[str, tuple[str, ...]]:
+    def sensors(self, needs: Mapping[str, Sequence[str]], bodies: Mapping[str, Body]) -> dict[str, tuple[str, ...]]:
         """The senses to compute, by group: what its agent needs and, behind a gateway, also all that this tells."""
-        told = {group: self._chosen[group].senses(bodies[group]) if group in self._chosen else () for group in needs}
+        told = {group: self._chosen[group].sensors(bodies[group]) if group in self._chosen else () for group in needs}
         return {group: tuple(dict.fromkeys([*need, *told[group]])) for group, need in needs.items()}
 
     @contextmanager

@@ -25,9 +25,9 @@ class Chosen:
     made: type[Gateway]
     options: Any  # an instance of `made.options`
 
-    def senses(self, body: Body) -> tuple[str, ...]:
+    def sensors(self, body: Body) -> tuple[str, ...]:
         """The senses of this body that it tells."""
-        return tuple(name for name in body.senses if name in self.made.senses)
+        return tuple(name for name in body.sensors if name in self.made.sensors)
 
 
 def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Chosen]:

@@ -42,9 +42,9 @@ class RobotSettings:
         """The content of `robot.toml` for the robot of this row, which answers at `address`."""
         group = next(group for group in self.static.groups if group.start <= row < group.stop)
         names, table, drive = self.static.robot_names, self.scenario.robots[group.name], group.body.drive
-        if table.sheet:
+        if table.body_overrides:
             expected = "expected none: robots read their body's sheet from a file, which `body` may name"
-            raise BadInput(self.scenario.source, f"robots.{group.name}.sheet", expected)
+            raise BadInput(self.scenario.source, f"robots.{group.name}.body_overrides", expected)
         sheet, air = sheet_path(table.body, self.scenario.source), self.scenario.radio
         rate_hz = max(1, round(self.static.rate_hz / group.act_every_ticks))
         return {

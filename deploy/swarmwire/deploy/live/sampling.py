@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.run_views import Glimpse, senses_within, truth_of
+from swarmwire.comms.run_views import Glimpse, readings_within, truth_of
 from swarmwire.comms.truth import Static, Truth
 
 FRAMES_PER_S = 30
@@ -78,6 +78,6 @@ class Sampling:
         few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
         shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
         if static.robots > SMALL:
-            shown = replace(shown, senses=senses_within(shown.senses, slice(self._selected, self._selected + 1)))
+            shown = replace(shown, readings=readings_within(shown.readings, slice(self._selected, self._selected + 1)))
         self._serial += 1
         return Glimpse(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])

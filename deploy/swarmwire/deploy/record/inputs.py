@@ -21,7 +21,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.interfaces import AgentBackend, AirTime, Put, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
@@ -54,20 +54,20 @@ class RecordedBackend:
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What every robot does in this tick."""
-        actions = self._backend.act(tick, senses, received, tx_status)
+        actions = self._backend.act(tick, readings, received, tx_status)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, {})
         return actions
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same of a backend that puts packets on the air itself."""
         noted = _Noted(air)
-        actions = cast("TimedBackend", self._backend).act_in_time(tick, senses, received, tx_status, noted)
+        actions = cast("TimedBackend", self._backend).act_in_time(tick, readings, received, tx_status, noted)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, _puts_arrays(noted.puts))
         return actions
@@ -189,15 +189,15 @@ class ReplayedBackend:
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What every robot does in this tick, or did."""
         if tick < self._inputs.first_tick:
-            return self._agents.act(tick, senses, received, tx_status)
+            return self._agents.act(tick, readings, received, tx_status)
         return self._inputs.actions(tick, self._robots)
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):

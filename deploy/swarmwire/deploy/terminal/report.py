@@ -45,8 +45,8 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
             table.add_row(name, late if value.final is None else f"at {_number(value.final)} s")
         elif value.mean is not None:
             table.add_row(name, _in_words(of[name], value))
-    for body, senses in result.global_senses.items():
-        table.add_row("global senses", f"{body}: {', '.join(senses)}")
+    for body, sensors in result.global_sensors.items():
+        table.add_row("global senses", f"{body}: {', '.join(sensors)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
     if counts:
         table.add_row("counts", ", ".join(counts))

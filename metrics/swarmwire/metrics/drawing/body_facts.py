@@ -9,15 +9,15 @@ from swarmwire.comms.bodies.sensors import (
     Bumper,
     Camera,
     Compass,
+    CustomSensorSpec,
     GroundColour,
     Imu,
     Light,
     Odometry,
-    OwnSheet,
     Positioning,
     Rim,
     Scan,
-    Sheet,
+    SensorSpec,
 )
 
 
@@ -36,13 +36,13 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
         facts.append(("flies", f"{_length(body.altitude_m)} up"))
     if body.leds:
         facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
-    for name, sheet in body.senses.items():
+    for name, sheet in body.sensors.items():
         facts.extend(zip((name, *[""] * 9), _told(sheet, body.altitude_m), strict=False))
     facts.extend((name, _own(sheet.kind)) for name, sheet in body.actuators.items())
     return facts
 
 
-def _told(sheet: Sheet, altitude_m: float) -> list[str]:
+def _told(sheet: SensorSpec, altitude_m: float) -> list[str]:
     match sheet:
         case Rim():
             return [f"{len(sheet.angles_deg)} rays of {_length(sheet.range_m)}", *_noise(sheet.noise)]
@@ -70,7 +70,7 @@ def _told(sheet: Sheet, altitude_m: float) -> list[str]:
             return [f"noise {sheet.noise_mps2:.2g} m/s²", f"{math.degrees(sheet.noise_radps):.2g} degrees/s"]
         case Battery():
             return [f"{sheet.capacity_wh:g} Wh, {sheet.full_v:g} V"]
-        case OwnSheet():
+        case CustomSensorSpec():
             return [_own(sheet.kind)]
         case _:
             return ["yes"]

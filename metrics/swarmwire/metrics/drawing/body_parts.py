@@ -18,7 +18,7 @@ _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
 
 def draw_parts(axes: Any, body: Body) -> None:
     """Draw the senses that have a place on the body, and its LEDs, into axes whose limits are set."""
-    for sheet in body.senses.values():
+    for sheet in body.sensors.values():
         match sheet:
             case Proximity():
                 _draw_rays(axes, body.radius_m, sheet, "proximity ray", _RAY, "-")

@@ -57,7 +57,7 @@ class RealRun:
                 state=motion.state[tick],
                 states=motion.states,
                 leds=leds,
-                senses={},
+                readings={},
                 contact_onsets=unknown,
                 edges=None,
                 tally=self._radio.tallies[tick],

@@ -111,13 +111,13 @@ class RerunSelected:
 
     def _remember(self, truth: Truth) -> None:
         """Keep what it senses in this tick; the dead sense nothing."""
-        senses = truth.senses.get(self._group.name)
+        readings = truth.readings.get(self._group.name)
         if not truth.alive[self._row]:
             self._sensed = {}
-        elif senses is not None:
-            at = int(np.searchsorted(senses.rows, self._row))
-            if at < len(senses.rows) and senses.rows[at] == self._row:
-                self._sensed = {name: senses.fields[name][at].copy() for name in _DRAWN if name in senses.fields}
+        elif readings is not None:
+            at = int(np.searchsorted(readings.rows, self._row))
+            if at < len(readings.rows) and readings.rows[at] == self._row:
+                self._sensed = {name: readings.fields[name][at].copy() for name in _DRAWN if name in readings.fields}
 
     def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""

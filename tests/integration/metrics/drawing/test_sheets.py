@@ -64,9 +64,9 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    senses = {"scan": {"rays": 1, "range_m": range_m}}
+    readings = {"scan": {"rays": 1, "range_m": range_m}}
     axes = Figure().add_axes((0, 0, 1, 1))
-    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": senses}, "a.toml"))
+    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": readings}, "a.toml"))
     drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
     assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
     legend = axes.get_legend()

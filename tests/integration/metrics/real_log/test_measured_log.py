@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput, OwnCodeFailed
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.real_log.measured_log import measured_log
@@ -56,7 +56,7 @@ def measures(static, truths, metrics) -> np.ndarray:
         for truth in truths:
             of.see(truth)
             values.append(of.values[:, 0].copy())
-    except OwnCodeFailed:
+    except CustomCodeFailed:
         return np.full((1, len(metrics)), np.nan)
     return np.array(values)
 

@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.pso.variants import BestPlace
 from swarmwire.agent.host import hosted
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
 
 HERE = (1.0, -2.0)
@@ -41,7 +41,7 @@ class One:
             "positioning.y_m": np.array([self.place[1]]),
         }
         actions = self._host.act(
-            (self.tick, self.tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received
+            (self.tick, self.tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
         )
         self.tick += 1
         return actions

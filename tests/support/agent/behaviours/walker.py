@@ -8,7 +8,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import Actions, GroupSenses
+from swarmwire.comms.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
 
 RAYS_RAD = np.deg2rad([17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0])
@@ -41,7 +41,7 @@ class Walker:
             value[:] = np.maximum(np.cos(RAYS_RAD - near_rad), 0.0) ** 4
         time = (self._tick, self._tick * 10**8, 10**8)
         self._tick += 1
-        return self._host.act(time, GroupSenses(np.arange(n), {"proximity.value": value}), received)
+        return self._host.act(time, GroupReadings(np.arange(n), {"proximity.value": value}), received)
 
     def first_turns_rad(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> np.ndarray:
         """How far each turns on the spot before it first goes straight, (n,), positive to the left."""

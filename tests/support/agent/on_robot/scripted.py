@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
-from swarmwire.agent.on_robot.controller import Mind, SensesOnRobot, group_of
+from swarmwire.agent.on_robot.controller import Mind, RobotSensors, group_of
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
@@ -66,15 +66,15 @@ class ScriptedDriver(Driver):
     def open(self) -> None:
         self._do("open", "open")
 
-    def sense(self, senses: frozenset[str]) -> dict[str, FloatArray]:
-        self.asked = senses
+    def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
+        self.asked = sensors
         self._do("sense", None)
         fields = {
             "proximity.value": np.zeros((1, 8)),
             "battery.charge": np.array([self.charge]),
             "battery.voltage_v": np.array([4.0]),
         }
-        return {name: column for name, column in fields.items() if name.partition(".")[0] in senses}
+        return {name: column for name, column in fields.items() if name.partition(".")[0] in sensors}
 
     def act(self, command: Command) -> None:
         self._do("act", command)
@@ -183,11 +183,11 @@ class Rig:
         self.pose: Pose | None = None
         group = group_of("robot-0", 0, f"{PLAYERS}:{agent}", params or {}, self.driver.body, seed=5)
         mind = Mind(group, RATE_HZ, (), limits or limits_for(self.driver.body, None, None, ""))
-        senses = SensesOnRobot(self.driver, frozenset(needs), frozenset(tracked), lambda: self.pose)
+        readings = RobotSensors(self.driver, frozenset(needs), frozenset(tracked), lambda: self.pose)
         self.motors = Motors(self.driver)
         self.watchdog = Watchdog(watchdog_s, self.motors.stop, self.clock)
         self.onlooker = Onlooking(self.end)
-        parts = RobotParts(self.driver, self.radio, mind, senses, self.motors, self.watchdog, self.clock)
+        parts = RobotParts(self.driver, self.radio, mind, readings, self.motors, self.watchdog, self.clock)
         self.loop = RobotLoop(parts, RATE_HZ, self.end, self.onlooker)
 
     def run(self, steps: int, duration_s: float | None = None) -> list[TickRow]:

@@ -53,8 +53,8 @@ class Ros2Rig(Rig):
     stamped: ClassVar[bool] = False
 
     def made_body(self) -> Body:
-        senses = {"scan": {"rate_hz": 0.0}, "light": {"angles_deg": [0, 180]}}
-        return body_from({"like": "turtlebot3-burger", "senses": senses}, "turtlebot.toml")
+        readings = {"scan": {"rate_hz": 0.0}, "light": {"angles_deg": [0, 180]}}
+        return body_from({"like": "turtlebot3-burger", "senses": readings}, "turtlebot.toml")
 
     def made_gateway(self, address: str) -> Gateway:
         options = Ros2GatewayOptions(stamped=self.stamped, north_deg=30.0)

@@ -173,7 +173,7 @@ class Ros2Sensors(ByteTarget):
 
     def feed(self, case: Ros2Message) -> str | None:
         body, garbage = self.body, 0
-        odometry, battery = OdometryReader(body.wheels.wheel_base_m, 0.22), BatteryReader(body.senses["battery"])
+        odometry, battery = OdometryReader(body.wheels.wheel_base_m, 0.22), BatteryReader(body.sensors["battery"])
         light = LightReader(np.zeros((1, 2)), 0, 1000.0)
         for reader in (LaserReader(body, 0.0), odometry, ImuReader(30.0), battery, light):
             if reader.kind != case.kind:

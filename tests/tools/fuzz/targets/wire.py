@@ -9,7 +9,7 @@ from swarmwire.agent.host import Host
 from swarmwire.agent.runner import Inbox
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
 from swarmwire.comms.run_views import Glimpse, Scene, Series
-from swarmwire.comms.tick_io import Senses
+from swarmwire.comms.tick_io import Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
@@ -19,7 +19,7 @@ from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import Roster
 from tests.support.agent.hosts import PLAYERS
 from tests.tools.fuzz.mutations import one_in, pick
-from tests.tools.fuzz.small_run import RUNNERS, joined, senses_of, small_run
+from tests.tools.fuzz.small_run import RUNNERS, joined, readings_of, small_run
 from tests.tools.fuzz.target import FrameTarget
 from tests.unit.comms.wire.test_truth_frames import SCENE
 
@@ -112,7 +112,7 @@ class WorldFrames(FrameTarget):
         return self.rosters[stage]
 
     def _open_tick(self, roster: Any) -> None:
-        inputs = (self.run.senses, self.run.received, self.run.tx_status)
+        inputs = (self.run.readings, self.run.received, self.run.tx_status)
         roster.open_tick(*((TICK, 0) if isinstance(roster, RealTime) else (TICK,)), *inputs)
 
 
@@ -169,7 +169,7 @@ class RunnerFrames(FrameTarget):
         self.run = run = small_run()
         self.host: Host | None = None
         decoded = decode_tick(
-            frames.decode(run.frames["one"][-1]), run.whole.measures or (), senses_of(run.parts, "one")
+            frames.decode(run.frames["one"][-1]), run.whole.measures or (), readings_of(run.parts, "one")
         )
         self.shapes = _shapes(decoded[0])
         between = encode_packets(11, 1_150_000_000, 3, run.received, run.tx_status)
@@ -200,8 +200,10 @@ class RunnerFrames(FrameTarget):
         return None
 
 
-def _shapes(senses: Senses) -> Any:
-    return {(name, sense): column.shape[1:] for name, group in senses.items() for sense, column in group.fields.items()}
+def _shapes(readings: Readings) -> Any:
+    return {
+        (name, sensor): column.shape[1:] for name, group in readings.items() for sensor, column in group.fields.items()
+    }
 
 
 class Scenes(FrameTarget):

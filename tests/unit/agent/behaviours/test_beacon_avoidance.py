@@ -13,7 +13,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
@@ -36,8 +36,8 @@ class One:
         zeros, given = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
         received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
-        senses = GroupSenses(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
-        actions = self._host.act((self.tick, now_ns, PERIOD_NS), senses, received)
+        readings = GroupReadings(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
+        actions = self._host.act((self.tick, now_ns, PERIOD_NS), readings, received)
         self.tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.consensus import Value
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
@@ -24,7 +24,7 @@ def told(*others: float, **params: float) -> float:
     payloads = Payloads.of([Value(value=other).encode() for other in others])
     received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
     host = hosted(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
-    actions = host.act((0, 0, 10**8), GroupSenses(np.zeros(1, np.int64), {}), received)
+    actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
     (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
     (value,) = actions.values.value.tolist()
     assert Value.decode(payload).value == value  # what it says to others is what it tells

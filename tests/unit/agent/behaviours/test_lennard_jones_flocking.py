@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.lennard_jones_flocking import Here
 from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
@@ -38,7 +38,7 @@ class One:
             light[0, light_ray] = 0.4
         fields = {"light.value": light}
         actions = self._host.act(
-            (self._tick, self._tick * 10**8, 10**8), GroupSenses(np.zeros(1, np.int64), fields), received
+            (self._tick, self._tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
         )
         self._tick += 1
         forward, turn = float(actions.linear_mps[0]), float(actions.angular_radps[0])

@@ -8,7 +8,7 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from tests.support.agent.hosts import group
 
 RAYS = load_body("flockbot").proximity
@@ -35,8 +35,8 @@ class One:
 
     def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
         fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
-        senses = GroupSenses(np.zeros(1, np.int64), fields)
-        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), senses, ReceivedPackets.none())
+        readings = GroupReadings(np.zeros(1, np.int64), fields)
+        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

@@ -17,7 +17,7 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
 from tests.support.agent.hosts import group
 
@@ -34,9 +34,9 @@ class One:
         self.body = "turtlebot3-burger" if "scan" in kind.needs else "footbot"
         self._tick, self._host = 0, hosted(group("", [0], body=self.body, params=dict(params)), kind)
 
-    def step(self, **senses: FloatArray) -> tuple[float, float]:
-        fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in senses.items()}
-        at = GroupSenses(np.zeros(1, np.int64), fields)
+    def step(self, **readings: FloatArray) -> tuple[float, float]:
+        fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in readings.items()}
+        at = GroupReadings(np.zeros(1, np.int64), fields)
         actions = self._host.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])

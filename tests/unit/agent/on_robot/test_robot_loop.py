@@ -11,7 +11,7 @@ from swarmwire.agent.on_robot.loop import LOST, RUNNING, Pacer
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.custom import ActuatorSheet
+from swarmwire.comms.bodies.custom import CustomActuatorSpec
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets
@@ -311,7 +311,7 @@ def test_ticks_of_a_pause_that_was_meant_are_neither_late_nor_skipped():
 
 
 def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_moves_them():
-    body = replace(load_body("epuck2"), actuators={"arm": ActuatorSheet("a:Arm", {}, 3)})
+    body = replace(load_body("epuck2"), actuators={"arm": CustomActuatorSpec("a:Arm", {}, 3)})
     group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
     mind = Mind(group, RATE_HZ, None, limits_for(body, None, None, ""))
     for tick in range(2):

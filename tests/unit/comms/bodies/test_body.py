@@ -15,9 +15,9 @@ WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
 
 
 def proximity_of(name: str) -> Proximity:
-    sheet = load_body(name).proximity
-    assert sheet is not None
-    return sheet
+    spec = load_body(name).proximity
+    assert spec is not None
+    return spec
 
 
 @pytest.mark.parametrize("name", body_names())
@@ -68,11 +68,11 @@ def test_the_epuck2_answers_as_its_driver_reads_it(distance_m: float) -> None:
 
 def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -> None:
     # Sectors of minimalist flocking: front (-45, 45], left (45, 135], rear (135, 225], right (225, 315].
-    body, sheet = load_body("flockbot"), proximity_of("flockbot")
+    body, spec = load_body("flockbot"), proximity_of("flockbot")
     infrared = body.infrared
     assert infrared is not None
-    assert sheet.range_m == infrared.range_m == pytest.approx(5.0 * 2.0 * body.radius_m)
-    for each in (sheet, infrared):
+    assert spec.range_m == infrared.range_m == pytest.approx(5.0 * 2.0 * body.radius_m)
+    for each in (spec, infrared):
         sector = np.floor((np.rad2deg(each.angle_rad) + 45.0 - 1e-9) / 90.0) % 4
         assert np.bincount(sector.astype(int)).tolist() == [3, 3, 3, 3]
 
@@ -121,7 +121,7 @@ def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
 
 
 def test_a_body_without_a_sense_has_no_sheet_for_it() -> None:
-    body = body_from({**sheet_of("epuck"), "senses": {}}, "blind.toml")
+    body = body_from({**sheet_of("epuck"), "sensors": {}}, "blind.toml")
     assert (body.proximity, body.compass, body.odometry) == (None, None, None)
 
 
@@ -131,15 +131,15 @@ def sheet_of(name: str) -> dict[str, Any]:
 
 def changed(path: str, value: object) -> dict[str, Any]:
     """The e-puck's sheet with one value put in place, or taken away where it is None."""
-    sheet = sheet_of("epuck")
+    spec = sheet_of("epuck")
     *tables, key = path.split(".")
-    table = sheet
+    table = spec
     for name in tables:
         table = table[name]
     table[key] = value
     if value is None:
         del table[key]
-    return sheet
+    return spec
 
 
 WHEELLESS = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
@@ -158,28 +158,28 @@ WHEELLESS = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "m
         ("drive.gears", 3, "drive.gears"),
         ("drive.noise", {"factor": 1000.0}, "drive.noise.factor"),
         ("drive.noise", {"bias_mps": -1}, "drive.noise.bias_mps"),
-        ("drive", WHEELLESS, "senses.odometry"),
+        ("drive", WHEELLESS, "sensors.odometry"),
         ("mass_kg", 10**400, "mass_kg"),
-        ("senses", 3, "senses"),
-        ("senses.lidar", {}, "senses.lidar"),
-        ("senses.light.noise", 2, "senses.light.noise"),
-        ("senses.bumper.noise", 1, "senses.bumper.noise"),
-        ("senses.positioning", {"noise_m": -1}, "senses.positioning.noise_m"),
-        ("senses.compass", True, "senses.compass"),
-        ("senses.compass.delay_s", 1e308, "senses.compass.delay_s"),
-        ("senses.compass.noise_rad", -1, "senses.compass.noise_rad"),
-        ("senses.odometry.slip", 2, "senses.odometry.slip"),
-        ("senses.proximity.response.b", 36.8961, "senses.proximity.response"),
-        ("senses.proximity.response.kind", "cubic", "senses.proximity.response.kind"),
-        *(("senses.proximity.angles_deg", value, "senses.proximity.angles_deg") for value in (17, [], [1] * 1001)),
-        ("senses.proximity.angles_deg", [1, "x"], "senses.proximity.angles_deg[1]"),
-        ("senses.ground.points_m", [[0, 0]] * 1001, "senses.ground.points_m"),
-        ("senses.scan", {"rays": 10_001, "range_m": 1}, "senses.scan.rays"),
-        ("senses.camera.most_blobs", 1001, "senses.camera.most_blobs"),
+        ("sensors", 3, "sensors"),
+        ("sensors.lidar", {}, "sensors.lidar"),
+        ("sensors.light.noise", 2, "sensors.light.noise"),
+        ("sensors.bumper.noise", 1, "sensors.bumper.noise"),
+        ("sensors.positioning", {"noise_m": -1}, "sensors.positioning.noise_m"),
+        ("sensors.compass", True, "sensors.compass"),
+        ("sensors.compass.delay_s", 1e308, "sensors.compass.delay_s"),
+        ("sensors.compass.noise_rad", -1, "sensors.compass.noise_rad"),
+        ("sensors.odometry.slip", 2, "sensors.odometry.slip"),
+        ("sensors.proximity.response.b", 36.8961, "sensors.proximity.response"),
+        ("sensors.proximity.response.kind", "cubic", "sensors.proximity.response.kind"),
+        *(("sensors.proximity.angles_deg", value, "sensors.proximity.angles_deg") for value in (17, [], [1] * 1001)),
+        ("sensors.proximity.angles_deg", [1, "x"], "sensors.proximity.angles_deg[1]"),
+        ("sensors.ground.points_m", [[0, 0]] * 1001, "sensors.ground.points_m"),
+        ("sensors.scan", {"rays": 10_001, "range_m": 1}, "sensors.scan.rays"),
+        ("sensors.camera.most_blobs", 1001, "sensors.camera.most_blobs"),
         ("leds.angles_deg", [1] * 1001, "leds.angles_deg"),
         *((f"leds.{name}", value, f"leds.{name}") for name, value in (("radius_m", 0.044), ("height_m", 0.173))),
         ("leds.beacon_height_m", 1, "leds.beacon_height_m"),
-        ("altitude_m", 0.5, "senses.ground"),
+        ("altitude_m", 0.5, "sensors.ground"),
     ],
 )
 def test_a_bad_sheet_is_refused_in_one_line_with_file_and_key(path: str, value: object, key: str) -> None:
@@ -194,7 +194,7 @@ def test_a_bad_sheet_is_refused_in_one_line_with_file_and_key(path: str, value: 
     [
         ("radius_m", None, "is missing: radius of the body"),
         ("like", "roomba", f"expected one of {', '.join(body_names())}; got 'roomba'"),
-        ("senses.light.noise", 2, "expected at most 1, got 2.0"),
+        ("sensors.light.noise", 2, "expected at most 1, got 2.0"),
         ("drive.wheel_base_m", 0.0701, "expected at most the body's diameter, 0.07 m; got 0.0701"),
     ],
 )
@@ -212,18 +212,18 @@ def test_whole_numbers_serve_as_numbers() -> None:
 
 def test_a_body_like_another_differs_only_in_what_it_says() -> None:
     gps, epuck = load_body("epuck-gps"), load_body("epuck")
-    assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "senses": None} == {
+    assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "sensors": None} == {
         **epuck.as_mapping(),
-        "senses": None,
+        "sensors": None,
     }
-    assert gps.senses == {**epuck.senses, "positioning": Positioning(0.01)}
+    assert gps.sensors == {**epuck.sensors, "positioning": Positioning(0.01)}
     mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
     assert (mine.wheels.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
-    assert (mine.name, mine.senses) == ("mine", gps.senses)
+    assert (mine.name, mine.sensors) == ("mine", gps.sensors)
 
 
 def test_bodies_know_no_global_position_unless_they_say_so() -> None:
-    assert [name for name in body_names() if "positioning" in load_body(name).senses] == ["epuck-gps", "point"]
+    assert [name for name in body_names() if "positioning" in load_body(name).sensors] == ["epuck-gps", "point"]
 
 
 def test_photocells_are_argos_s() -> None:
@@ -238,11 +238,11 @@ def test_photocells_are_argos_s() -> None:
 def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> None:
     forces = {"max_force_n": 1.0, "max_torque_nm": 1.0}
     drive = {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, **forces}
-    sheet = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
-    drone = body_from(sheet, "drone.toml")
-    assert set(load_body("epuck").senses) - set(drone.senses) == {"odometry", "ground"}
+    spec = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
+    drone = body_from(spec, "drone.toml")
+    assert set(load_body("epuck").sensors) - set(drone.sensors) == {"odometry", "ground"}
     with pytest.raises(BadInput, match=r"drone\.toml: senses\.ground: expected altitude_m = 0"):
-        body_from({**sheet, "senses": {"ground": {"noise": 0.1}}}, "drone.toml")
+        body_from({**spec, "sensors": {"ground": {"noise": 0.1}}}, "drone.toml")
 
 
 def test_numbers_of_own_actuators_stand_one_after_another() -> None:
@@ -263,8 +263,8 @@ def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
 
 
 def test_merged_tables_keep_what_only_one_says_and_take_the_rest_from_the_second():
-    base = {"name": "a", "senses": {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}, "radius_m": 1.0}
-    over = {"senses": {"compass": {"delay_s": 1.0}}, "radius_m": {"new": 2}}
-    senses = {"compass": {"noise_rad": 0.1, "delay_s": 1.0}, "light": {"noise": 0.2}}
-    assert merged(base, over) == {"name": "a", "senses": senses, "radius_m": {"new": 2}}
-    assert base["senses"] == {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}
+    base = {"name": "a", "sensors": {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}, "radius_m": 1.0}
+    over = {"sensors": {"compass": {"delay_s": 1.0}}, "radius_m": {"new": 2}}
+    sensors = {"compass": {"noise_rad": 0.1, "delay_s": 1.0}, "light": {"noise": 0.2}}
+    assert merged(base, over) == {"name": "a", "sensors": sensors, "radius_m": {"new": 2}}
+    assert base["sensors"] == {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}

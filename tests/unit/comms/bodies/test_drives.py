@@ -17,8 +17,8 @@ HOLONOMIC = {"kind": "holonomic", "max_speed_mps": 0.5, "max_angular_radps": 3.0
 
 
 def driven(drive: object, **given: Any) -> Body:
-    sheet = {"name": "mine", "source": "nowhere", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0}
-    return body_from({**sheet, "drive": drive, **given}, "mine.toml")
+    spec = {"name": "mine", "source": "nowhere", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0}
+    return body_from({**spec, "drive": drive, **given}, "mine.toml")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Antenna, Antennas, OwnAntenna
+from swarmwire.comms.radio.config.phy import Antenna, Antennas, RobotAntenna
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.reception.bursts import BurstStates
@@ -139,7 +139,12 @@ def test_robots_without_anything_of_their_own_have_the_radios():
 
 
 def test_groups_have_their_own_power_or_gain_or_both():
-    groups = [(1, OwnAntenna(power_dbm=0.0)), (2, OwnAntenna(gain_dbi=-1.0)), (1, None), (1, OwnAntenna(1.0, 1.0))]
+    groups = [
+        (1, RobotAntenna(power_dbm=0.0)),
+        (2, RobotAntenna(gain_dbi=-1.0)),
+        (1, None),
+        (1, RobotAntenna(1.0, 1.0)),
+    ]
     mixed = Antennas.of_groups(groups)
     assert mixed.send_dbm(RADIO).tolist() == [2.0, 9.0, 9.0, 12.0, 2.0]
     assert mixed.receive_dbi(RADIO).tolist() == [2.0, -1.0, -1.0, 2.0, 1.0]

@@ -21,7 +21,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import Actions, Actuations, GroupSenses, LedChanges, Notes, Senses, Values
+from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Readings, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 
@@ -39,12 +39,12 @@ def floats(*shape: int) -> st.SearchStrategy[Any]:
 
 
 @st.composite
-def senses_(draw: st.DrawFn) -> Senses:
-    out: Senses = {}
+def readings_(draw: st.DrawFn) -> Readings:
+    out: Readings = {}
     for name in draw(st.lists(st.sampled_from(["flock", "a-b", "x_1"]), unique=True, max_size=3)):
         n = draw(st.integers(0, 4))
         fields = {"compass.heading_rad": draw(floats(n)), "proximity.value": draw(floats(n, 8))}
-        out[name] = GroupSenses(np.sort(draw(ints(n))), fields)
+        out[name] = GroupReadings(np.sort(draw(ints(n))), fields)
     return out
 
 
@@ -62,21 +62,21 @@ def same(one: Any, other: Any) -> bool:
     return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
 
 
-@given(senses_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
+@given(readings_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
 def test_senses_and_received_packets_come_over_whole(
-    senses: Senses, measures: tuple[str, ...], data: st.DataObject
+    readings: Readings, measures: tuple[str, ...], data: st.DataObject
 ) -> None:
-    assume(senses)
+    assume(readings)
     received = data.draw(received_(measures))
-    frame = frames.decode(encode_tick(5, senses, received, NO_TX_STATUSES))
-    got_senses, got, tx_status = decode_tick(frame, measures, senses.keys())
+    frame = frames.decode(encode_tick(5, readings, received, NO_TX_STATUSES))
+    got_readings, got, tx_status = decode_tick(frame, measures, readings.keys())
     assert "tx_status" not in frame.arrays
     assert len(tx_status) == 0
-    assert list(got_senses) == list(senses)
-    for name, group in senses.items():
-        assert same(got_senses[name].rows, group.rows)
-        assert list(got_senses[name].fields) == list(group.fields)
-        assert all(same(got_senses[name].fields[field], column) for field, column in group.fields.items())
+    assert list(got_readings) == list(readings)
+    for name, group in readings.items():
+        assert same(got_readings[name].rows, group.rows)
+        assert list(got_readings[name].fields) == list(group.fields)
+        assert all(same(got_readings[name].fields[field], column) for field, column in group.fields.items())
     assert len(got) == len(received)
     assert set(got.given) == set(measures)
     for column in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
@@ -113,7 +113,7 @@ TWO_RECEIVED = ReceivedPackets(
     ids=repr,
 )
 def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, TWO_RECEIVED, NO_TX_STATUSES))
+    frame = frames.decode(encode_tick(5, {"flock": GroupReadings(ROWS, {})}, TWO_RECEIVED, NO_TX_STATUSES))
     decode_tick(frame, ("range_m",), {"flock"})
     with pytest.raises(BadFrame) as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, name: wrong}), ("range_m",), {"flock"})
@@ -138,8 +138,8 @@ def test_senses_and_packets_of_other_robots_are_refused(
     known = {"flock": np.array([4, 5, 6])}
 
     def checked(rows: list[int], column: list[float], receiver: list[int]) -> None:
-        senses = {"flock": GroupSenses(np.array(rows), {"compass.heading_rad": np.array(column)})}
-        check_rows(senses, replace(TWO_RECEIVED, receiver=np.array(receiver)), known)
+        readings = {"flock": GroupReadings(np.array(rows), {"compass.heading_rad": np.array(column)})}
+        check_rows(readings, replace(TWO_RECEIVED, receiver=np.array(receiver)), known)
 
     checked([4, 5], [0.0, 0.0], [4, 5])
     with pytest.raises(BadFrame) as caught:
@@ -148,7 +148,7 @@ def test_senses_and_packets_of_other_robots_are_refused(
 
 
 def telling(tx_status: TxStatuses) -> frames.Frame:
-    return frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, ReceivedPackets.none(), tx_status))
+    return frames.decode(encode_tick(5, {"flock": GroupReadings(ROWS, {})}, ReceivedPackets.none(), tx_status))
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(TxResult)), min_size=1))
@@ -159,8 +159,8 @@ def test_tx_status_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
 
 
 def test_senses_of_other_groups_or_none_are_refused() -> None:
-    for senses, known in (({"flock": GroupSenses(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
-        frame = frames.decode(encode_tick(5, senses, ReceivedPackets.none(), NO_TX_STATUSES))
+    for readings, known in (({"flock": GroupReadings(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
+        frame = frames.decode(encode_tick(5, readings, ReceivedPackets.none(), NO_TX_STATUSES))
         with pytest.raises(BadFrame, match="expected groups of this runner"):
             decode_tick(frame, (), known)
 
@@ -170,7 +170,7 @@ def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measure
     received = ReceivedPackets(
         *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"])
     )
-    frame = frames.decode(encode_tick(5, {"flock": GroupSenses(ROWS, {})}, received, NO_TX_STATUSES))
+    frame = frames.decode(encode_tick(5, {"flock": GroupReadings(ROWS, {})}, received, NO_TX_STATUSES))
     with pytest.raises(BadFrame):
         decode_tick(frame, measures, {"flock"})
 

@@ -14,7 +14,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_image
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import Glimpse, Scene, Series, static_of, truth_of
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import Departed, Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import (
@@ -83,7 +83,7 @@ def finished_(draw: st.DrawFn) -> Finished:
 def glimpses(draw: st.DrawFn) -> Glimpse:
     states = ("", *draw(st.lists(st.text(max_size=64), max_size=3)))
     rows = np.array(draw(st.lists(st.integers(0, ROWS - 1), unique=True)), np.int64)
-    senses = {"a": GroupSenses(np.sort(rows), {"compass.heading_rad": draw(floats(len(rows)))})}
+    readings = {"a": GroupReadings(np.sort(rows), {"compass.heading_rad": draw(floats(len(rows)))})}
     flags = npst.arrays(np.bool_, ROWS)
     happened = st.builds(
         Happened,
@@ -106,7 +106,7 @@ def glimpses(draw: st.DrawFn) -> Glimpse:
         state=draw(ints(ROWS, least=0, most=len(states) - 1)),
         states=states,
         leds=draw(ints(ROWS, SCENE.static.most_leds, least=0, most=0xFFFFFF)),
-        senses=draw(st.sampled_from([{}, senses])),
+        readings=draw(st.sampled_from([{}, readings])),
         contact_onsets=draw(ints(ARENAS, 2)),
         edges=draw(st.none() | ints(draw(st.integers(0, 5)), 2, least=0, most=ROWS - 1)),
         tally=draw(st.none() | st.builds(Tally, ints(2), ints(2), ints(2), ints(2, len(Fate)))),
@@ -165,7 +165,7 @@ def quiet(**given: Any) -> Glimpse:
         state=np.zeros(ROWS, np.int64),
         states=("",),
         leds=np.zeros((ROWS, SCENE.static.most_leds), np.int64),
-        senses={},
+        readings={},
         contact_onsets=np.zeros((ARENAS, 2), np.int64),
         edges=None,
         tally=None,
@@ -202,9 +202,9 @@ def one_finished(**given: int) -> Finished:
         ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
         ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
         ("events", {"events": (Happened(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
-        ("groups of this run", {"senses": {"c": GroupSenses(np.zeros(1, np.int64), {})}}),
-        ("sense/a/rows", {"senses": {"a": GroupSenses(np.array([ROWS]), {"x": np.zeros(1)})}}),
-        ("sense/a", {"senses": {"a": GroupSenses(np.array([0]), {"x": np.zeros(2)})}}),
+        ("groups of this run", {"senses": {"c": GroupReadings(np.zeros(1, np.int64), {})}}),
+        ("sense/a/rows", {"senses": {"a": GroupReadings(np.array([ROWS]), {"x": np.zeros(1)})}}),
+        ("sense/a", {"senses": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
     ],
 )
 def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
@@ -225,7 +225,7 @@ def test_events_that_are_none_are_refused(events):
 
 
 def test_a_sense_may_have_a_name_of_several_parts():
-    glimpse = quiet(senses={"a": GroupSenses(np.array([0]), {"own/of/mine": np.zeros(1)})})
+    glimpse = quiet(readings={"a": GroupReadings(np.array([0]), {"own/of/mine": np.zeros(1)})})
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
 
@@ -348,8 +348,8 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
         assert (one.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
     if truth.finished is not None and one.finished is not None:
         assert len(one.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
-    seen = [row for group in one.senses.values() for row in (group.rows + rows.start).tolist()]
-    assert seen == [row for g in truth.senses.values() for row in g.rows.tolist() if row // ROBOTS == arena]
+    seen = [row for group in one.readings.values() for row in (group.rows + rows.start).tolist()]
+    assert seen == [row for g in truth.readings.values() for row in g.rows.tolist() if row // ROBOTS == arena]
 
 
 def test_packets_that_left_are_of_one_arena():

@@ -171,10 +171,10 @@ def test_a_network_without_certificates_is_warned_of_each_time(scenario, scripte
 
 
 def test_a_sheet_within_the_scenario_is_refused_where_robots_read_theirs(scenario: Path, scripted: Any) -> None:
-    changed = ["robots.other.sheet.senses.proximity.drop_out=0.5"]
+    changed = ["robots.other.body_overrides.sensors.proximity.drop_out=0.5"]
 
     def begun() -> None:
         with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=changed):
             pass
 
-    assert refused(begun).key == "robots.other.sheet"
+    assert refused(begun).key == "robots.other.body_overrides"

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.tick_io import GroupSenses
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.about import about
 from swarmwire.metrics.viewer.selected import selected_robot
@@ -28,7 +28,9 @@ def rays(path):
 
 
 def sensed(rows, **fields):
-    return {"flock": GroupSenses(np.array(rows), {name.replace("_", ".", 1): value for name, value in fields.items()})}
+    return {
+        "flock": GroupReadings(np.array(rows), {name.replace("_", ".", 1): value for name, value in fields.items()})
+    }
 
 
 def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_path):
@@ -36,7 +38,7 @@ def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_p
     value = np.zeros((2, 8))
     value[1] = RESPONSE.value(distance_m)
     pose = np.array([[0, 0, 0], [0, 0, 0], [9, 9, 0], [1.0, 2.0, 0.5]])
-    seen = truth(of, pose=pose, senses=sensed([2, 3], proximity_value=value))
+    seen = truth(of, pose=pose, readings=sensed([2, 3], proximity_value=value))
     record(tmp_path / "run.rrd", of, [seen], arena=1, selected="flock-1")
     lines, _ = rays(tmp_path / "run.rrd")[0]
     outwards = np.stack([np.cos(LOOKS + 0.5), np.sin(LOOKS + 0.5)], axis=1)
@@ -52,7 +54,7 @@ def test_a_ray_has_the_colour_of_what_it_meets_and_noise_is_nothing(tmp_path):
     of = static(2)
     pose = np.array([[0, 0, 0], [0.0, 0.09, 0]])  # the other stands on the ray to the left
     value = np.array([[0.5, 0.04, 0.5, 0, 0, 0, 0, 0], [0] * 8], float)
-    record(tmp_path / "run.rrd", of, [truth(of, pose=pose, senses=sensed([0, 1], proximity_value=value))])
+    record(tmp_path / "run.rrd", of, [truth(of, pose=pose, readings=sensed([0, 1], proximity_value=value))])
     _, colors = rays(tmp_path / "run.rrd")[0]
     wall, noise, robot, *nothing = colors
     assert len({wall, noise, robot}) == 3
@@ -63,7 +65,7 @@ def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tm
     of, value = static(1), np.full((1, 8), 0.5)
     turned = np.array([[0.0, 0.0, 1.0]])
     ticks = [
-        truth(of, 0, senses=sensed([0], proximity_value=value)),
+        truth(of, 0, readings=sensed([0], proximity_value=value)),
         truth(of, 1, pose=turned),
         truth(of, 2, alive=np.array([False])),
         truth(of, 3, alive=np.array([False])),
@@ -79,7 +81,7 @@ def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tm
 def test_in_large_swarms_rays_that_see_nothing_are_thinned_as_links_are(tmp_path, robots, expected):
     of = static(robots)
     ticks = [
-        truth(of, tick, senses=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
+        truth(of, tick, readings=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
         for tick in range(12)
     ]
     record(tmp_path / "run.rrd", of, ticks)
@@ -88,7 +90,7 @@ def test_in_large_swarms_rays_that_see_nothing_are_thinned_as_links_are(tmp_path
 
 def test_photocells_are_bars_as_long_as_what_they_see(tmp_path):
     of, value = static(1), np.linspace(0.0, 1.0, 8)[None]
-    record(tmp_path / "run.rrd", of, [truth(of, senses=sensed([0], light_value=value))])
+    record(tmp_path / "run.rrd", of, [truth(of, readings=sensed([0], light_value=value))])
     lines, _ = rays(tmp_path / "run.rrd")[0]
     length_m = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
     np.testing.assert_allclose(length_m, 2.0 * EPUCK.radius_m * value[0], atol=1e-6)
@@ -101,7 +103,7 @@ def test_an_agent_that_senses_nothing_has_no_rays(tmp_path):
 
 
 def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
-    blind = replace(EPUCK, senses={})
+    blind = replace(EPUCK, readings={})
     of = static(4)
     mixed = replace(of, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
     assert selected_robot(mixed, None, "here") == "flock-2"

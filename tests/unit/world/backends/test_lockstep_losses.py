@@ -11,14 +11,14 @@ from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.backends.join_policy import Refused
 from swarmwire.world.backends.lockstep import Lockstep
 from tests.support.agent.hosts import MEASURES, plain
-from tests.support.world.locksteps import actions, all_senses, joined, ready, request, state, two, two_parts
+from tests.support.world.locksteps import actions, all_readings, joined, ready, request, state, two, two_parts
 
 
 @pytest.mark.parametrize("opened", [False, True])
 def test_a_failed_agent_ends_the_run_with_its_robots_and_traceback(opened: bool) -> None:
     lockstep = joined(two(), "a", "b")
     if opened:
-        ready(lockstep, "a", "b").open_tick(0, all_senses(), ReceivedPackets.none(MEASURES))
+        ready(lockstep, "a", "b").open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
     with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, {"robots": "flock-4", "traceback": "Boom"}))
     assert (caught.value.robots, caught.value.traceback) == ("flock-4", "Boom")
@@ -45,7 +45,7 @@ def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
 
 def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "dead"), "a", "b"), "a", "b")
-    lockstep.open_tick(0, all_senses(), ReceivedPackets.none(MEASURES))
+    lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
     lockstep.gone("b", "its link is gone")
     assert (lockstep.waiting, lockstep.missing[0]) == (1, "a")
     for tick in range(2):
@@ -57,7 +57,7 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
         assert got.drive[still].all()
         assert not got.linear_mps[still].any()
         assert not got.angular_radps[still].any()
-        out = lockstep.open_tick(tick + 1, all_senses(tick + 1), ReceivedPackets.none(MEASURES))
+        out = lockstep.open_tick(tick + 1, all_readings(tick + 1), ReceivedPackets.none(MEASURES))
         assert [name for name, _ in out] == ["a"]
     assert [loss.runner for loss in lockstep.losses] == ["b"]
     assert lockstep.counts() == {"runners_lost": 1}
@@ -68,7 +68,7 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
 @pytest.mark.parametrize("answered", [False, True])
 def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(answered: bool) -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "wait"), "a", "b"), "a", "b")
-    out = dict(lockstep.open_tick(0, all_senses(), ReceivedPackets.none(MEASURES)))
+    out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
     lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
     if answered:
         lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
@@ -82,7 +82,7 @@ def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(
     lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
     assert not lockstep.waiting
     assert plain(lockstep.take()) == plain(actions(list(range(8))))
-    assert [name for name, _ in lockstep.open_tick(1, all_senses(1), ReceivedPackets.none(MEASURES))] == ["a", "c"]
+    assert [name for name, _ in lockstep.open_tick(1, all_readings(1), ReceivedPackets.none(MEASURES))] == ["a", "c"]
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "wait"])

@@ -11,13 +11,13 @@ from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxSt
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep
-from tests.support.agent.hosts import MEASURES, plain, received_from, senses
+from tests.support.agent.hosts import MEASURES, plain, readings, received_from
 from tests.support.world.locksteps import (
     FLOCK,
     GROUPS,
     SCOUTS,
     actions,
-    all_senses,
+    all_readings,
     joined,
     parts,
     playing,
@@ -31,7 +31,7 @@ from tests.support.world.locksteps import (
 def test_a_tick_is_complete_once_all_have_answered() -> None:
     lockstep = playing()
     for tick in range(3):
-        out = dict(lockstep.open_tick(tick, all_senses(tick), ReceivedPackets.none(MEASURES)))
+        out = dict(lockstep.open_tick(tick, all_readings(tick), ReceivedPackets.none(MEASURES)))
         assert list(out) == ["a", "b"]
         assert {frames.decode(data).tick for data in out.values()} == {tick}
         for name in ("a", "b"):
@@ -47,7 +47,7 @@ def test_answers_in_any_order_give_the_same() -> None:
     taken: list[Any] = []
     for order in (["a", "b"], ["b", "a"]):
         lockstep = playing()
-        out = dict(lockstep.open_tick(0, all_senses(), ReceivedPackets.none(MEASURES)))
+        out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
         for name in order:
             lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
         got = lockstep.take()
@@ -77,7 +77,7 @@ def test_answers_in_any_order_give_the_same() -> None:
 )
 def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
     lockstep = playing()
-    lockstep.open_tick(4, all_senses(), ReceivedPackets.none(MEASURES))
+    lockstep.open_tick(4, all_readings(), ReceivedPackets.none(MEASURES))
     lockstep.answer("b", sound("b"))
     before = state(lockstep)
     lockstep.answer(runner, data)
@@ -89,7 +89,7 @@ def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, d
 
 def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
     lockstep, generator, data = playing(), np.random.default_rng(3), sound()
-    lockstep.open_tick(4, all_senses(), ReceivedPackets.none(MEASURES))
+    lockstep.open_tick(4, all_readings(), ReceivedPackets.none(MEASURES))
     before = state(lockstep)
     for _ in range(1000):
         spoiled = bytearray(data)
@@ -102,7 +102,7 @@ def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
 
 def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
     lockstep = playing()
-    some = {"flock": senses(0, [1, 4]), "lone": senses(0, [7])}
+    some = {"flock": readings(0, [1, 4]), "lone": readings(0, [7])}
     out = dict(lockstep.open_tick(0, some, ReceivedPackets.none(MEASURES)))
     assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
     lockstep.answer("b", encode_actions(0, actions([4, 7])))
@@ -114,7 +114,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
     lockstep = playing()
     out = dict(
-        lockstep.open_tick(0, {"flock": senses(0, [4]), "scouts": senses(0, [])}, ReceivedPackets.none(MEASURES))
+        lockstep.open_tick(0, {"flock": readings(0, [4]), "scouts": readings(0, [])}, ReceivedPackets.none(MEASURES))
     )
     found, *_ = decode_tick(frames.decode(out["a"]), MEASURES, GROUPS)
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
@@ -128,7 +128,7 @@ def test_each_runner_gets_the_tx_status_of_its_own_robots_in_their_order():
     ready(joined(lockstep, "a", "b", "c"), "a", "b", "c")
     told = TxStatuses(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
     got: dict[str, list[list[int]]] = {}
-    for name, frame in lockstep.open_tick(0, all_senses(), ReceivedPackets.none(MEASURES), told):
+    for name, frame in lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES), told):
         _, _, its = decode_tick(frames.decode(frame), MEASURES, GROUPS)
         got[name] = [its.row.tolist(), its.id.tolist(), its.result.tolist()]
     assert got == {"a": [[1, 1, 3], [2, 3, 1], [1, 2, 4]], "b": [[0, 2], [9, 0], [0, 3]], "c": [[], [], []]}
@@ -136,7 +136,7 @@ def test_each_runner_gets_the_tx_status_of_its_own_robots_in_their_order():
 
 def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for() -> None:
     lockstep = ready(joined(Lockstep(parts({0: 0, 1: 0, 4: 0, 5: 0, 2: 1, 6: 1, 3: 1, 7: 1})), "a", "b"), "a", "b")
-    frames_out = lockstep.open_tick(0, {"flock": senses(0, FLOCK)}, ReceivedPackets.none(MEASURES))
+    frames_out = lockstep.open_tick(0, {"flock": readings(0, FLOCK)}, ReceivedPackets.none(MEASURES))
     assert [runner for runner, _ in frames_out] == ["a"]
     assert lockstep.waiting == 1
     lockstep.answer("b", encode_actions(0, actions([])))
@@ -160,7 +160,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     names = [f"r{i}" for i in range(len(slots))]
     ready(joined(lockstep, *names), *names)
     acting_groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
-    whole = {name: senses(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
+    whole = {name: readings(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
     senders = data.draw(st.lists(st.integers(0, 7), max_size=6))
     sent = SentPackets(
         np.array(senders, np.int64), np.full(len(senders), -1), Payloads.of([bytes([s] * (s + 1)) for s in senders])
@@ -173,9 +173,9 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
     for (name, frame), own in zip(out, owned, strict=True):
-        got_senses, got, _ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
+        got_readings, got, _ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
         rows: list[int] = []
-        for part_name, part in got_senses.items():
+        for part_name, part in got_readings.items():
             rows += part.rows.tolist()
             assert part.rows.tolist() == sorted(part.rows.tolist())
             seen |= {

@@ -21,7 +21,7 @@ from tests.support.world.locksteps import (
     GROUPS,
     SCOUTS,
     actions,
-    all_senses,
+    all_readings,
     joined,
     parts,
     ready,
@@ -52,7 +52,7 @@ def comes(roster: Lockstep | RealTime, runner: str, *names: str) -> Memory:
 
 
 def opened(lockstep: Lockstep, tick: int, received: ReceivedPackets | None = None) -> dict[str, list[int]]:
-    out = lockstep.open_tick(tick, all_senses(tick), ReceivedPackets.none(MEASURES) if received is None else received)
+    out = lockstep.open_tick(tick, all_readings(tick), ReceivedPackets.none(MEASURES) if received is None else received)
     return {name: rows_of(data) for name, data in out}
 
 
@@ -212,24 +212,24 @@ def commands(roster: RealTime) -> dict[int, float]:
 def test_in_real_time_too_and_no_watchdog_counts_robots_that_nobody_asks(on_loss: Any) -> None:
     roster = real_time(on_loss)
     for tick in range(3):
-        roster.open_tick(tick, tick * TICK_NS, all_senses(tick), ReceivedPackets.none(MEASURES))
+        roster.open_tick(tick, tick * TICK_NS, all_readings(tick), ReceivedPackets.none(MEASURES))
         assert commands(roster) == {}
     comes(roster, "a", "flock-1", "flock-5")
-    [(name, frame)] = roster.open_tick(3, 3 * TICK_NS, all_senses(3), ReceivedPackets.none(MEASURES))
+    [(name, frame)] = roster.open_tick(3, 3 * TICK_NS, all_readings(3), ReceivedPackets.none(MEASURES))
     assert (name, rows_of(frame)) == ("a", [1, 5])
     rows = np.array([1, 5])
     moving = Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2))
     kept = {"flock": GroupMemory(rows, {"x": np.array([7, 8])})}
     roster.answer("a", encode_actions(3, moving, memory=kept))
     assert commands(roster) == {1: 0.5, 5: 0.5}
-    roster.open_tick(4, 4 * TICK_NS, all_senses(4), ReceivedPackets.none(MEASURES))
+    roster.open_tick(4, 4 * TICK_NS, all_readings(4), ReceivedPackets.none(MEASURES))
     roster.answer("a", LEAVE)
     assert commands(roster) == ({1: 0.0, 5: 0.0} if on_loss == "stand" else {})
     for tick in range(5, 20):
-        assert roster.open_tick(tick, tick * TICK_NS, all_senses(tick), ReceivedPackets.none(MEASURES)) == []
+        assert roster.open_tick(tick, tick * TICK_NS, all_readings(tick), ReceivedPackets.none(MEASURES)) == []
         assert commands(roster) == {}
     assert not roster.watchdog_stops.any()
     assert comes(roster, "b", "flock-5")["flock"].columns["x"].tolist() == [8]
-    assert [name for name, _ in roster.open_tick(20, 20 * TICK_NS, all_senses(20), ReceivedPackets.none(MEASURES))] == [
-        "b"
-    ]
+    assert [
+        name for name, _ in roster.open_tick(20, 20 * TICK_NS, all_readings(20), ReceivedPackets.none(MEASURES))
+    ] == ["b"]

@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDE
-from swarmwire.comms.bodies.sensors import OwnSheet
-from swarmwire.comms.errors import BadInput, OwnCodeFailed
+from swarmwire.comms.bodies.sensors import CustomSensorSpec
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, Actuations
 from swarmwire.world.custom.loading import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
@@ -19,11 +19,11 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded
 
-CODE = Path(__file__).parents[3] / "support" / "world" / "own_code.py"
+CODE = Path(__file__).parents[3] / "support" / "world" / "custom_code.py"
 PAINT, PAINTER = f"{CODE}:Paint", f"{CODE}:Painter"
 BOTH = f'''like = "epuck"
 name = "mine"
-[senses.paint]
+[sensors.paint]
 kind = "{PAINT}"
 scale = 2.0
 [actuators.painter]
@@ -31,17 +31,17 @@ kind = "{PAINTER}"
 '''
 
 
-def scenario(folder: Path, sheet: str, count: int = 2) -> Scenario:
+def scenario(folder: Path, spec: str, count: int = 2) -> Scenario:
     """Robots with this body, on a line."""
-    (folder / "mine.toml").write_text(sheet)
+    (folder / "mine.toml").write_text(spec)
     poses = [[0.5 * i, 0.0, 0.0] for i in range(count)]
     group = {"body": "mine.toml", "count": count, "agent": "x:X", "place": {"how": "poses", "poses": poses}}
     tables = {"arena": {"size_m": [4.0, 4.0]}, "robots": {"a": group}}
     return scenario_from({"format": 1, "name": "t", "seed": 1, "duration_s": 1.0, **tables}, str(folder / "s.toml"))
 
 
-def world(folder: Path, sheet: str = BOTH, seeds: tuple[int, ...] = (1,), needs: tuple[str, ...] = ("paint",)) -> World:
-    return World(scenario(folder, sheet), seeds, {"a": needs})
+def world(folder: Path, spec: str = BOTH, seeds: tuple[int, ...] = (1,), needs: tuple[str, ...] = ("paint",)) -> World:
+    return World(scenario(folder, spec), seeds, {"a": needs})
 
 
 def actuated(of: World, rows: list[int], place: list[int], value: list[float], speed: float = 0.0) -> Actions:
@@ -63,8 +63,8 @@ def test_an_own_sense_tells_what_an_own_actuator_did(tmp_path: Path) -> None:
 def test_a_sheets_own_code_is_made_with_its_parameters(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(BOTH)
     body = read_body(tmp_path / "mine.toml", "s.toml", "robots.a.body")
-    paint, painter = body.senses["paint"], body.actuators["painter"]
-    assert isinstance(paint, OwnSheet)
+    paint, painter = body.sensors["paint"], body.actuators["painter"]
+    assert isinstance(paint, CustomSensorSpec)
     made: Any = made_sensor(paint)
     assert (type(made).__name__, made.scale) == ("Paint", 2.0)
     assert type(made_actuator(painter)).__name__ == "Painter"
@@ -109,7 +109,7 @@ def test_the_dead_do_nothing_and_places_that_are_not_there_are_counted(tmp_path:
 
 
 def test_one_field_needs_no_tuple_and_is_copied(tmp_path: Path) -> None:
-    of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:Alone"\n', needs=("x",))
+    of = world(tmp_path, f'like = "epuck"\n[sensors.x]\nkind = "{CODE}:Alone"\n', needs=("x",))
     told = of.sense(0)["a"].fields["x.x"]
     told[:] = 9.0
     assert of.sense(1)["a"].fields["x.x"].tolist() == [0.0, 0.5]
@@ -126,19 +126,19 @@ def test_one_field_needs_no_tuple_and_is_copied(tmp_path: Path) -> None:
     ],
 )
 def test_a_sense_that_fails_says_which_it_is(tmp_path: Path, name: str, said: str) -> None:
-    of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:{name}"\n', needs=("x",))
-    with pytest.raises(OwnCodeFailed, match=rf"the sense x of a \(.*own_code.py:{name}\) failed:[\s\S]*{said}"):
+    of = world(tmp_path, f'like = "epuck"\n[sensors.x]\nkind = "{CODE}:{name}"\n', needs=("x",))
+    with pytest.raises(CustomCodeFailed, match=rf"the sense x of a \(.*custom_code.py:{name}\) failed:[\s\S]*{said}"):
         of.sense(0)
 
 
 def test_a_sense_may_tell_that_it_knows_nothing(tmp_path: Path) -> None:
-    of = world(tmp_path, f'like = "epuck"\n[senses.x]\nkind = "{CODE}:TellsNan"\n', needs=("x",))
+    of = world(tmp_path, f'like = "epuck"\n[sensors.x]\nkind = "{CODE}:TellsNan"\n', needs=("x",))
     assert np.isnan(of.sense(0)["a"].fields["x.x"]).all()
 
 
 def test_an_actuator_that_fails_says_which_it_is(tmp_path: Path) -> None:
     of = world(tmp_path, f'like = "epuck"\n[actuators.x]\nkind = "{CODE}:Breaks"\n', needs=())
-    with pytest.raises(OwnCodeFailed, match=r"the actuator x of a \(.*Breaks\) failed:[\s\S]*jammed"):
+    with pytest.raises(CustomCodeFailed, match=r"the actuator x of a \(.*Breaks\) failed:[\s\S]*jammed"):
         of.move(commanded(of, 0.0, 0.0))
 
 
@@ -149,7 +149,7 @@ def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, whe
     of = world(tmp_path, BOTH + bursts, needs=())
     of.move(commanded(of, 0.1, 0.0))
     said = rf"finite numbers in scene.{where}, got .*{value}.* of robot 1 in arena 0"
-    with pytest.raises(OwnCodeFailed, match=rf"the actuator x of a \(.*Bursts\) failed:\n.*{said}"):
+    with pytest.raises(CustomCodeFailed, match=rf"the actuator x of a \(.*Bursts\) failed:\n.*{said}"):
         of.move(commanded(of, 0.1, 0.0))
 
 
@@ -167,10 +167,10 @@ def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path
 
 
 def test_keys_of_own_classes_may_be_named_as_those_of_told_sheets(tmp_path: Path) -> None:
-    sense = f'[senses.x]\nkind = "{CODE}:Keyed"\nparams = 2\nany = [{{a = 1}}, "b", false, -0.5]\n'
+    sensor = f'[sensors.x]\nkind = "{CODE}:Keyed"\nparams = 2\nany = [{{a = 1}}, "b", false, -0.5]\n'
     actuator = f'[actuators.x]\nkind = "{CODE}:Wide"\nwidth = 3\nparams = 4\n'
-    body = world(tmp_path, f'like = "epuck"\n{sense}{actuator}', needs=("x",)).static.groups[0].body
-    assert (body.senses["x"].params, body.senses["x"].fields) == (
+    body = world(tmp_path, f'like = "epuck"\n{sensor}{actuator}', needs=("x",)).static.groups[0].body
+    assert (body.sensors["x"].params, body.sensors["x"].fields) == (
         {"params": 2, "any": [{"a": 1}, "b", False, -0.5]},
         {"x": 0},
     )
@@ -178,46 +178,49 @@ def test_keys_of_own_classes_may_be_named_as_those_of_told_sheets(tmp_path: Path
     assert body_from_mapping(body.as_mapping(), "static.json") == body
 
 
-SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
+SENSOR, ACTUATOR = "[sensors.x]\nkind = ", "[actuators.x]\nkind = "
 
 
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        (SENSE + '"none.py:X"', "senses.x.kind: there is no file"),
-        (SENSE + '"json:Nothing"', "senses.x.kind: json holds no such name: 'Nothing'"),
-        (SENSE + '"nonsense"', 'senses.x.kind: expected "package.module:Class" or "file.py:Class", got \'nonsense\''),
-        (SENSE + "3", 'senses.x.kind: expected "file.py:Class", "package.module:Class" or the name of an entry point'),
-        (SENSE + f'"{CODE}:NOTHING"', "senses.x.kind: expected a dataclass below OwnSensor; .* is 1"),
-        (SENSE + f'"{PAINTER}"', "senses.x.kind: expected a dataclass below OwnSensor"),
-        (SENSE + f'"{CODE}:NoTruth"', "senses.x.kind: NoTruth has no truth"),
-        (SENSE + f'"{CODE}:NoFields"', "senses.x.kind: expected fields as a tuple of Field; NoFields has 'x'"),
+        (SENSOR + '"none.py:X"', "sensors.x.kind: there is no file"),
+        (SENSOR + '"json:Nothing"', "sensors.x.kind: json holds no such name: 'Nothing'"),
+        (SENSOR + '"nonsense"', 'sensors.x.kind: expected "package.module:Class" or "file.py:Class", got \'nonsense\''),
         (
-            SENSE + f'"{CODE}:Twice"',
-            "senses.x.kind: expected fields with names of their own, of letters, digits and _; got x, x",
+            SENSOR + "3",
+            'sensors.x.kind: expected "file.py:Class", "package.module:Class" or the name of an entry point',
         ),
-        (SENSE + f'"{CODE}:Refuses"', "senses.x: Refuses refuses: ValueError: no"),
-        (SENSE + f'"{PAINT}"\nscale = 0', "senses.x.scale: expected more than 0, got 0.0"),
-        (SENSE + f'"{PAINT}"\nscale = "a"', "senses.x.scale: expected a number, got 'a'"),
-        (SENSE + f'"{PAINT}"\ncells = 1.5', "senses.x.cells: expected a whole number, got 1.5"),
-        (SENSE + f'"{PAINT}"\ncells = 0', "senses.x.cells: expected at least 1, got 0"),
-        (SENSE + f'"{PAINT}"\nsize = 1', "senses.x.size: unknown key; expected one of scale, noise, cells"),
-        (SENSE + f'"{PAINT}"\ndelay_s = -1', "senses.x.delay_s: expected at least 0 s, got -1.0"),
+        (SENSOR + f'"{CODE}:NOTHING"', "sensors.x.kind: expected a dataclass below CustomSensor; .* is 1"),
+        (SENSOR + f'"{PAINTER}"', "sensors.x.kind: expected a dataclass below CustomSensor"),
+        (SENSOR + f'"{CODE}:NoTruth"', "sensors.x.kind: NoTruth has no truth"),
+        (SENSOR + f'"{CODE}:NoFields"', "sensors.x.kind: expected fields as a tuple of Field; NoFields has 'x'"),
         (
-            "[senses.x]\nscale = 1",
-            'senses.x: unknown sense; expected one of .*, or a kind = "file.py:Class" of your own',
+            SENSOR + f'"{CODE}:Twice"',
+            "sensors.x.kind: expected fields with names of their own, of letters, digits and _; got x, x",
+        ),
+        (SENSOR + f'"{CODE}:Refuses"', "sensors.x: Refuses refuses: ValueError: no"),
+        (SENSOR + f'"{PAINT}"\nscale = 0', "sensors.x.scale: expected more than 0, got 0.0"),
+        (SENSOR + f'"{PAINT}"\nscale = "a"', "sensors.x.scale: expected a number, got 'a'"),
+        (SENSOR + f'"{PAINT}"\ncells = 1.5', "sensors.x.cells: expected a whole number, got 1.5"),
+        (SENSOR + f'"{PAINT}"\ncells = 0', "sensors.x.cells: expected at least 1, got 0"),
+        (SENSOR + f'"{PAINT}"\nsize = 1', "sensors.x.size: unknown key; expected one of scale, noise, cells"),
+        (SENSOR + f'"{PAINT}"\ndelay_s = -1', "sensors.x.delay_s: expected at least 0 s, got -1.0"),
+        (
+            "[sensors.x]\nscale = 1",
+            'sensors.x: unknown sense; expected one of .*, or a kind = "file.py:Class" of your own',
         ),
         *(
             (
-                f'[senses.{name}]\nkind = "{PAINT}"',
-                f"senses.{name}: expected another name: {name} is a part of the drive",
+                f'[sensors.{name}]\nkind = "{PAINT}"',
+                f"sensors.{name}: expected another name: {name} is a part of the drive",
             )
             for name in ("motors", "left_wheel", "right_wheel")
         ),
         *(
             (f"{table}any = {value}", f"{key}.any{inner}: expected {expected}")
             for table, key in (
-                (SENSE + f'"{CODE}:Keyed"\n', "senses.x"),
+                (SENSOR + f'"{CODE}:Keyed"\n', "sensors.x"),
                 (ACTUATOR + f'"{CODE}:Wide"\n', "actuators.x"),
             )
             for value, inner, expected in (
@@ -227,18 +230,18 @@ SENSE, ACTUATOR = "[senses.x]\nkind = ", "[actuators.x]\nkind = "
                 ("0x1_0000_0000_0000_0000", "", "a whole number of 64 bits, got 18446744073709551616"),
             )
         ),
-        ('[senses."x.y"]\nkind = "a"', "senses.x.y: unknown sense"),
-        (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below OwnActuator"),
-        (SENSE + f'"{CODE}:Frozen"', "senses.x.kind: expected a dataclass that is not frozen; Frozen is"),
+        ('[sensors."x.y"]\nkind = "a"', "sensors.x.y: unknown sense"),
+        (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below CustomActuator"),
+        (SENSOR + f'"{CODE}:Frozen"', "sensors.x.kind: expected a dataclass that is not frozen; Frozen is"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
         (
             ACTUATOR + f'"{CODE}:TooWide"',
             f"actuators.x.kind: expected a width from 1 to {MAX_WIDE}; TooWide has",
         ),
-        (SENSE + f'"{CODE}:WideField"', "senses.x.kind: the field x of WideField: expected a width from 0 to 10000"),
+        (SENSOR + f'"{CODE}:WideField"', "sensors.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
         ("[actuators.x]\ngain = 1", "actuators.x.kind: is missing"),
-        (SENSE + f'"{PAINT}"\nparams = {{}}\nfields = {{}}', "senses.x.params: unknown key; expected one of scale"),
+        (SENSOR + f'"{PAINT}"\nparams = {{}}\nfields = {{}}', "sensors.x.params: unknown key; expected one of scale"),
         (ACTUATOR + f'"{PAINTER}"\nparams = {{}}\nwidth = 2', "actuators.x.params: unknown key; expected one of gain"),
         ('[actuators."x y"]\nkind = "a:B"', "actuators.x y: expected a name of letters"),
     ],
@@ -269,19 +272,19 @@ def test_an_entry_point_is_a_kind_of_its_name(tmp_path: Path, monkeypatch: pytes
     (info / "entry_points.txt").write_text("[swarmwire.sensors]\npainted = painted_code:Paint\n")
     (tmp_path / "site" / "painted_code.py").write_text(CODE.read_text())
     monkeypatch.syspath_prepend(tmp_path / "site")
-    of = world(tmp_path, 'like = "epuck"\n[senses.mine]\nkind = "painted"\nscale = 3.0\n', needs=("mine",))
+    of = world(tmp_path, 'like = "epuck"\n[sensors.mine]\nkind = "painted"\nscale = 3.0\n', needs=("mine",))
     assert of.sense(0)["a"].fields["mine.ticks"].shape == (2, 3)
-    assert of.static.groups[0].body.senses["mine"].kind == "painted_code:Paint"
+    assert of.static.groups[0].body.sensors["mine"].kind == "painted_code:Paint"
 
 
 def test_agents_know_names_and_widths_and_nothing_of_classes_and_keys(tmp_path: Path) -> None:
     body = world(tmp_path).static.groups[0].body
-    sheet = body.senses["paint"]
-    assert (sheet.fields, sheet.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
+    spec = body.sensors["paint"]
+    assert (spec.fields, spec.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
     told = body_from_mapping(body.told.as_mapping(), "assignment")
-    assert (told.senses["paint"].fields, told.senses["paint"].params) == ({"amount": 0, "ticks": 3}, {})
+    assert (told.sensors["paint"].fields, told.sensors["paint"].params) == ({"amount": 0, "ticks": 3}, {})
     assert (told.actuators["painter"].width, told.actuators["painter"].params) == (2, {})
-    assert (told.senses["paint"].kind, told.actuators["painter"].kind) == ("", "")
+    assert (told.sensors["paint"].kind, told.actuators["painter"].kind) == ("", "")
     assert str(CODE.parent) not in str(told.as_mapping())
     assert body_from_mapping(body.as_mapping(), "static.json") == body
     assert load_body("epuck").told == load_body("epuck")

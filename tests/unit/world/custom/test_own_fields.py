@@ -11,17 +11,17 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.custom import Field, Noise
 from swarmwire.world.custom.loading import fitted
-from tests.support.world import own_code
+from tests.support.world import custom_code
 
 UNKNOWN: Any = "gaussian"
-SHEET: dict[str, Any] = {"like": "epuck", "senses": {"x": {"kind": "tests.support.world.own_code:Alone"}}}
+SHEET: dict[str, Any] = {"like": "epuck", "sensors": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}
 
 
 def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
     """The fields that agents are told of, of an own sense with these."""
-    monkeypatch.setattr(own_code.Alone, "fields", fields)
-    sheet: Any = fitted(body_from(SHEET, "mine.toml"), "mine.toml").senses["x"]
-    return sheet.fields
+    monkeypatch.setattr(custom_code.Alone, "fields", fields)
+    spec: Any = fitted(body_from(SHEET, "mine.toml"), "mine.toml").sensors["x"]
+    return spec.fields
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
     ],
 )
 def test_a_field_that_cannot_be_is_refused(monkeypatch: pytest.MonkeyPatch, of: dict[str, Any], said: str) -> None:
-    with pytest.raises(BadInput, match=f"^mine.toml: senses.x.kind: the field b of Alone: {re.escape(said)}$"):
+    with pytest.raises(BadInput, match=f"^mine.toml: sensors.x.kind: the field b of Alone: {re.escape(said)}$"):
         fit(monkeypatch, Field("a"), Field("b", **of))
 
 

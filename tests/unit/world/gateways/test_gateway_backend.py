@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses, LedChanges
+from swarmwire.comms.tick_io import Actions, GroupReadings, LedChanges
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
@@ -29,8 +29,8 @@ class Inner:
     def start(self) -> None:
         self.given.append("started")
 
-    def act(self, tick, senses, received, tx_status=NO_TX_STATUSES) -> Actions:
-        self.given.append((tick, senses, received, tx_status))
+    def act(self, tick, sensors, received, tx_status=NO_TX_STATUSES) -> Actions:
+        self.given.append((tick, sensors, received, tx_status))
         rows = np.array([0, 1])
         sent = SentPackets(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
         return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
@@ -92,9 +92,9 @@ class Around:
     ) -> Actions:
         rows = np.array(alive, np.int64)
         fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
-        senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
+        sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields)}
         return self.backend.act(
-            tick, senses, ReceivedPackets.none(MEASURES) if received is None else received, tx_status
+            tick, sensors, ReceivedPackets.none(MEASURES) if received is None else received, tx_status
         )
 
 
@@ -151,8 +151,8 @@ def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_pack
     sent = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
     tx_status = TxStatuses(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
     actions = around.act(0, [2, 3, 4], received_from(sent, [1, 2, 4]), tx_status)
-    _, senses, received, _ = around.inner.given[-1]
-    assert list(senses) == ["a"]
+    _, sensors, received, _ = around.inner.given[-1]
+    assert list(sensors) == ["a"]
     assert len(received) == 3  # a host takes what is for its robots
     assert around.air is not None
     ((tick, outside, told),) = around.air.published
@@ -171,7 +171,7 @@ def test_without_a_radio_nothing_but_commands_is_taken() -> None:
 def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:
     around = Around()
     around.gateway.drive = {0: (0.1, 0.0)}
-    actions = around.backend.act(3, {"a": GroupSenses(np.array([0, 1]), {})}, ReceivedPackets.none(MEASURES))
+    actions = around.backend.act(3, {"a": GroupReadings(np.array([0, 1]), {})}, ReceivedPackets.none(MEASURES))
     assert not around.gateway.published
     assert commands(actions)[2] == (0.1, 0.0)
 
@@ -237,9 +237,9 @@ def test_in_subticks_robots_behind_gateways_are_told_when_it_is_due_and_what_the
     around, air = Around(subtick_s=0.010), QuietAir()
     rows = np.array([2, 3, 4])
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
-    senses = {"a": GroupSenses(np.array([0, 1]), {}), "b": GroupSenses(rows, fields)}
+    sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields)}
     around.gateway.drive = {1: (0.05, -0.7)}
-    actions = around.backend.act_in_time(0, senses, ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
+    actions = around.backend.act_in_time(0, sensors, ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
     assert around.air is not None
     received = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
     assert received == [[3]]

@@ -313,8 +313,8 @@ def test_on_a_torus_a_disc_goes_on_at_the_other_side() -> None:
 def own_body(folder: Path, **figures: Any) -> str:
     """An e-puck with other figures, as a sheet of one's own."""
     path = folder / "own.toml"
-    sheet = {"like": "epuck", "name": "own", "source": "a test", **figures}
-    path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in sheet.items()))
+    spec = {"like": "epuck", "name": "own", "source": "a test", **figures}
+    path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in spec.items()))
     return str(path)
 
 

@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.custom import loading
 from swarmwire.world.placement.maps import beside
-from swarmwire.world.scenario.bodies import bodies_of, own_code_of, read_body, sheet_path
+from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body, sheet_path
 from swarmwire.world.scenario.file import scenario_from
 
 
@@ -28,28 +28,28 @@ def test_a_sheet_may_start_from_a_body_that_comes_with_swarmwire(tmp_path):
 
 
 def test_a_class_that_bodies_name_is_listed_once(tmp_path):
-    kind = "tests.support.world.own_code:Alone"
+    kind = "tests.support.world.custom_code:Alone"
     (tmp_path / "mine.toml").write_text(f'like = "epuck"\nsenses.x.kind = "{kind}"\nsenses.y.kind = "{kind}"\n')
     body = read_body(tmp_path / "mine.toml", "swarm.toml", "robots.flock.body")
-    assert own_code_of([load_body("epuck"), body, body]) == (kind,)
+    assert custom_code_of([load_body("epuck"), body, body]) == (kind,)
 
 
 @pytest.mark.parametrize(
     ("sheet", "said"),
     [(None, "swarm.toml: robots.flock.body: expected a readable file"), ("mass_kg =", "mine.toml: expected TOML")],
 )
-def test_a_sheet_that_cannot_be_read_is_named_by_whoever_names_it(tmp_path, sheet, said):
-    if sheet is not None:
-        (tmp_path / "mine.toml").write_text(sheet)
+def test_a_sheet_that_cannot_be_read_is_named_by_whoever_names_it(tmp_path, spec, said):
+    if spec is not None:
+        (tmp_path / "mine.toml").write_text(spec)
     with pytest.raises(BadInput) as caught:
         read_body(tmp_path / "mine.toml", "swarm.toml", "robots.flock.body")
     assert said in str(caught.value)
 
 
-def bodies(tmp_path: Path, body: str, sheet: dict[str, object]):
-    """The bodies of two groups, of which only the first has a `sheet`."""
+def bodies(tmp_path: Path, body: str, spec: dict[str, object]):
+    """The bodies of two groups, of which only the first has a `spec`."""
     group = {"body": body, "count": 1, "agent": "a:A"}
-    robots = {"worn": {**group, "sheet": sheet}, "new": group}
+    robots = {"worn": {**group, "sheet": spec}, "new": group}
     arena = {"size_m": [2.0, 2.0]}
     mapping = {"format": 1, "name": "s", "duration_s": 1.0, "arena": arena, "robots": robots}
     where = str(tmp_path / "swarm.toml")
@@ -70,24 +70,24 @@ def test_a_scenario_changes_a_body_for_one_group(tmp_path, body):
 @pytest.mark.parametrize(
     ("sheet", "key"),
     [
-        ({"senses": {"proximity": {"drop_out": 2}}}, "robots.worn.sheet.senses.proximity.drop_out"),
-        ({"weight_kg": 1.0}, "robots.worn.sheet.weight_kg"),
-        ({"senses": {"x": {"kind": "tests.support.world.own_code:Alone"}}}, "robots.worn.sheet"),
+        ({"senses": {"proximity": {"drop_out": 2}}}, "robots.worn.body_overrides.sensors.proximity.drop_out"),
+        ({"weight_kg": 1.0}, "robots.worn.body_overrides.weight_kg"),
+        ({"senses": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}, "robots.worn.body_overrides"),
     ],
 )
-def test_what_a_scenario_may_not_change_is_named(tmp_path, sheet, key):
+def test_what_a_scenario_may_not_change_is_named(tmp_path, spec, key):
     with pytest.raises(BadInput) as caught:
-        bodies(tmp_path, "epuck", sheet)
+        bodies(tmp_path, "epuck", spec)
     assert (caught.value.where, caught.value.key) == (str(tmp_path / "swarm.toml"), key)
 
 
 def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_names(tmp_path, monkeypatch):
-    point = EntryPoint("painted", "tests.support.world.own_code:Paint", "swarmwire.sensors")
+    point = EntryPoint("painted", "tests.support.world.custom_code:Paint", "swarmwire.sensors")
     monkeypatch.setattr(loading, "entry_points_of", lambda _: [point])
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsenses.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 2}}})["worn"]
-    assert own_code_of([worn]) == ("tests.support.world.own_code:Paint",)
+    assert custom_code_of([worn]) == ("tests.support.world.custom_code:Paint",)
     with pytest.raises(BadInput, match="at least 1") as caught:
         bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 0}}})
-    assert caught.value.key == "robots.worn.sheet.senses.paint.cells"
+    assert caught.value.key == "robots.worn.body_overrides.sensors.paint.cells"
     assert caught.value.where == str(tmp_path / "swarm.toml")

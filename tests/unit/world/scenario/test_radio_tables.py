@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
-from swarmwire.comms.radio.config.phy import OwnAntenna
+from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.file import scenario_from
@@ -134,7 +134,7 @@ def test_groups_may_have_their_own_power_and_gain_of_a_radio_with_signals() -> N
     table = {**SAMPLE, "radio": SIGNAL}
     own = {**SAMPLE["robots"], "big": {**SAMPLE["robots"]["big"], "radio": {"power_dbm": -10.0}}}
     scenario = scenario_from({**table, "robots": own}, "f")
-    assert scenario.robots["big"].radio == OwnAntenna(power_dbm=-10.0)
+    assert scenario.robots["big"].radio == RobotAntenna(power_dbm=-10.0)
     assert scenario.robots["flock"].radio is None
     mute = {key: value for key, value in SAMPLE.items() if key != "radio"}
     strong = {**own, "big": {**own["big"], "radio": {"power_dbm": 1000.0}}}

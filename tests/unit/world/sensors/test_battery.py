@@ -28,8 +28,8 @@ HOLONOMIC = body_from(
 )
 
 
-def with_battery(sheet: Battery) -> Body:
-    return replace(EPUCK, senses={**EPUCK.senses, "battery": sheet})
+def with_battery(spec: Battery) -> Body:
+    return replace(EPUCK, readings={**EPUCK.readings, "battery": spec})
 
 
 def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
@@ -127,6 +127,6 @@ def test_the_gauge_tells_charge_and_a_voltage_that_falls_with_it() -> None:
     ],
 )
 def test_a_negative_battery_is_refused(key: str, value: float, expected: str) -> None:
-    sheet = {"like": "epuck", "senses": {"battery": {"capacity_wh": 1.0, key: value}}}
-    with pytest.raises(BadInput, match=rf"mine.toml: senses.battery.{key}: {expected}"):
-        body_from(sheet, "mine.toml")
+    spec = {"like": "epuck", "senses": {"battery": {"capacity_wh": 1.0, key: value}}}
+    with pytest.raises(BadInput, match=rf"mine.toml: sensors.battery.{key}: {expected}"):
+        body_from(spec, "mine.toml")

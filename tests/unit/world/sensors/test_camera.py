@@ -20,12 +20,12 @@ HIGH = Camera(height_m=0.2887, aperture_deg=70.0)
 GREEN = 0x00FF00
 
 
-def told(poses: Any, sheet: Camera = HIGH, tick: int = 0, **more: Any) -> dict[str, FloatArray]:
+def told(poses: Any, spec: Camera = HIGH, tick: int = 0, **more: Any) -> dict[str, FloatArray]:
     body, colour = more.pop("body", BEACON), more.pop("colour", GREEN)
     looked_at = scene(poses, body, more.pop("obstacles", ()), boundary="open", colour=colour)
     if "dark" in more:
         looked_at.leds[0, :, more["dark"]] = 0
-    fields = read(looked_at, body, "camera", sheet, tick)
+    fields = read(looked_at, body, "camera", spec, tick)
     return {name.removeprefix("camera."): values for name, values in fields.items()}
 
 
@@ -40,11 +40,11 @@ def distances(*at: Any, **more: Any) -> list[float]:
     [(0.2887, 70.0, 0.793), (0.2887, 80.0, 1.64), (0.122, 70.0, 0.335)],
 )
 def test_a_camera_sees_as_far_as_argos_s_do(height_m: float, aperture_deg: float, reach_m: float) -> None:
-    sheet = Camera(height_m=height_m, aperture_deg=aperture_deg)
-    assert sheet.reach_m(0.0) == pytest.approx(reach_m, abs=4e-3)
+    spec = Camera(height_m=height_m, aperture_deg=aperture_deg)
+    assert spec.reach_m(0.0) == pytest.approx(reach_m, abs=4e-3)
     low = replace(FOOTBOT, height_m=0.05, leds=Leds(angles_deg=(0.0,), radius_m=1e-9, height_m=0.05))
     for share, seen in ((0.999, 1), (1.001, 0)):
-        assert len(distances([sheet.reach_m(0.0) * share, 0.0, 0.0], sheet=sheet, body=low)) == seen
+        assert len(distances([spec.reach_m(0.0) * share, 0.0, 0.0], spec=spec, body=low)) == seen
 
 
 def test_a_blob_is_where_its_led_is() -> None:
@@ -81,7 +81,7 @@ def test_the_nearest_blobs_are_kept_in_order() -> None:
     apart_m = 0.75, 0.25, 0.5, 0.625, 0.375, 0.725
     others = [[d * np.cos(a), d * np.sin(a), 0.0] for a, d in enumerate(apart_m)]
     assert distances(*others, dark=0) == pytest.approx([0.25, 0.375, 0.5, 0.625, 0.725, 0.75])
-    assert distances(*others, dark=0, sheet=replace(HIGH, most_blobs=3)) == pytest.approx([0.25, 0.375, 0.5])
+    assert distances(*others, dark=0, spec=replace(HIGH, most_blobs=3)) == pytest.approx([0.25, 0.375, 0.5])
 
 
 def test_the_error_of_a_distance_is_a_share_of_it() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.bodies.sensors import SHEETS, RangedSheet
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS, RangedSensorSpec
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.sensors import SENSORS
 from swarmwire.world.world import World
@@ -30,14 +30,14 @@ KEYS = {
     "ground": "points_m = [[0.0, 0.01], [0.01, 0.0]]\nnoise = 0.1\n",
     "camera": "height_m = 0.2\naperture_deg = 70.0\nmost_blobs = 4\n",
 }
-OWN = f'[senses.own]\nkind = "{Path(__file__).parents[3] / "support" / "world" / "own_code.py"}:Alone"\n{STAGES}'
+OWN = f'[sensors.own]\nkind = "{Path(__file__).parents[3] / "support" / "world" / "custom_code.py"}:Alone"\n{STAGES}'
 NAMES = (*KEYS, "own")
 
 
 def body() -> str:
     """A sheet with all senses."""
     tables = [
-        f"[senses.{name}]\n{keys}{STAGES}{OUTLIER if issubclass(SHEETS[name], RangedSheet) else ''}"
+        f"[sensors.{name}]\n{keys}{STAGES}{OUTLIER if issubclass(SENSOR_SPECS[name], RangedSensorSpec) else ''}"
         for name, keys in KEYS.items()
     ]
     return "\n".join(['like = "epuck"', *tables, OWN])
@@ -72,7 +72,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 
 
 def test_every_sense_is_here() -> None:
-    assert KEYS.keys() == SHEETS.keys() == SENSORS.keys()
+    assert KEYS.keys() == SENSOR_SPECS.keys() == SENSORS.keys()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -92,9 +92,9 @@ def test_an_arena_senses_the_same_once_another_has_left(tmp_path: Path, told: li
     for tick, expected in enumerate(told):
         if tick == 5:
             of.leave(np.arange(2) == over)
-        senses = of.sense(tick)["a"]
-        assert senses.rows.tolist() == list(range(18) if tick < 5 else range(18)[kept])
-        for field, values in senses.fields.items():
+        readings = of.sense(tick)["a"]
+        assert readings.rows.tolist() == list(range(18) if tick < 5 else range(18)[kept])
+        for field, values in readings.fields.items():
             np.testing.assert_array_equal(values[-9:] if over == 0 else values[:9], expected[field][kept])
         moved(of, tick)
 

@@ -21,8 +21,8 @@ THREE = GroundColour(points_m=((0.03, -0.009), (0.03, 0.0), (0.03, 0.009)))  # A
 SPOT = Floor(0.8, (Patch("disc", 0.5, 0.2, 0.1, radius_m=0.1), Patch("disc", 0.5, 0.2, 0.4, radius_m=0.02)))
 
 
-def shade(poses: Any, floor: Floor | None, sheet: GroundColour = THREE, tick: int = 0) -> FloatArray:
-    return read(scene(poses, EPUCK, floor=floor), EPUCK, "ground", sheet, tick)["ground.shade"]
+def shade(poses: Any, floor: Floor | None, spec: GroundColour = THREE, tick: int = 0) -> FloatArray:
+    return read(scene(poses, EPUCK, floor=floor), EPUCK, "ground", spec, tick)["ground.shade"]
 
 
 def test_the_floor_is_white_where_there_is_none() -> None:
@@ -62,5 +62,5 @@ def test_noise_is_uniform_keyed_and_clipped() -> None:
     ],
 )
 def test_points_that_are_not_under_the_body_are_refused(points: Any, text: str) -> None:
-    with pytest.raises(BadInput, match=f"^mine.toml: senses.ground.{text}"):
+    with pytest.raises(BadInput, match=f"^mine.toml: sensors.ground.{text}"):
         body_from({"like": "epuck", "senses": {"ground": {"points_m": points}}}, "mine.toml")

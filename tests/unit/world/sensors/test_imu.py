@@ -20,11 +20,11 @@ def put(looked_at: Scene, heading, velocity) -> None:
     looked_at.state[0, :, 2], looked_at.state[0, :, 3:5] = heading, velocity
 
 
-def felt(headings, velocities, sheet: Imu | None = None, robots: int = 1):
+def felt(headings, velocities, spec: Imu | None = None, robots: int = 1):
     """What was felt last when these headings and velocities came one after another, (robots, fields)."""
     looked_at = scene(np.zeros((robots, 3)), EPUCK)
     put(looked_at, headings[0], velocities[0])
-    imu = staged(looked_at, EPUCK, "imu", sheet or Imu())
+    imu = staged(looked_at, EPUCK, "imu", spec or Imu())
     told = {}
     for tick, (heading, velocity) in enumerate(zip(headings, velocities, strict=True)):
         put(looked_at, heading, velocity)
@@ -74,8 +74,8 @@ def test_biases_are_drawn_once_and_drift_from_tick_to_tick() -> None:
 
 def test_drift_goes_on_while_nobody_looks() -> None:
     looked_at = scene(np.zeros((3, 3)), EPUCK)
-    sheet = Imu(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
-    always, seldom = (staged(looked_at, EPUCK, "imu", sheet) for _ in range(2))
+    spec = Imu(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
+    always, seldom = (staged(looked_at, EPUCK, "imu", spec) for _ in range(2))
     for tick in range(9):
         looked_at.state[0, :, 2:5] += 0.01 * tick
         told = always.read(tick)

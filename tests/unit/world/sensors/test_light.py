@@ -19,9 +19,9 @@ from tests.support.world.scenes import scene, staged
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 
 
-def sensor(looked_at: Scene, body: Body, **sheet: Any) -> Staged:
+def sensor(looked_at: Scene, body: Body, **spec: Any) -> Staged:
     assert body.light is not None
-    return staged(looked_at, body, "light", replace(body.light, **sheet))
+    return staged(looked_at, body, "light", replace(body.light, **spec))
 
 
 def values(looked_at: Scene, body: Body = EPUCK) -> FloatArray:

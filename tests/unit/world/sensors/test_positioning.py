@@ -31,6 +31,6 @@ def test_a_body_without_it_is_refused_to_an_agent_that_needs_it() -> None:
     needs = {"a": ("positioning",)}
     with pytest.raises(BadInput, match="the agent needs the sense 'positioning'; the body epuck has proximity"):
         World(posed([[0, 0, 0]]), [1], needs)
-    senses = World(posed([[0.5, 0.25, 0]], body="epuck-gps"), [1], needs).sense(0)["a"].fields
-    assert senses["positioning.x_m"][0] == pytest.approx(0.5, abs=0.06)
-    assert senses["positioning.y_m"][0] == pytest.approx(0.25, abs=0.06)
+    readings = World(posed([[0.5, 0.25, 0]], body="epuck-gps"), [1], needs).sense(0)["a"].fields
+    assert readings["positioning.x_m"][0] == pytest.approx(0.5, abs=0.06)
+    assert readings["positioning.y_m"][0] == pytest.approx(0.25, abs=0.06)

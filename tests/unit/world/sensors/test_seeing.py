@@ -19,9 +19,9 @@ assert FOOTBOT.proximity is not None
 RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.6)
 
 
-def truth(of: Sample, name: str, sheet: Any) -> tuple[FloatArray, ...]:
+def truth(of: Sample, name: str, spec: Any) -> tuple[FloatArray, ...]:
     """The truth of all groups side by side, a row per robot of each arena."""
-    fields = zip(*(SENSORS[name](of.scene, group, sheet).truth(0) for group in of.groups), strict=True)
+    fields = zip(*(SENSORS[name](of.scene, group, spec).truth(0) for group in of.groups), strict=True)
     return tuple(np.concatenate(field, axis=1).reshape(-1, field[0].shape[2]) for field in fields)
 
 
@@ -37,9 +37,9 @@ def same(seen: FloatArray, expected: FloatArray) -> None:
 def test_rays_from_the_rim_end_at_the_nearest_thing_or_for_passive_ones_the_nearest_robot(boundary: Boundary) -> None:
     of = sample(1, boundary)
     for name, kind in (("proximity", Proximity), ("infrared", Infrared)):
-        sheet = kind(angles_deg=ANGLES_DEG, range_m=0.6, response=RESPONSE)
-        expected = brute_force.rim_rays(of, name == "proximity", sheet.angle_rad, 0.6)
-        answers = truth(of, name, sheet)[0]
+        spec = kind(angles_deg=ANGLES_DEG, range_m=0.6, response=RESPONSE)
+        expected = brute_force.rim_rays(of, name == "proximity", spec.angle_rad, 0.6)
+        answers = truth(of, name, spec)[0]
         assert answers == pytest.approx(RESPONSE.value(expected), abs=1e-6)
         assert 0.1 < np.isfinite(expected).mean() < 0.9
 
@@ -55,17 +55,17 @@ def test_rays_from_the_rim_end_at_the_nearest_thing_or_for_passive_ones_the_near
     ],
 )
 def test_a_scan_shows_the_nearest_thing_on_every_ray(turned: dict[str, Any], boundary: Boundary) -> None:
-    of, sheet = sample(3, boundary), Scan(range_m=1.0, **turned)
-    same(truth(of, "scan", sheet)[0], brute_force.scanned(of, sheet.angle_rad, 1.0, sheet.at_m))
+    of, spec = sample(3, boundary), Scan(range_m=1.0, **turned)
+    same(truth(of, "scan", spec)[0], brute_force.scanned(of, spec.angle_rad, 1.0, spec.at_m))
 
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 @pytest.mark.parametrize("seed", [4, 5])
 def test_photocells_see_the_lights_that_nothing_beside_them_hides(seed: int, boundary: Boundary) -> None:
     of = sample(seed, boundary, each=5)
-    sheet = Light(angles_deg=(0.0, 90.0, 180.0, 270.0))
-    expected = brute_force.shone(of, sheet.angle_rad)
-    assert truth(of, "light", sheet)[0] == pytest.approx(expected, abs=1e-9)
+    spec = Light(angles_deg=(0.0, 90.0, 180.0, 270.0))
+    expected = brute_force.shone(of, spec.angle_rad)
+    assert truth(of, "light", spec)[0] == pytest.approx(expected, abs=1e-9)
     assert 0.05 < (expected > 0).mean() < 0.6
 
 
@@ -73,11 +73,11 @@ def test_photocells_see_the_lights_that_nothing_beside_them_hides(seed: int, bou
 @pytest.mark.parametrize("height_m", [0.12, 0.25])
 def test_a_camera_sees_the_leds_within_its_cone_that_no_body_hides(height_m: float, boundary: Boundary) -> None:
     of = sample(6, boundary, each=8)
-    sheet = Camera(height_m=height_m, aperture_deg=70.0, most_blobs=200)
-    seen, hidden = truth(of, "camera", sheet), 0
+    spec = Camera(height_m=height_m, aperture_deg=70.0, most_blobs=200)
+    seen, hidden = truth(of, "camera", spec), 0
     rows = [(arena, group, i) for arena in range(2) for group in of.groups for i in range(group.start, group.stop)]
     for row, (arena, group, robot) in enumerate(rows):
-        expected = brute_force.blobs(of, arena, robot, sheet.reach_m(group.body.altitude_m), height_m)
+        expected = brute_force.blobs(of, arena, robot, spec.reach_m(group.body.altitude_m), height_m)
         count = len(expected)
         assert np.isfinite(seen[0][row]).tolist() == [True] * count + [False] * (200 - count)
         assert np.column_stack([field[row, :count] for field in seen]) == pytest.approx(

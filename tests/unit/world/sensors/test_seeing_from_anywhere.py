@@ -13,14 +13,14 @@ from swarmwire.comms.bodies.sensors import Camera, Infrared, Light, Proximity, S
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
 from swarmwire.world.sensors import SENSORS, Scene
-from swarmwire.world.sensors.sensor import TrueSense
+from swarmwire.world.sensors.sensor import Sensor
 from tests.support.world.brute_force import FOOTBOT
 from tests.support.world.scenes import scene
 
 assert FOOTBOT.proximity is not None
 RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
 RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": RESPONSE}
-SHEETS: dict[str, Any] = {
+SENSOR_SPECS: dict[str, Any] = {
     "proximity": Proximity(**RING),
     "infrared": Infrared(**RING),
     "scan": Scan(rays=45, range_m=1.0, at_m=0.02),
@@ -33,11 +33,11 @@ def seen(poses: Any, name: str, lamps: Any, size_m: float = 3.0) -> tuple[FloatA
     """What foot-bots at these poses sense of one another and of lamps, in the open."""
     lights = tuple(Lamp(x, y, 1.0) for x, y in lamps)
     looked_at = scene(poses, FOOTBOT, size_m=size_m, boundary="open", colour=0x00FF00, lights=lights)
-    sense = SENSORS[name](looked_at, Group("a", FOOTBOT, 0, len(poses)), SHEETS[name])
-    return tuple(field[0] for field in sense.truth(0))
+    sensor = SENSORS[name](looked_at, Group("a", FOOTBOT, 0, len(poses)), SENSOR_SPECS[name])
+    return tuple(field[0] for field in sensor.truth(0))
 
 
-@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("name", SENSOR_SPECS)
 @given(x=st.floats(-30, 30), y=st.floats(-30, 30), turn=st.floats(-20, 20), seed=st.integers(0, 5))
 def test_moving_and_turning_everything_changes_nothing(name: str, x: float, y: float, turn: float, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -57,7 +57,7 @@ def test_moving_and_turning_everything_changes_nothing(name: str, x: float, y: f
         assert np.allclose(one, other, atol=3e-6, equal_nan=True)
 
 
-@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("name", SENSOR_SPECS)
 @given(bearing=st.floats(0, 6.3), size_m=st.sampled_from([1.0, 3.0, 7.0]))
 def test_a_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: float) -> None:
     random = np.random.default_rng(3)
@@ -70,7 +70,7 @@ def test_a_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: 
 
 
 @pytest.mark.parametrize("running", [(True, True, True), (True, False, True)])
-@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("name", SENSOR_SPECS)
 def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tuple[bool, ...]) -> None:
     """Also beside an arena that is over, where nobody looks any more."""
     poses = np.random.default_rng(4).uniform(-1, 1, (3, 12, 3)) * [0.7, 0.7, np.pi]
@@ -88,10 +88,10 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tupl
         obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
     )
     group = Group("a", FOOTBOT, 3, 9)
-    together = SENSORS[name](many, group, SHEETS[name]).truth(0)
+    together = SENSORS[name](many, group, SENSOR_SPECS[name]).truth(0)
     for arena in np.flatnonzero(running):
         alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
-        for one, other in zip(SENSORS[name](alone, group, SHEETS[name]).truth(0), together, strict=True):
+        for one, other in zip(SENSORS[name](alone, group, SENSOR_SPECS[name]).truth(0), together, strict=True):
             assert np.array_equal(one[0], other[arena], equal_nan=True)
 
 
@@ -105,15 +105,15 @@ def test_an_obstacle_that_was_pushed_is_seen_where_it_is(name: str) -> None:
         made = scene(poses, FOOTBOT, obstacles, size_m=2.0, colour=0xFF0000, lights=lamps)
         return replace(made, obstacles_move=moves)
 
-    def truth(sense: TrueSense) -> FloatArray:
-        return np.stack([field[0] for field in sense.truth(0)])
+    def truth(sensor: Sensor) -> FloatArray:
+        return np.stack([field[0] for field in sensor.truth(0)])
 
     group, pushed = Group("a", FOOTBOT, 0, 12), (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0))
     looked_at, expected = around(pillar, box, moves=True), around(*pushed)
-    sense = SENSORS[name](looked_at, group, SHEETS[name])
-    before = truth(sense)
+    sensor = SENSORS[name](looked_at, group, SENSOR_SPECS[name])
+    before = truth(sensor)
     for have, now in zip(looked_at.obstacles, expected.obstacles, strict=True):
         have[...] = now
-    after = truth(sense)
-    assert np.array_equal(after, truth(SENSORS[name](expected, group, SHEETS[name])), equal_nan=True)
+    after = truth(sensor)
+    assert np.array_equal(after, truth(SENSORS[name](expected, group, SENSOR_SPECS[name])), equal_nan=True)
     assert not np.array_equal(before, after, equal_nan=True)

@@ -16,16 +16,16 @@ from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
 from swarmwire.world.sensors.rays import ProximitySensor
 from swarmwire.world.world import World
-from tests.support.world.samples import SENSES, commanded, posed
+from tests.support.world.samples import SENSORS, commanded, posed
 from tests.support.world.scenes import read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 
 
-def proximity(looked_at: Scene, body: Body, **sheet: Any) -> ProximitySensor:
+def proximity(looked_at: Scene, body: Body, **spec: Any) -> ProximitySensor:
     assert body.proximity is not None
     group = Group("a", body, 0, len(looked_at.radius_m))
-    return ProximitySensor(looked_at, group, replace(body.proximity, **sheet))
+    return ProximitySensor(looked_at, group, replace(body.proximity, **spec))
 
 
 def values(looked_at: Scene, body: Body) -> FloatArray:
@@ -155,8 +155,8 @@ def test_what_robots_see_of_each_other_does_not_depend_on_the_frame(x: float, y:
 def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
     poses = np.stack([np.linspace(-4, 4, 500), np.zeros(500), np.zeros(500)], axis=1)
     assert EPUCK.proximity is not None
-    sheet = replace(EPUCK.proximity, noise=0.05)
-    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", sheet)
+    spec = replace(EPUCK.proximity, noise=0.05)
+    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", spec)
     draws = np.concatenate([sensor.read(tick)["proximity.value"].ravel() for tick in range(50)])
     assert draws.min() == 0.0
     assert 0.0499 < draws.max() <= 0.05
@@ -243,7 +243,7 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
-    assert EPUCK.senses.keys() == FOOTBOT.senses.keys() == {*SENSES, "ground", "camera"}
+    assert EPUCK.readings.keys() == FOOTBOT.readings.keys() == {*SENSORS, "ground", "camera"}
     assert isinstance(EPUCK.proximity, Proximity)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Sheet
+from swarmwire.comms.bodies.sensors import SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Field, Noise
@@ -34,7 +34,7 @@ class Counter:
 
 
 def sense(**keys: float) -> Staged:
-    return Staged("counter", Counter(), Sheet(**keys), KEYS, GROUP, 0.1)
+    return Staged("counter", Counter(), SensorSpec(**keys), KEYS, GROUP, 0.1)
 
 
 def told(of: Staged, ticks: int, every: int = 1) -> dict[int, dict[str, Any]]:

@@ -27,11 +27,11 @@ class Batteries:
     def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
         """Charged as their data sheets say."""
         sizes = [group.stop - group.start for group in groups]
-        sheets = [next((s for s in group.body.senses.values() if isinstance(s, Battery)), MAINS) for group in groups]
-        self.any = any(sheet is not MAINS for sheet in sheets)
-        self.charge: FloatArray = np.tile(np.repeat([sheet.start for sheet in sheets], sizes), (arenas, 1))
-        draw = [(sheet.idle_w, sheet.drive_w_per_mps, sheet.led_w) for sheet in sheets]
-        share = tick_s / PER_HOUR / np.array([sheet.capacity_wh for sheet in sheets])  # of a charge, per W and tick
+        specs = [next((s for s in group.body.sensors.values() if isinstance(s, Battery)), MAINS) for group in groups]
+        self.any = any(spec is not MAINS for spec in specs)
+        self.charge: FloatArray = np.tile(np.repeat([spec.start for spec in specs], sizes), (arenas, 1))
+        draw = [(spec.idle_w, spec.drive_w_per_mps, spec.led_w) for spec in specs]
+        share = tick_s / PER_HOUR / np.array([spec.capacity_wh for spec in specs])  # of a charge, per W and tick
         self._draw = np.repeat(np.array(draw) * share[:, None], sizes, axis=0)  # (robots, 3) in a tick
         limits = limits_of(groups)
         self._half_base_m, self._holonomic = limits.half_base_m, limits.kind == HOLONOMIC

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupSenses, Senses
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
@@ -20,10 +20,10 @@ from swarmwire.world.backends.join_policy import USUAL, Terms
 from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, What
 
 
-def split_senses(senses: Senses, owner: IntArray, assignments: list[Assignment]) -> list[Senses]:
+def split_readings(readings: Readings, owner: IntArray, assignments: list[Assignment]) -> list[Readings]:
     """What the robots of each assignment sense; `owner` (rows,) names the assignment of each robot row."""
-    parts: list[Senses] = [{} for _ in assignments]
-    for name, group in senses.items():
+    parts: list[Readings] = [{} for _ in assignments]
+    for name, group in readings.items():
         owners = owner[group.rows]
         order = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[order], np.arange(len(assignments) + 1))
@@ -34,11 +34,11 @@ def split_senses(senses: Senses, owner: IntArray, assignments: list[Assignment])
             # Also a group none of whose robots acts now: their agents must forget, as they do beside others.
             if name in [group.name for group in assignment.groups]:
                 own = {field: column[first:last] for field, column in fields.items()}
-                part[name] = GroupSenses(rows[first:last], own)
+                part[name] = GroupReadings(rows[first:last], own)
     return parts
 
 
-def acting(part: Senses) -> IntArray:
+def acting(part: Readings) -> IntArray:
     """The robot rows of a part, group after group: the order of the answer."""
     if len(part) == 1:
         return next(iter(part.values())).rows
@@ -102,7 +102,7 @@ class _Open(NamedTuple):
     """What the tick that is open brings to all robots."""
 
     tick: int
-    senses: Senses
+    readings: Readings
     received: ReceivedPackets
     tx_status: TxStatuses
 
@@ -115,11 +115,11 @@ class Lockstep(Roster[_Slot]):
         self._open: _Open | None = None
 
     def open_tick(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> list[tuple[str, bytes]]:
         """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
-        self._tick, self._open = tick, _Open(tick, senses, received, tx_status)
-        parts = split_senses(senses, self._slots.owner, self._slots.assignments)
+        self._tick, self._open = tick, _Open(tick, readings, received, tx_status)
+        parts = split_readings(readings, self._slots.owner, self._slots.assignments)
         packets = split_received(received, self._slots.owner, len(self._slots))
         told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []
@@ -154,10 +154,10 @@ class Lockstep(Roster[_Slot]):
     def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
         if self._open is None or self._on_loss in GOES_ON:
             return ()
-        tick, senses, received, tx_status = self._open
+        tick, readings, received, tx_status = self._open
         own = np.full(len(self._slots.owner), NOBODY)
         own[slot.all_rows] = 0
-        (part,) = split_senses(senses, own, [slot.assignment])
+        (part,) = split_readings(readings, own, [slot.assignment])
         slot.rows, slot.idle = acting(part), False
         if not part:
             return ()

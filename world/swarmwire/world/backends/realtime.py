@@ -33,12 +33,12 @@ from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.interfaces import Put
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Senses, Values
+from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Readings, Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Slot, rows_of
 from swarmwire.world.backends.join_policy import USUAL, Terms
-from swarmwire.world.backends.lockstep import acting, split_received, split_senses, split_tx_status
+from swarmwire.world.backends.lockstep import acting, split_readings, split_received, split_tx_status
 from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, RunnerHealth, What
 
 ANSWERED = -1
@@ -111,12 +111,17 @@ class RealTime(Roster[_Slot]):
         )
 
     def open_tick(
-        self, tick: int, now_ns: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self,
+        tick: int,
+        now_ns: int,
+        readings: Readings,
+        received: ReceivedPackets,
+        tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> list[tuple[str, bytes]]:
         """Begin a tick at wall time `now_ns`, pauses left out: one frame for each runner that is ready."""
         self._tick = tick
         start_ns = tick_start_ns(tick, self._rate_hz)
-        parts = split_senses(senses, self._slots.owner, self._slots.assignments)
+        parts = split_readings(readings, self._slots.owner, self._slots.assignments)
         packets = split_received(received, self._slots.owner, len(self._slots))
         told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
         out: list[tuple[str, bytes]] = []

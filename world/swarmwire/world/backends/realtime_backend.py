@@ -11,7 +11,7 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.inbox import Item, RunnerInbox
 from swarmwire.world.backends.join_policy import USUAL, Door, Terms
 from swarmwire.world.backends.pacing import Delays, Pace
@@ -59,24 +59,24 @@ class PacedBackend:
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What every robot does in this tick."""
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
-        actions = self._backend.act(tick, senses, received, tx_status)
+        actions = self._backend.act(tick, readings, received, tx_status)
         self._pace.hold(tick)
         return actions
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with packets handed over when they are due."""
         assert self._subticks
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
         self._backend.receive(received, tx_status)
-        actions = self._backend.act(tick, senses, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
+        actions = self._backend.act(tick, readings, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
         self._subticks.pass_tick(tick, air, self)
         return replace(actions, sent=SentPackets.none())
@@ -125,17 +125,17 @@ class RealTimeBackend(ZenohBackend[RealTime]):
             self._inbox = RunnerInbox(roster.limits, clock.now_ns)
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """A frame to every runner; what has come when the tick is over."""
-        self._send(self._roster.open_tick(tick, self._pace.begin(), senses, received, tx_status))
+        self._send(self._roster.open_tick(tick, self._pace.begin(), readings, received, tx_status))
         self._pace.handed_over(received.received_at_ns)
         self._pace.hold(tick)
         self._take_in()
         return self._roster.take()
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with frames also between ticks, as packets come and are due."""
         assert self._subticks
@@ -143,7 +143,7 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, tx_status)
         self._pace.handed_over(received.received_at_ns)
         self._subticks.exchange(tick, air, self)  # first what became due since the last tick's end
-        self._send(self._roster.open_tick(tick, now_ns, senses, ReceivedPackets.none(), NO_TX_STATUSES))
+        self._send(self._roster.open_tick(tick, now_ns, readings, ReceivedPackets.none(), NO_TX_STATUSES))
         self._subticks.pass_tick(tick, air, self)
         return self._roster.take()
 

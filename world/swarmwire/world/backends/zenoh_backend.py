@@ -15,7 +15,7 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, to_ns, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Senses
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
@@ -117,7 +117,7 @@ class ZenohBackend(ABC, Generic[R]):
 
     @abstractmethod
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What every robot does in this tick."""
 
@@ -334,9 +334,9 @@ class LockstepBackend(ZenohBackend[Lockstep]):
         super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """One frame to every runner, one answer from each."""
-        self._send(self._roster.open_tick(tick, senses, received, tx_status))
+        self._send(self._roster.open_tick(tick, readings, received, tx_status))
         self._wait()
         return self._roster.take()

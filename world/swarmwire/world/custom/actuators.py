@@ -9,7 +9,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Scene
 
 
-class OwnActuator(ABC):
+class CustomActuator(ABC):
     """What an actuator of your own does. Subclasses are dataclasses: fields made by `parameter` are keys.
 
     One instance serves all robots of a group, in all arenas.

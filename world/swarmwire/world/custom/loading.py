@@ -9,43 +9,43 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import MAX_WIDE, ActuatorSheet
-from swarmwire.comms.bodies.sensors import OwnSheet, Sheet
+from swarmwire.comms.bodies.custom import MAX_WIDE, CustomActuatorSpec
+from swarmwire.comms.bodies.sensors import CustomSensorSpec, SensorSpec
 from swarmwire.comms.bodies.tables import built
-from swarmwire.comms.errors import BadInput, OwnCodeFailed
-from swarmwire.comms.plugins import entry_points_of, own_class
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.plugins import custom_class, entry_points_of
 from swarmwire.comms.tick_io import Actuations
 from swarmwire.comms.truth import Group
-from swarmwire.world.custom.actuators import OwnActuator
-from swarmwire.world.custom.sensors import OwnSensor, field_fault
+from swarmwire.world.custom.actuators import CustomActuator
+from swarmwire.world.custom.sensors import CustomSensor, field_fault
 from swarmwire.world.sensors.sensor import Field, Scene
 
-K = TypeVar("K", OwnSensor, OwnActuator)
+K = TypeVar("K", CustomSensor, CustomActuator)
 SENSORS, ACTUATORS = "swarmwire.sensors", "swarmwire.actuators"  # groups of entry points
 
 
 def fitted(body: Body, where: str) -> Body:
     """The body with what the classes of its own senses and actuators tell agents; BadInput names what is wrong."""
-    senses = {name: _sense(sheet, where, f"senses.{name}") for name, sheet in body.senses.items()}
-    actuators = {name: _actuator(sheet, where, f"actuators.{name}") for name, sheet in body.actuators.items()}
-    return replace(body, senses=senses, actuators=actuators)
+    sensors = {name: _sensor(spec, where, f"sensors.{name}") for name, spec in body.sensors.items()}
+    actuators = {name: _actuator(spec, where, f"actuators.{name}") for name, spec in body.actuators.items()}
+    return replace(body, sensors=sensors, actuators=actuators)
 
 
-def made_sensor(sheet: OwnSheet) -> OwnSensor:
+def made_sensor(spec: CustomSensorSpec) -> CustomSensor:
     """A new instance of the class of a sheet that is `fitted`."""
-    return _made(OwnSensor, sheet.kind, sheet.params, "", "")
+    return _made(CustomSensor, spec.kind, spec.params, "", "")
 
 
-def made_actuator(sheet: ActuatorSheet) -> OwnActuator:
+def made_actuator(spec: CustomActuatorSpec) -> CustomActuator:
     """A new instance of the class of a sheet that is `fitted`."""
-    return _made(OwnActuator, sheet.kind, sheet.params, "", "")
+    return _made(CustomActuator, spec.kind, spec.params, "", "")
 
 
-def _sense(sheet: Sheet, where: str, key: str) -> Sheet:
-    if not isinstance(sheet, OwnSheet):
-        return sheet
-    sheet = replace(sheet, kind=_entry_point(sheet.kind, SENSORS))
-    own = _made(OwnSensor, sheet.kind, sheet.params, where, key)
+def _sensor(spec: SensorSpec, where: str, key: str) -> SensorSpec:
+    if not isinstance(spec, CustomSensorSpec):
+        return spec
+    spec = replace(spec, kind=_entry_point(spec.kind, SENSORS))
+    own = _made(CustomSensor, spec.kind, spec.params, where, key)
     found: Any = _asked(own, "fields", where, key)
     if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
         raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
@@ -58,18 +58,18 @@ def _sense(sheet: Sheet, where: str, key: str) -> Sheet:
         fault = field_fault(field)
         if fault:
             raise BadInput(where, f"{key}.kind", f"the field {field.name} of {type(own).__name__}: {fault}")
-    return replace(sheet, fields={of.name: of.width for of in fields})
+    return replace(spec, fields={of.name: of.width for of in fields})
 
 
-def _actuator(sheet: ActuatorSheet, where: str, key: str) -> ActuatorSheet:
-    sheet = replace(sheet, kind=_entry_point(sheet.kind, ACTUATORS))
-    own = _made(OwnActuator, sheet.kind, sheet.params, where, key)
+def _actuator(spec: CustomActuatorSpec, where: str, key: str) -> CustomActuatorSpec:
+    spec = replace(spec, kind=_entry_point(spec.kind, ACTUATORS))
+    own = _made(CustomActuator, spec.kind, spec.params, where, key)
     width: Any = _asked(own, "width", where, key)
     if type(width) is not int or not 1 <= width <= MAX_WIDE:
         raise BadInput(
             where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDE}; {type(own).__name__} has {width!r}"
         )
-    return replace(sheet, width=width)
+    return replace(spec, width=width)
 
 
 def _entry_point(kind: str, group: str) -> str:
@@ -88,7 +88,7 @@ def _asked(own: object, name: str, where: str, key: str) -> object:
 
 def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: str) -> K:
     """An instance of the class `kind` below `base`; BadInput if it is none, or does not take these parameters."""
-    found = own_class(base, kind, where, f"{key}.kind")
+    found = custom_class(base, kind, where, f"{key}.kind")
     if cast("Any", found).__dataclass_params__.frozen:  # it is told its scene and group
         raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {found.__name__} is")
     try:
@@ -102,7 +102,7 @@ def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: 
 # --- The actuators of the user's own, of all groups: set by agents, and let act in each tick.
 
 
-class OwnActuators:
+class CustomActuators:
     """The actuators of the user's own; `any` tells whether there are some.
 
     Attributes:
@@ -110,26 +110,26 @@ class OwnActuators:
     """
 
     def __init__(self, groups: Sequence[Group], scene: Scene) -> None:
-        """Each is started; OwnCodeFailed if one raises."""
+        """Each is started; CustomCodeFailed if one raises."""
         self._scene = scene
-        self._fitted: list[tuple[str, OwnActuator, slice]] = []
+        self._fitted: list[tuple[str, CustomActuator, slice]] = []
         for group in groups:
-            for name, sheet in group.body.actuators.items():
-                own = made_actuator(sheet)
+            for name, spec in group.body.actuators.items():
+                own = made_actuator(spec)
                 own.scene, own.group = scene, group
-                what = f"the actuator {name} of {group.name} ({sheet.kind})"
+                what = f"the actuator {name} of {group.name} ({spec.kind})"
                 self._fitted.append((what, own, group.body.actuator_places[name]))
                 _call(what, own.start)
         self.any = bool(self._fitted)
         arenas, robots = len(scene.keys), len(scene.radius_m)
-        places = [sum(sheet.width for sheet in group.body.actuators.values()) for group in groups]
+        places = [sum(spec.width for spec in group.body.actuators.values()) for group in groups]
         self._places = np.tile(np.repeat(places, [group.stop - group.start for group in groups]), arenas)
         self._index: IntArray = np.tile(np.arange(robots, dtype=np.int64), arenas)
         self.not_there: IntArray = np.zeros(arenas, np.int64)
         self._robots, self._ticks = robots, 0
 
     def act(self, actuations: Actuations, alive: BoolArray) -> None:
-        """Let those of robots `alive` (rows,) act in a tick; OwnCodeFailed if one raises or leaves inf or nan."""
+        """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
         rows, place = actuations.rows, actuations.place
         there = place < self._places[rows]
         np.add.at(self.not_there, rows[~there] // self._robots, 1)
@@ -152,11 +152,11 @@ class OwnActuators:
                 arena, robot = np.argwhere(~finite)[0, :2]
                 value = values[arena, robot].tolist()
                 said = f"expected finite numbers in scene.{name}, got {value} of robot {robot} in arena {arena}"
-                raise OwnCodeFailed(what, f"act: {said}")
+                raise CustomCodeFailed(what, f"act: {said}")
 
 
 def _call(what: str, method: Any, *args: Any) -> None:
     try:
         method(*args)
     except (Exception, SystemExit) as error:
-        raise OwnCodeFailed(what, traceback.format_exc()) from error
+        raise CustomCodeFailed(what, traceback.format_exc()) from error

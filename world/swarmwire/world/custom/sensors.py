@@ -12,13 +12,13 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.custom import MAX_WIDE
-from swarmwire.comms.bodies.sensors import OwnSheet
-from swarmwire.comms.errors import OwnCodeFailed
+from swarmwire.comms.bodies.sensors import CustomSensorSpec
+from swarmwire.comms.errors import CustomCodeFailed
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 
-class OwnSensor(ABC):
+class CustomSensor(ABC):
     """What the truth is about a sense of your own. Subclasses are dataclasses: fields made by `parameter` are keys.
 
     One instance serves all robots of a group, in all arenas. Noise, drop-out, rate and delay are not its affair: they
@@ -52,13 +52,13 @@ class OwnSensor(ABC):
         return self.scene.state[:, self.group.start : self.group.stop, :3]
 
 
-class AskedSensor:
-    """An `OwnSensor` as the stages ask it: what it tells is checked and copied; OwnCodeFailed if it raises."""
+class CheckedSensor:
+    """An `CustomSensor` as the stages ask it: what it tells is checked and copied; CustomCodeFailed if it raises."""
 
-    def __init__(self, name: str, own: OwnSensor, sheet: OwnSheet, scene: Scene, group: Group) -> None:
+    def __init__(self, name: str, own: CustomSensor, spec: CustomSensorSpec, scene: Scene, group: Group) -> None:
         own.scene, own.group = scene, group
-        self._what, self._own = f"the sense {name} of {group.name} ({sheet.kind})", own
-        self.fields = tuple(replace(field, step=field.step or sheet.step) for field in own.fields)
+        self._what, self._own = f"the sense {name} of {group.name} ({spec.kind})", own
+        self.fields = tuple(replace(field, step=field.step or spec.step) for field in own.fields)
         robots = len(scene.keys), group.stop - group.start
         self._shapes = [(*robots, field.width) if field.width else robots for field in self.fields]
         self._call(own.start)
@@ -67,11 +67,11 @@ class AskedSensor:
         """The truth about each field."""
         told: Any = self._call(self._own.truth, tick)
         if not isinstance(cast("object", told), np.ndarray | tuple | list):
-            raise OwnCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {told!r:.80}")
+            raise CustomCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {told!r:.80}")
         single = isinstance(cast("object", told), np.ndarray)
         arrays: tuple[Any, ...] = (told,) if single else tuple(told)
         if len(arrays) != len(self._shapes):
-            raise OwnCodeFailed(self._what, f"truth: expected {len(self._shapes)} arrays, got {len(arrays)}")
+            raise CustomCodeFailed(self._what, f"truth: expected {len(self._shapes)} arrays, got {len(arrays)}")
         return tuple(self._checked(*each) for each in zip(self.fields, arrays, self._shapes, strict=True))
 
     def follow(self, tick: int) -> None:
@@ -82,16 +82,16 @@ class AskedSensor:
         try:
             numbers = np.array(array, np.float64, order="C")
         except (TypeError, ValueError) as error:
-            raise OwnCodeFailed(self._what, f"truth: expected numbers as {field.name}: {error}") from error
+            raise CustomCodeFailed(self._what, f"truth: expected numbers as {field.name}: {error}") from error
         if numbers.shape != shape:
-            raise OwnCodeFailed(self._what, f"truth: expected {field.name} of shape {shape}, got {numbers.shape}")
+            raise CustomCodeFailed(self._what, f"truth: expected {field.name} of shape {shape}, got {numbers.shape}")
         return numbers
 
     def _call(self, method: Any, *args: int) -> Any:
         try:
             return method(*args)
         except (Exception, SystemExit) as error:
-            raise OwnCodeFailed(self._what, traceback.format_exc()) from error
+            raise CustomCodeFailed(self._what, traceback.format_exc()) from error
 
 
 # --- What is wrong with a field of a sense of the user's own, which no type checker looked at.

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, LedChanges, Senses
+from swarmwire.comms.tick_io import Actions, LedChanges, Readings
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
@@ -37,11 +37,11 @@ class GatewayGroup:
         self._alive = self._minds = np.ones(len(self.rows), np.bool_)
         self._told: dict[str, FloatArray] = {}  # the newest readings, of the dead those before their death
 
-    def publish(self, time_ns: int, senses: Senses) -> None:
+    def publish(self, time_ns: int, readings: Readings) -> None:
         """Hand the newest readings to the gateway; who senses nothing in a tick in which its group acts is dead."""
-        if self.name not in senses:  # it does not act in this tick
+        if self.name not in readings:  # it does not act in this tick
             return
-        own = senses[self.name]
+        own = readings[self.name]
         place = own.rows - self.rows[0]
         alive = np.zeros(len(self.rows), np.bool_)
         alive[place] = True
@@ -124,10 +124,10 @@ class GatewayBackend:
         self.start, self.close = inner.start, inner.close
 
     def act(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """What agents here decided, and what foreign programs told the other robots in this tick."""
-        others = self._begin(tick, senses, received, tx_status)
+        others = self._begin(tick, readings, received, tx_status)
         actions = self._inner.act(tick, others, received, tx_status)
         self._pace.hold(tick)
         self._catch_up(tick)
@@ -135,11 +135,11 @@ class GatewayBackend:
         return replace(told, sent=SentPackets.joined([told.sent, self._air.take()])) if self._air else told
 
     def act_in_time(
-        self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
     ) -> Actions:
         """The same, with packets taken when they come and handed over when they are due."""
         assert self._subticks
-        others = self._begin(tick, senses, received, tx_status)
+        others = self._begin(tick, readings, received, tx_status)
         self._inner.receive(received, tx_status)
         actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
@@ -175,15 +175,15 @@ class GatewayBackend:
         """How far the loop kept up."""
         return report_of(self._pace, self._subticks)
 
-    def _begin(self, tick: int, senses: Senses, received: ReceivedPackets, tx_status: TxStatuses) -> Senses:
+    def _begin(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Readings:
         """A tick begins: all goes out; what the others sense."""
         self._pace.begin()
         self._show()
         for group in self._groups:
-            group.publish(tick_start_ns(tick, self._rate_hz), senses)
+            group.publish(tick_start_ns(tick, self._rate_hz), readings)
         self._publish(tick, received, tx_status)
         self._pace.handed_over(received.received_at_ns)
-        return {name: of for name, of in senses.items() if name not in self._names}
+        return {name: of for name, of in readings.items() if name not in self._names}
 
     def _publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         if self._air:

@@ -34,7 +34,7 @@ class Gateway(ABC):
     """
 
     options: ClassVar[type] = NoParameters
-    senses: ClassVar[frozenset[str]]
+    sensors: ClassVar[frozenset[str]]
     unsaid: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:
@@ -52,8 +52,8 @@ class Gateway(ABC):
 
         Senses that a tracker tells are no difference.
         """
-        told = self.senses | self.unsaid
-        untold = [name for name, sheet in self.body.senses.items() if not (name in told or sheet.is_global)]
+        told = self.sensors | self.unsaid
+        untold = [name for name, spec in self.body.sensors.items() if not (name in told or spec.is_global)]
         unmoved = [*self.body.actuators]
         return tuple(
             f"{words} {', '.join(names)}"

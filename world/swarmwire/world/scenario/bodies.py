@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
-from swarmwire.comms.bodies.custom import ActuatorSheet
-from swarmwire.comms.bodies.sensors import OwnSheet
+from swarmwire.comms.bodies.custom import CustomActuatorSpec
+from swarmwire.comms.bodies.sensors import CustomSensorSpec
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
@@ -30,15 +30,15 @@ def sheet_path(body: str, where: str) -> Path | None:
     return (Path(where).parent / body).resolve() if body.endswith(".toml") else None
 
 
-def own_code(static: Static) -> tuple[str, ...]:
+def custom_code(static: Static) -> tuple[str, ...]:
     """The classes of the bodies' own senses and actuators: "package.module:Class" or "/path/file.py:Class"."""
-    return own_code_of(group.body for group in static.groups)
+    return custom_code_of(group.body for group in static.groups)
 
 
-def own_code_of(bodies: Iterable[Body]) -> tuple[str, ...]:
+def custom_code_of(bodies: Iterable[Body]) -> tuple[str, ...]:
     """The classes of these bodies' own senses and actuators, in the same form."""
-    sheets = [sheet for body in bodies for sheet in (*body.senses.values(), *body.actuators.values())]
-    return tuple(dict.fromkeys(sheet.kind for sheet in sheets if isinstance(sheet, OwnSheet | ActuatorSheet)))
+    specs = [spec for body in bodies for spec in (*body.sensors.values(), *body.actuators.values())]
+    return tuple(dict.fromkeys(spec.kind for spec in specs if isinstance(spec, CustomSensorSpec | CustomActuatorSpec)))
 
 
 def _body(name: str, where: str, key: str) -> Body:
@@ -55,17 +55,17 @@ def _body(name: str, where: str, key: str) -> Body:
 
 def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
     """The body with what the scenario itself says of its sheet; the group in its name tells it from all others."""
-    if not table.sheet:
+    if not table.body_overrides:
         return body
     key = f"robots.{group}.sheet"
     path = sheet_path(table.body, where)
     base = {"like": table.body} if path is None else read_toml(path)
-    sheet = merged({**base, "name": f"{body.name} of {group}"}, table.sheet)
+    spec = merged({**base, "name": f"{body.name} of {group}"}, table.body_overrides)
     try:
-        changed = body_from(sheet, where) if path is None else _fitted(sheet, path)
+        changed = body_from(spec, where) if path is None else _fitted(spec, path)
     except BadInput as error:
         raise BadInput(where, ".".join(filter(None, (key, error.key))), error.expected) from None
-    if own_code_of([changed]) != own_code_of([body]):
+    if custom_code_of([changed]) != custom_code_of([body]):
         raise BadInput(where, key, "expected no classes of your own: they belong into a file that `body` names")
     return changed
 
@@ -75,11 +75,11 @@ def read_body(path: Path, where: str, key: str) -> Body:
 
     BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
     """
-    sheet = read_toml(path, (where, key))
-    if "robots" in sheet:
+    spec = read_toml(path, (where, key))
+    if "robots" in spec:
         raise BadInput(str(path), "", "expected a body's sheet, got a scenario; swarmwire check and draw take one")
-    return _fitted(sheet, path)
+    return _fitted(spec, path)
 
 
-def _fitted(sheet: dict[str, Any], path: Path) -> Body:
-    return fitted(body_from(sheet, str(path), path.parent), str(path))
+def _fitted(spec: dict[str, Any], path: Path) -> Body:
+    return fitted(body_from(spec, str(path), path.parent), str(path))

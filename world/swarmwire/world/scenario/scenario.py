@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.events.selection import Groups
-from swarmwire.comms.radio.config.phy import OwnAntenna
+from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import with_preset
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.scenario.schema import AsTable, OneOf
@@ -54,8 +54,8 @@ class RobotsTable(Table):
 
     body: str = Field(min_length=1)
     """Name of the body."""
-    sheet: dict[str, Any] = Field(default_factory=dict)
-    """What of the body's data sheet is otherwise for this group, such as senses.proximity.drop_out."""
+    body_overrides: dict[str, Any] = Field(default_factory=dict)
+    """What of the body's data sheet is otherwise for this group, such as sensors.proximity.drop_out."""
     count: int = Field(ge=1, le=1_000_000)
     """How many robots."""
     agent: str = Field(min_length=1)
@@ -64,7 +64,7 @@ class RobotsTable(Table):
     """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
-    radio: Annotated[OwnAntenna, AsTable()] | None = None
+    radio: Annotated[RobotAntenna, AsTable()] | None = None
     """Their own power and gain; only of a radio with signals."""
     place: PlaceTable = InArena(how="arena")
     """Where the robots stand at the start."""

@@ -1,4 +1,4 @@
-"""What robots sense, a file per sensor: the truth (`sensor.TrueSense`), of which `staged.Staged` makes readings.
+"""What robots sense, a file per sensor: the truth (`sensor.Sensor`), of which `staged.Staged` makes readings.
 
 A new one: a sheet in `swarmwire.comms.bodies.sensors`, a file here, a line below.
 """
@@ -12,7 +12,7 @@ from swarmwire.world.sensors.imu import ImuSensor
 from swarmwire.world.sensors.light import LightSensor
 from swarmwire.world.sensors.rays import InfraredSensor, ProximitySensor
 from swarmwire.world.sensors.scan import ScanSensor
-from swarmwire.world.sensors.sensor import Scene, TrueSense
+from swarmwire.world.sensors.sensor import Scene, Sensor
 from swarmwire.world.sensors.simple import (
     BatterySensor,
     BumperSensor,
@@ -22,7 +22,7 @@ from swarmwire.world.sensors.simple import (
     PositioningSensor,
 )
 
-SENSORS: dict[str, Callable[[Scene, Group, Any], TrueSense]] = {
+SENSORS: dict[str, Callable[[Scene, Group, Any], Sensor]] = {
     "proximity": ProximitySensor,
     "compass": CompassSensor,
     "odometry": OdometrySensor,

@@ -95,11 +95,11 @@ class Mirror(NamedTuple):
 class CameraSensor:
     """Sense `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Camera) -> None:
-        blobs, noise = sheet.most_blobs, Noise("normal", 0.0, sheet.noise_relative)
-        reach_m = sheet.reach_m(group.body.altitude_m)
+    def __init__(self, scene: Scene, group: Group, spec: Camera) -> None:
+        blobs, noise = spec.most_blobs, Noise("normal", 0.0, spec.noise_relative)
+        reach_m = spec.reach_m(group.body.altitude_m)
         self.fields = (
-            Field("distance_m", blobs, noise, sheet.step, low=0.0, high=reach_m),
+            Field("distance_m", blobs, noise, spec.step, low=0.0, high=reach_m),
             Field("bearing_rad", blobs, angle=True),
             Field("colour", blobs),
         )
@@ -109,7 +109,7 @@ class CameraSensor:
         self._crowd = crowd_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
         self._standing = Standing(scene, reach_m)
         found = np.empty(len(self._standing.now().shape), np.int64)
-        self._mirror = Mirror(group.start, sheet.height_m, reach_m, overhang_m, found)
+        self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, found)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The blobs that every robot of the group sees."""

@@ -24,19 +24,19 @@ BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
 class ImuSensor:
     """Sense `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Imu) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: Imu) -> None:
         self._scene, self._group = scene, group
-        acceleration, turn = Noise("normal", sheet.noise_mps2), Noise("normal", sheet.noise_radps)
+        acceleration, turn = Noise("normal", spec.noise_mps2), Noise("normal", spec.noise_radps)
         self.fields = (
-            Field("forward_mps2", noise=acceleration, step=sheet.step),
-            Field("left_mps2", noise=acceleration, step=sheet.step),
-            Field("turn_radps", noise=turn, step=sheet.step),
+            Field("forward_mps2", noise=acceleration, step=spec.step),
+            Field("left_mps2", noise=acceleration, step=spec.step),
+            Field("turn_radps", noise=turn, step=spec.step),
         )
         robots = np.arange(group.start, group.stop)
-        spread = np.array([sheet.bias_std_mps2, sheet.bias_std_mps2, sheet.bias_std_radps])
+        spread = np.array([spec.bias_std_mps2, spec.bias_std_mps2, spec.bias_std_radps])
         drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(3), BIAS)
         self._bias = spread * drawn  # (arenas, n, fields)
-        drift = np.array([sheet.drift_mps2, sheet.drift_mps2, sheet.drift_radps])
+        drift = np.array([spec.drift_mps2, spec.drift_mps2, spec.drift_radps])
         self._drift = drift * np.sqrt(scene.tick_s)  # (fields,) in a tick
         self._before = scene.state[:, group.start : group.stop, 2:5].copy()  # heading and velocity
         self._felt = np.zeros_like(self._bias)

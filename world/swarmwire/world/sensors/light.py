@@ -101,10 +101,10 @@ TURN_RAD = 2.0 * np.pi
 class LightSensor:
     """Sense `light`: value (n, sensors), 0 dark to 1. Noise is uniform, and new in every reading."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Light) -> None:
-        self._scene, self._group, self._sheet = scene, group, sheet
-        noise = Noise("uniform", sheet.noise)
-        self.fields = (Field("value", len(sheet.angle_rad), noise, sheet.step, low=0.0, high=1.0, blank=0.0),)
+    def __init__(self, scene: Scene, group: Group, spec: Light) -> None:
+        self._scene, self._group, self._spec = scene, group, spec
+        noise = Noise("uniform", spec.noise)
+        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
         lights = [(a, light) for a, some in enumerate(scene.lights) for light in some]
         self._arena = np.array([a for a, _ in lights], np.int64)
         self._light = np.array([(of.x_m, of.y_m, of.intensity_m) for _, of in lights], np.float64).reshape(-1, 3)
@@ -114,7 +114,7 @@ class LightSensor:
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every photocell of every robot of the group answers, without noise; more than 1 where lights add up."""
-        scene, group, angle = self._scene, self._group, self._sheet.angle_rad
+        scene, group, angle = self._scene, self._group, self._spec.angle_rad
         value = np.zeros((len(scene.keys), group.stop - group.start, len(angle)))
         around = self._crowd, self._widest_m, self._standing.now()
         _shine(value, group.start, angle, *around, self._arena, self._light)

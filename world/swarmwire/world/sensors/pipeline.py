@@ -14,11 +14,11 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.bodies.sensors import RangedSheet, Sheet
+from swarmwire.comms.bodies.sensors import RangedSensorSpec, SensorSpec
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.sensor import Field, Following, TrueSense
+from swarmwire.world.sensors.sensor import Field, Following, Sensor
 
 NOISE, OUTLIER, OUTLYING, DROP_OUT = range(4)  # places in `purposes`
 FULL_TURN = 2.0 * np.pi
@@ -45,7 +45,7 @@ class Numbers(NamedTuple):
 class Stages:
     """All that one field of a sense passes through."""
 
-    def __init__(self, sense: str, field: Field, outlier: float, drop_out: float) -> None:
+    def __init__(self, sensor: str, field: Field, outlier: float, drop_out: float) -> None:
         low, high = field.span or (field.low, field.high)
         self._numbers = Numbers(
             is_normal=field.noise.kind == "normal",
@@ -61,7 +61,12 @@ class Stages:
             high=float(field.high),
             angle=field.angle,
         )
-        names = f"{sense}.{field.name} noise", f"{sense} outlier", f"{sense}.{field.name} outlier", f"{sense} drop-out"
+        names = (
+            f"{sensor}.{field.name} noise",
+            f"{sensor} outlier",
+            f"{sensor}.{field.name} outlier",
+            f"{sensor} drop-out",
+        )
         self._purposes = np.array([purpose(name) for name in names], np.uint64)
         unbounded = isinf(field.low) and isinf(field.high) and not field.angle
         errs = field.noise.size or field.noise.relative or outlier or drop_out or field.step
@@ -185,8 +190,8 @@ class Staged:
     def __init__(
         self,
         name: str,
-        sense: TrueSense,
-        sheet: Sheet,
+        sensor: Sensor,
+        spec: SensorSpec,
         keys: KeyArray,
         group: Group,
         tick_s: float,
@@ -197,12 +202,12 @@ class Staged:
         Nobody reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
         """
         self.failed: BoolArray | None = None
-        self._sense, self._keys, self._running, self._group = sense, keys, running, group
-        outlier = sheet.outlier if isinstance(sheet, RangedSheet) else 0.0
-        self._stages = [Stages(name, field, outlier, sheet.drop_out) for field in sense.fields]
-        self._fields = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in sense.fields]
-        self._per_tick = sheet.rate_hz * tick_s  # readings; 0: one in each tick
-        self._delay = ceil(sheet.delay_s / tick_s - NEAR)  # ticks
+        self._sensor, self._keys, self._running, self._group = sensor, keys, running, group
+        outlier = spec.outlier if isinstance(spec, RangedSensorSpec) else 0.0
+        self._stages = [Stages(name, field, outlier, spec.drop_out) for field in sensor.fields]
+        self._fields = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in sensor.fields]
+        self._per_tick = spec.rate_hz * tick_s  # readings; 0: one in each tick
+        self._delay = ceil(spec.delay_s / tick_s - NEAR)  # ticks
         self._held = self._delay > 0 or 0.0 < self._per_tick < 1.0
         self._shown: Taken | None = None
         self._waiting: deque[tuple[int, Taken]] = deque()  # until the tick in which each is shown
@@ -215,7 +220,7 @@ class Staged:
         else:
             values = self._take(tick)
         if self.failed is not None:
-            for value, field in zip(values, self._sense.fields, strict=True):
+            for value, field in zip(values, self._sensor.fields, strict=True):
                 value[self.failed] = field.blank
         return {key: value.reshape(shape) for (key, shape), value in zip(self._fields, values, strict=True)}
 
@@ -223,11 +228,11 @@ class Staged:
         """Keep up in a tick in which the group does not act."""
         if self._held:
             self._hold(tick)
-        elif isinstance(self._sense, Following):
-            self._sense.follow(tick)
+        elif isinstance(self._sensor, Following):
+            self._sensor.follow(tick)
 
     def _take(self, tick: int) -> Taken:
-        values = self._sense.truth(tick)
+        values = self._sensor.truth(tick)
         for value, stages in zip(values, self._stages, strict=True):
             stages.apply(value, self._keys, self._group.start, tick, self._running)
         return values
@@ -236,15 +241,15 @@ class Staged:
         """Take a reading if one is due, and show the newest that is old enough."""
         if self._is_due(tick):
             self._waiting.append((tick + self._delay, self._take(tick)))
-        elif isinstance(self._sense, Following):
-            self._sense.follow(tick)
+        elif isinstance(self._sensor, Following):
+            self._sensor.follow(tick)
         while self._waiting and self._waiting[0][0] <= tick:
             self._shown = self._waiting.popleft()[1]
 
     def _blank(self) -> Taken:
         shape = len(self._keys), self._group.stop - self._group.start
         return tuple(
-            np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._sense.fields
+            np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._sensor.fields
         )
 
     def _is_due(self, tick: int) -> bool:

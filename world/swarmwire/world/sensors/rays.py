@@ -145,18 +145,18 @@ class Fan(NamedTuple):
 class FanSight:
     """What the rays of a group's robots meet: everything if they are active, else only robots alive and in sight."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Rim, active: bool) -> None:
-        reach_m = group.body.radius_m + sheet.range_m
-        self._shape = len(scene.keys), group.stop - group.start, len(sheet.angle_rad)
-        self._active, self._alive, curve = active, scene.alive, sheet.response
+    def __init__(self, scene: Scene, group: Group, spec: Rim, active: bool) -> None:
+        reach_m = group.body.radius_m + spec.range_m
+        self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
+        self._active, self._alive, curve = active, scene.alive, spec.response
         self._crowd = crowd_of(scene, reach_m + float(scene.radius_m.max()))
         self._standing = Standing(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._fan = Fan(
             group.start,
-            np.cos(sheet.angle_rad),
-            np.sin(sheet.angle_rad),
-            sheet.range_m,
+            np.cos(spec.angle_rad),
+            np.sin(spec.angle_rad),
+            spec.range_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
             FORMS.index(curve.kind),
@@ -285,10 +285,10 @@ def _answer(distance, fan):
 class ProximitySensor:
     """Sense `proximity`: value (n, rays), the sensors' answers, 0 to 1. Noise is uniform, and new in every reading."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Proximity) -> None:
-        self._sight = FanSight(scene, group, sheet, active=True)
-        noise = Noise("uniform", sheet.noise)
-        self.fields = (Field("value", len(sheet.angle_rad), noise, sheet.step, low=0.0, high=1.0, blank=0.0),)
+    def __init__(self, scene: Scene, group: Group, spec: Proximity) -> None:
+        self._sight = FanSight(scene, group, spec, active=True)
+        noise = Noise("uniform", spec.noise)
+        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every ray of every robot of the group would answer without noise."""
@@ -305,10 +305,10 @@ class ProximitySensor:
 class InfraredSensor:
     """Sense `infrared`: value (n, rays), the answers to other robots' light, 0 to 1. Noise is uniform."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Infrared) -> None:
-        self._sight = FanSight(scene, group, sheet, active=False)
-        noise = Noise("uniform", sheet.noise)
-        self.fields = (Field("value", len(sheet.angle_rad), noise, sheet.step, low=0.0, high=1.0, blank=0.0),)
+    def __init__(self, scene: Scene, group: Group, spec: Infrared) -> None:
+        self._sight = FanSight(scene, group, spec, active=False)
+        noise = Noise("uniform", spec.noise)
+        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every ray of every robot of the group would answer without noise."""

@@ -40,26 +40,26 @@ class Laser(NamedTuple):
 class ScanSensor:
     """Sense `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Scan) -> None:
-        noise = Noise("normal", sheet.noise_m, sheet.noise_relative)
+    def __init__(self, scene: Scene, group: Group, spec: Scan) -> None:
+        noise = Noise("normal", spec.noise_m, spec.noise_relative)
         self.fields = (
-            Field("range_m", sheet.rays, noise, sheet.step, low=sheet.range_min_m, high=sheet.range_m, blank=np.inf),
+            Field("range_m", spec.rays, noise, spec.step, low=spec.range_min_m, high=spec.range_m, blank=np.inf),
         )
-        self._shape = len(scene.keys), group.stop - group.start, sheet.rays
-        self._crowd = crowd_of(scene, sheet.range_m + float(scene.radius_m.max()))
-        self._standing = Standing(scene, sheet.range_m)
+        self._shape = len(scene.keys), group.stop - group.start, spec.rays
+        self._crowd = crowd_of(scene, spec.range_m + float(scene.radius_m.max()))
+        self._standing = Standing(scene, spec.range_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._laser = Laser(
             group.start,
-            *sheet.direction,
-            np.deg2rad(sheet.first_deg),
-            sheet.step_rad,
-            sheet.range_m,
-            sheet.at_m,
+            *spec.direction,
+            np.deg2rad(spec.first_deg),
+            spec.step_rad,
+            spec.range_m,
+            spec.at_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
-            np.empty(sheet.rays),
-            np.empty(sheet.rays),
+            np.empty(spec.rays),
+            np.empty(spec.rays),
             np.empty(len(self._standing.now().shape), np.int64),
         )
 

@@ -39,7 +39,7 @@ class Field:
     span: tuple[float, float] | None = None  # where an outlier may lie; None: from low to high
 
 
-class TrueSense(Protocol):
+class Sensor(Protocol):
     """One kind of sense of one group, in all arenas, without any error of the sensor."""
 
     fields: tuple[Field, ...]

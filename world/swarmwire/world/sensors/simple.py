@@ -21,18 +21,18 @@ from swarmwire.world.sensors.sensor import Field, Noise, Scene
 class BatterySensor:
     """Sense `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,)."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Battery) -> None:
-        self._scene, self._group, self._sheet = scene, group, sheet
+    def __init__(self, scene: Scene, group: Group, spec: Battery) -> None:
+        self._scene, self._group, self._spec = scene, group, spec
         self.fields = (
-            Field("charge", noise=Noise("normal", sheet.noise), step=sheet.step, low=0.0, high=1.0),
-            Field("voltage_v", noise=Noise("normal", sheet.noise_v), low=0.0),
+            Field("charge", noise=Noise("normal", spec.noise), step=spec.step, low=0.0, high=1.0),
+            Field("voltage_v", noise=Noise("normal", spec.noise_v), low=0.0),
         )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """Charge and voltage of every robot of the group."""
         charge = self._scene.charge[:, self._group.start : self._group.stop].copy()
-        empty_v = self._sheet.empty_v
-        return charge, empty_v + charge * (self._sheet.full_v - empty_v)
+        empty_v = self._spec.empty_v
+        return charge, empty_v + charge * (self._spec.full_v - empty_v)
 
 
 # --- The bumper: whether the body touched anything in the tick before.
@@ -41,7 +41,7 @@ class BatterySensor:
 class BumperSensor:
     """Sense `bumper`: pressed (n,), 1 if the body touched a robot, an obstacle or a wall in the tick before, else 0."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Bumper) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: Bumper) -> None:
         self._scene, self._group = scene, group
         self.fields = (Field("pressed", blank=0.0),)
 
@@ -56,10 +56,10 @@ class BumperSensor:
 class CompassSensor:
     """Sense `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Compass) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: Compass) -> None:
         self._scene, self._group = scene, group
-        noise = Noise("normal", sheet.noise_rad)
-        self.fields = (Field("heading_rad", noise=noise, step=sheet.step, angle=True, span=(-pi, pi)),)
+        noise = Noise("normal", spec.noise_rad)
+        self.fields = (Field("heading_rad", noise=noise, step=spec.step, angle=True, span=(-pi, pi)),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The heading of every robot of the group, with the full turns that it has made."""
@@ -72,11 +72,11 @@ class CompassSensor:
 class PositioningSensor:
     """Sense `positioning`: x_m, y_m (n,), in m, arena frame. An outlier is anywhere in the arena."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: Positioning) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: Positioning) -> None:
         self._scene, self._group = scene, group
-        noise = Noise("normal", sheet.noise_m)
+        noise = Noise("normal", spec.noise_m)
         self.fields = tuple(
-            Field(name, noise=noise, step=sheet.step, span=(-0.5 * side_m, 0.5 * side_m))
+            Field(name, noise=noise, step=spec.step, span=(-0.5 * side_m, 0.5 * side_m))
             for name, side_m in zip(("x_m", "y_m"), scene.size_m, strict=True)
         )
 
@@ -99,25 +99,25 @@ class OdometrySensor:
     reading.
     """
 
-    def __init__(self, scene: Scene, group: Group, sheet: Odometry) -> None:
-        self._scene, self._group, self._sheet = scene, group, sheet
-        self.fields = (Field("left_m", step=sheet.step), Field("right_m", step=sheet.step))
+    def __init__(self, scene: Scene, group: Group, spec: Odometry) -> None:
+        self._scene, self._group, self._spec = scene, group, spec
+        self.fields = (Field("left_m", step=spec.step), Field("right_m", step=spec.step))
         self._rolled_m = scene.travel_m[:, group.start : group.stop].copy()
         self._told_m = self._rolled_m.copy()
         robots = np.arange(group.start, group.stop)
         drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(2), WHEEL)
-        self._scale = 1.0 + sheet.wheel_error_std * drawn  # (arenas, n, wheels)
+        self._scale = 1.0 + spec.wheel_error_std * drawn  # (arenas, n, wheels)
 
     def follow(self, tick: int) -> None:
         """Add the travel since the last tick, with a slip of its own: how often an agent looks changes nothing."""
         scene, start = self._scene, self._group.start
         of, arenas = (self._told_m, self._rolled_m, scene.travel_m), (scene.keys, scene.running)
-        _add_travel(*of, start, self._scale, *arenas, tick, self._sheet.slip)
+        _add_travel(*of, start, self._scale, *arenas, tick, self._spec.slip)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The travel that the encoders of every robot show."""
         self.follow(tick)
-        step_m = self._sheet.step_m
+        step_m = self._spec.step_m
         shown = np.floor(self._told_m / step_m) * step_m if step_m > 0.0 else self._told_m
         return shown[:, :, 0].copy(), shown[:, :, 1].copy()
 
@@ -144,11 +144,11 @@ def _add_travel(told, rolled, travel, start, scale, keys, running, tick, slip):
 class GroundSensor:
     """Sense `ground`: shade (n, points), 0 black to 1 white, of the floor under each point. Noise is uniform."""
 
-    def __init__(self, scene: Scene, group: Group, sheet: GroundColour) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: GroundColour) -> None:
         self._scene, self._group = scene, group
-        self._points = np.array(sheet.points_m, np.float64)
-        noise = Noise("uniform", sheet.noise)
-        self.fields = (Field("shade", len(self._points), noise, sheet.step, low=0.0, high=1.0),)
+        self._points = np.array(spec.points_m, np.float64)
+        noise = Noise("uniform", spec.noise)
+        self.fields = (Field("shade", len(self._points), noise, spec.step, low=0.0, high=1.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The shade under every point of every robot of the group."""

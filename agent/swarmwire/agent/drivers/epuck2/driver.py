@@ -15,7 +15,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.epuck2.commands import SENSES, RobotCommand, check_fits, wheel_steps
+from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, RobotCommand, check_fits, wheel_steps
 from swarmwire.comms.robots.epuck2.packets import SENSORS, Request, Settings
 from swarmwire.comms.robots.epuck2.readings import (
     CHIPS,
@@ -23,8 +23,8 @@ from swarmwire.comms.robots.epuck2.readings import (
     GROUND_WHITE,
     Calibration,
     Compass,
+    Epuck2Readings,
     Odometer,
-    Readings,
 )
 
 
@@ -93,7 +93,7 @@ class Epuck2Driver(Driver):
         self._options.check()
         self._counts: Counter[str] = Counter()
         self._odometer = Odometer()
-        self._readings = Readings(body, options.calibration, self._odometer)
+        self._readings = Epuck2Readings(body, options.calibration, self._odometer)
         self._gives = _given(body, self._options)
         self._received_ns: int | None = None  # when the newest reading came
         self._told_sensors: AnyArray = np.zeros(1, SENSORS)
@@ -128,7 +128,7 @@ class Epuck2Driver(Driver):
         if not self._exchange(link, options.connect_s):
             raise self._lose(DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer"))
 
-    def sense(self, senses: frozenset[str]) -> dict[str, FloatArray]:
+    def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
         """As `Driver.sense`."""
         link = self._connected()
         if not self._exchange(link, self._options.answer_s):
@@ -137,7 +137,7 @@ class Epuck2Driver(Driver):
             if silent_s > self._options.silent_s:
                 self._counts["silences"] += 1
                 raise self._lose(DriverLost(f"the e-puck2 at {self.address} has been silent for {silent_s:.1f} s"))
-        return self._readings.of(self._told_sensors, senses)
+        return self._readings.of(self._told_sensors, sensors)
 
     def act(self, command: Command) -> None:
         """As `Driver.act`; what no wheel can follow is slowed down as a whole, so that its curve stays."""
@@ -239,4 +239,4 @@ class Epuck2Driver(Driver):
 
 def _given(body: Body, options: Epuck2Options) -> frozenset[str]:
     unknown = frozenset[str]() if options.north_deg is not None else frozenset({"compass"})
-    return (SENSES & body.senses.keys()) - unknown
+    return (READABLE_SENSORS & body.sensors.keys()) - unknown

@@ -109,8 +109,8 @@ class Ros2Driver(Driver):
     @property
     def measures(self) -> frozenset[str]:
         """As `Driver.measures`: those of the body that a topic tells of."""
-        senses = (feed.senses for feed in self._feeds.values())
-        return frozenset[str]().union(*senses) & self.body.senses.keys()
+        sensors = (feed.sensors for feed in self._feeds.values())
+        return frozenset[str]().union(*sensors) & self.body.sensors.keys()
 
     def open(self) -> None:
         """As `Driver.open`."""
@@ -131,18 +131,18 @@ class Ros2Driver(Driver):
         self._since_ns = self.clock.now_ns()
         self._commander = Commander(lambda command: self._send(outlet, command), self.clock)
 
-    def sense(self, senses: frozenset[str]) -> dict[str, FloatArray]:
+    def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
         """As `Driver.sense`: what came until now; nothing is waited for."""
         self._check_link()
         if self._outlet is None or not self._outlet.wanted:
             self.stop()
             raise DriverLost(self._nobody())
-        self._asked = tuple(feed for feed in self._feeds.values() if feed.senses & senses)
+        self._asked = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
         fields: dict[str, FloatArray] = {}
         for feed in self._asked:
             fields.update(feed.look())
         self._check_silence()
-        return {field: value.copy() for field, value in fields.items() if field.split(".")[0] in senses}
+        return {field: value.copy() for field, value in fields.items() if field.split(".")[0] in sensors}
 
     def act(self, command: Command) -> None:
         """As `Driver.act`; it is sent again until the next one, or `stop`."""

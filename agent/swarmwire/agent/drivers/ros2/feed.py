@@ -22,7 +22,7 @@ class Feed:
     """
 
     def __init__(self, reader: Reader, messages: Messages, clock: Clock) -> None:
-        self.senses = frozenset(field.split(".")[0] for field in reader.fields)
+        self.sensors = frozenset(field.split(".")[0] for field in reader.fields)
         self.garbage = 0
         self._reader, self._messages, self._clock = reader, messages, clock
         self._waiting: deque[tuple[int, bytes]] = deque(maxlen=reader.keeps)

@@ -157,13 +157,13 @@ class BatteryReader(Reader):
     kind = BATTERY_STATE
     is_steady = False
 
-    def __init__(self, sheet: Battery) -> None:
-        self._sheet = sheet
+    def __init__(self, spec: Battery) -> None:
+        self._spec = spec
         self.fields = _numbers("battery", charge=np.nan, voltage_v=np.nan)
 
     def read(self, message: Any) -> None:
         """As `Reader.read`."""
-        self.fields = _numbers("battery", charge=charge_of(message, self._sheet), voltage_v=message.voltage)
+        self.fields = _numbers("battery", charge=charge_of(message, self._spec), voltage_v=message.voltage)
 
 
 class LightReader(Reader):
@@ -187,8 +187,8 @@ def _motion(forward_mps2: float, left_mps2: float, turn_radps: float, heading_ra
     return {**imu, **_numbers("compass", heading_rad=heading_rad)}
 
 
-def _numbers(sense: str, **values: float) -> Fields:
-    return {f"{sense}.{name}": np.array([value], np.float64) for name, value in values.items()}
+def _numbers(sensor: str, **values: float) -> Fields:
+    return {f"{sensor}.{name}": np.array([value], np.float64) for name, value in values.items()}
 
 
 # --- The topics that the senses of a body come from.
@@ -201,9 +201,9 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
         readers[options.scan_topic] = LaserReader(body, radians(options.scanner_deg))
     if body.odometry and wheel_base_of(body.drive) > 0.0:
         readers[options.odometry_topic] = OdometryReader(wheel_base_of(body.drive), body.max_linear_mps)
-    if "imu" in body.senses or body.compass:
+    if "imu" in body.sensors or body.compass:
         readers[options.imu_topic] = ImuReader(options.north_deg)
-    battery = body.senses.get("battery")
+    battery = body.sensors.get("battery")
     if isinstance(battery, Battery):
         readers[options.battery_topic] = BatteryReader(battery)
     if body.light:

@@ -26,7 +26,7 @@ class Antenna:
 
 
 @dataclass(frozen=True)
-class OwnAntenna:
+class RobotAntenna:
     """What the antennas of a group's robots have of their own, instead of what `[radio.antenna]` says."""
 
     power_dbm: float | None = parameter(
@@ -94,9 +94,9 @@ class Antennas:
     gain_dbi: FloatArray  # (robots,)
 
     @classmethod
-    def of_groups(cls, groups: Iterable[tuple[int, OwnAntenna | None]]) -> "Antennas":
+    def of_groups(cls, groups: Iterable[tuple[int, RobotAntenna | None]]) -> "Antennas":
         """Those of groups of so many robots each, in their order."""
-        given = [(count, own or OwnAntenna()) for count, own in groups]
+        given = [(count, own or RobotAntenna()) for count, own in groups]
         counts = [count for count, _ in given]
         power_dbm = [np.nan if own.power_dbm is None else own.power_dbm for _, own in given]
         gain_dbi = [np.nan if own.gain_dbi is None else own.gain_dbi for _, own in given]

@@ -17,7 +17,7 @@ from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sens
 from swarmwire.comms.radio.stages.stage import Medium
 
 # What counts as sensitivity in data sheets: share of frames that are right, and their bytes (see `sensitivity_dbm`).
-SHEETS = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
+SENSOR_SPECS = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
 
 
 def receiver_for(radio: Radio) -> Receiver:
@@ -30,7 +30,7 @@ def sensitivity_of(radio: Radio) -> float:
     reception = radio.reception_or_default
     if reception.sensitivity_dbm is not None:
         return reception.sensitivity_dbm
-    success, frame_bytes = SHEETS.get(reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes))
+    success, frame_bytes = SENSOR_SPECS.get(reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes))
     of_bits_dbm = sensitivity_dbm(receiver_for(radio), radio.noise_or_default.power_dbm, success, 8 * frame_bytes)
     return max(of_bits_dbm, reception.preamble_dbm)  # without a preamble there are no bits
 

@@ -56,15 +56,15 @@ def to_shade(value: FloatArray) -> AnyArray:
     return _whole(GROUND_BLACK + value * (GROUND_WHITE - GROUND_BLACK), GROUND_BLACK, GROUND_WHITE)
 
 
-def distance_m(raw: AnyArray, sheet: Scan) -> FloatArray:
+def distance_m(raw: AnyArray, spec: Scan) -> FloatArray:
     """The distance from where the sheet has the scanner; inf beyond its range."""
-    range_m = raw / 1000.0 + (DISTANCE_AHEAD_M - sheet.at_m)
-    return np.where(range_m > sheet.range_m, np.inf, np.maximum(range_m, sheet.range_min_m))
+    range_m = raw / 1000.0 + (DISTANCE_AHEAD_M - spec.at_m)
+    return np.where(range_m > spec.range_m, np.inf, np.maximum(range_m, spec.range_min_m))
 
 
-def to_distance(range_m: FloatArray, sheet: Scan) -> AnyArray:
+def to_distance(range_m: FloatArray, spec: Scan) -> AnyArray:
     """The inverse of `distance_m`; inf: what the sensor tells that sees nothing."""
-    seen_m = np.minimum(range_m, 0.001 * SEES_NOTHING_MM) - (DISTANCE_AHEAD_M - sheet.at_m)
+    seen_m = np.minimum(range_m, 0.001 * SEES_NOTHING_MM) - (DISTANCE_AHEAD_M - spec.at_m)
     return np.where(np.isinf(range_m), SEES_NOTHING_MM, _whole(1000.0 * seen_m, 0, SEES_NOTHING_MM))
 
 
@@ -83,9 +83,9 @@ def to_voltage(value_v: FloatArray) -> AnyArray:
     return _whole(value_v * PER_V, 0, 4095)
 
 
-def charge(voltage_v: FloatArray, sheet: Battery) -> FloatArray:
+def charge(voltage_v: FloatArray, spec: Battery) -> FloatArray:
     """The share that is left in a battery of this voltage, which falls evenly with it."""
-    return np.clip((voltage_v - sheet.empty_v) / max(sheet.full_v - sheet.empty_v, 1e-9), 0.0, 1.0)
+    return np.clip((voltage_v - spec.empty_v) / max(spec.full_v - spec.empty_v, 1e-9), 0.0, 1.0)
 
 
 def _whole(value: FloatArray, low: float, high: float) -> AnyArray:
@@ -189,7 +189,7 @@ class Calibration:
     ground_white: float = GROUND_WHITE
 
 
-class Readings:
+class Epuck2Readings:
     """The senses of one robot, from its packets and the steps that it has gone."""
 
     def __init__(self, body: Body, calibration: Calibration, odometer: Odometer) -> None:
@@ -205,10 +205,10 @@ class Readings:
             "battery": self._battery,
         }
 
-    def of(self, told: AnyArray, senses: frozenset[str]) -> Fields:
+    def of(self, told: AnyArray, sensors: frozenset[str]) -> Fields:
         """The readings of these senses in a packet, `SENSORS` (1,)."""
         fields: Fields = {}
-        for name in senses:
+        for name in sensors:
             fields |= self._of[name](told)
         return fields
 
@@ -217,9 +217,9 @@ class Readings:
         return {"ground.shade": shade(told["ground"], of.ground_black, of.ground_white)}
 
     def _scan(self, told: AnyArray) -> Fields:
-        sheet = self._body.scan
-        assert sheet is not None
-        return {"scan.range_m": distance_m(told["distance_mm"], sheet)[:, None]}
+        spec = self._body.scan
+        assert spec is not None
+        return {"scan.range_m": distance_m(told["distance_mm"], spec)[:, None]}
 
     def _odometry(self, told: AnyArray) -> Fields:
         steps = self._odometer.left, self._odometer.right
@@ -236,7 +236,7 @@ class Readings:
         }
 
     def _battery(self, told: AnyArray) -> Fields:
-        sheet = self._body.senses["battery"]
-        assert isinstance(sheet, Battery)
+        spec = self._body.sensors["battery"]
+        assert isinstance(spec, Battery)
         voltage_v = told["battery"] / PER_V
-        return {"battery.charge": charge(voltage_v, sheet), "battery.voltage_v": voltage_v}
+        return {"battery.charge": charge(voltage_v, spec), "battery.voltage_v": voltage_v}

@@ -69,19 +69,19 @@ def returns_m(message: Any) -> FloatArray:
     return np.where(none, np.inf, np.where(near, float(message.range_min), range_m))
 
 
-def laser_scan(messages: Messages, sheet: Scan, range_m: FloatArray, stamp_ns: int) -> Any:
+def laser_scan(messages: Messages, spec: Scan, range_m: FloatArray, stamp_ns: int) -> Any:
     """The message of a reading (rays,) of the sheet's scanner, all of whose rays were taken at once."""
-    first_rad = float(np.deg2rad(sheet.first_deg))
+    first_rad = float(np.deg2rad(spec.first_deg))
     return messages.make(
         LASER_SCAN,
         messages.header(stamp_ns, FRAME),
         first_rad,
-        first_rad + (sheet.rays - 1) * sheet.step_rad,
-        sheet.step_rad,
+        first_rad + (spec.rays - 1) * spec.step_rad,
+        spec.step_rad,
         0.0,
-        1.0 / sheet.rate_hz if sheet.rate_hz else 0.0,
-        sheet.range_min_m,
-        sheet.range_m,
+        1.0 / spec.rate_hz if spec.rate_hz else 0.0,
+        spec.range_min_m,
+        spec.range_m,
         range_m.astype(np.float32),
         np.empty(0, np.float32),
     )
@@ -105,9 +105,9 @@ WIDEST_RAD = np.pi / 4.0  # to either side: further off, a thing is beside a sen
 class LaserAsProximity:
     """Measures each sensor of the sheet the nearest return before it, measured from the rim."""
 
-    def __init__(self, sheet: Proximity, radius_m: float, at_m: float, scanner_rad: float) -> None:
+    def __init__(self, spec: Proximity, radius_m: float, at_m: float, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
-        self._sheet, self._radius_m, self._at_m, self._scanner_rad = sheet, radius_m, at_m, scanner_rad
+        self._spec, self._radius_m, self._at_m, self._scanner_rad = spec, radius_m, at_m, scanner_rad
         self._geometry: Geometry | None = None
         self._rays: IntArray = np.empty(0, np.int64)  # those before a sensor, sensor by sensor
         self._sensor: IntArray = np.empty(0, np.int64)  # of each of these
@@ -118,15 +118,15 @@ class LaserAsProximity:
         geometry = geometry_of(message)
         if geometry != self._geometry:
             self._fit(geometry)
-        nearest_m = np.full(len(self._sheet.angle_rad), np.inf)
+        nearest_m = np.full(len(self._spec.angle_rad), np.inf)
         from_rim_m = np.maximum(returns_m(message)[self._rays] - self._to_rim_m, 0.0)
         np.minimum.at(nearest_m, self._sensor, from_rim_m)
-        reach_m = self._sheet.range_m
-        return np.where(nearest_m <= reach_m, self._sheet.response.value(np.minimum(nearest_m, reach_m)), 0.0)
+        reach_m = self._spec.range_m
+        return np.where(nearest_m <= reach_m, self._spec.response.value(np.minimum(nearest_m, reach_m)), 0.0)
 
     def _fit(self, geometry: Geometry) -> None:
         angle_rad = angles_rad(geometry, self._scanner_rad)
-        sensor, apart_rad = nearest_angle(angle_rad, self._sheet.angle_rad)
+        sensor, apart_rad = nearest_angle(angle_rad, self._spec.angle_rad)
         self._rays = np.flatnonzero(apart_rad <= WIDEST_RAD)
         self._sensor, angle_rad = sensor[self._rays], angle_rad[self._rays]
         across_m = self._at_m * np.sin(angle_rad)
@@ -147,9 +147,9 @@ class LaserAsScan:
     look there, and the ray meets nothing.
     """
 
-    def __init__(self, sheet: Scan, scanner_rad: float) -> None:
+    def __init__(self, spec: Scan, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
-        self._sheet, self._scanner_rad = sheet, scanner_rad
+        self._spec, self._scanner_rad = spec, scanner_rad
         self._geometry: Geometry | None = None
         self._ray: IntArray = np.empty(0, np.int64)
         self._unseen = np.empty(0, np.bool_)
@@ -163,10 +163,10 @@ class LaserAsScan:
         if geometry != self._geometry:
             self._fit(geometry)
         range_m = returns_m(message)[self._ray]
-        range_m[self._unseen | (range_m > np.float32(self._sheet.range_m))] = np.inf
-        return np.maximum(range_m, self._sheet.range_min_m)
+        range_m[self._unseen | (range_m > np.float32(self._spec.range_m))] = np.inf
+        return np.maximum(range_m, self._spec.range_min_m)
 
     def _fit(self, geometry: Geometry) -> None:
-        self._ray, apart_rad = nearest_angle(self._sheet.angle_rad, angles_rad(geometry, self._scanner_rad))
-        self._unseen = apart_rad > SLACK * 0.5 * max(self._sheet.step_rad, abs(geometry.step_rad))
+        self._ray, apart_rad = nearest_angle(self._spec.angle_rad, angles_rad(geometry, self._scanner_rad))
+        self._unseen = apart_rad > SLACK * 0.5 * max(self._spec.step_rad, abs(geometry.step_rad))
         self._geometry = geometry

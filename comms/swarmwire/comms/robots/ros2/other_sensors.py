@@ -13,7 +13,7 @@ FRAME = ""
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
 
 
-def charge_of(message: Any, sheet: Battery) -> float:
+def charge_of(message: Any, spec: Battery) -> float:
     """The charge, 0 to 1: as told, else as the voltage lies between the sheet's when empty and when full; nan: neither.
 
     `percentage` is a share by its definition. A base that tells more than 1 means per cent, and 1 could be either: then
@@ -22,10 +22,10 @@ def charge_of(message: Any, sheet: Battery) -> float:
     share = float(message.percentage)
     if 0.0 <= share <= 1.0 and message.present:
         return share
-    span_v = sheet.full_v - sheet.empty_v
+    span_v = spec.full_v - spec.empty_v
     if isnan(message.voltage) or span_v <= 0.0:
         return nan
-    return min(max((float(message.voltage) - sheet.empty_v) / span_v, 0.0), 1.0)
+    return min(max((float(message.voltage) - spec.empty_v) / span_v, 0.0), 1.0)
 
 
 def battery_state(messages: Messages, charge: float, voltage_v: float, stamp_ns: int) -> Any:

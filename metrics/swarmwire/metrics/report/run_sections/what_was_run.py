@@ -155,8 +155,8 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
         said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
-    senses: dict[str, list[str]] = summary["global_senses"]
-    if senses:
-        bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in senses.items())
+    readings: dict[str, list[str]] = summary["global_senses"]
+    if readings:
+        bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in readings.items())
         said.append(f"Bodies that know more than their surroundings: {bodies}.")
     return said

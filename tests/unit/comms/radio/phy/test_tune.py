@@ -11,7 +11,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import SentPackets
-from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, OwnAntenna, Shadowing
+from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, RobotAntenna, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import Air
@@ -149,7 +149,7 @@ def test_a_gain_may_reach_farther_than_any_radio_did_before():
 def test_groups_have_their_own_power():
     """The strong are received by the weak, who are not received by them."""
     radio, pose = with_access("none"), at((0, 0), (200, 0))
-    antennas = Antennas.of_groups([(1, OwnAntenna(power_dbm=20.0)), (1, None)])
+    antennas = Antennas.of_groups([(1, RobotAntenna(power_dbm=20.0)), (1, None)])
     keys = np.array([derive_key(1, "air")], np.uint64)
     air = Air(radio, keys, 2, SIZE_M, obstacle_arrays(((),)), RATE_HZ, antennas=antennas)
     told = ran(air, pose, lambda _: packets([0, 1]), {}, 5)

@@ -27,7 +27,7 @@ def received(message: independent.LaserScan):
 def body(at_m: float = 0.0) -> Body:
     angles_deg = [0, 30, -30, 90, -90, 180]
     proximity = {"angles_deg": angles_deg, "range_m": 0.4, "response": LINEAR}
-    return body_from({"like": "turtlebot3-burger", "senses": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
+    return body_from({"like": "turtlebot3-burger", "sensors": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
 
 
 def proximity_of(of: Body) -> Proximity:
@@ -48,7 +48,7 @@ def test_the_nearest_angle_is_that_of_a_brute_force_search(of, among):
 
 
 def scans():
-    sheet = st.builds(
+    spec = st.builds(
         Scan,
         rays=st.integers(1, 90),
         range_m=st.just(3.5),
@@ -56,7 +56,7 @@ def scans():
         first_deg=st.floats(-180, 180),
         span_deg=st.sampled_from([30.0, 180.0, 270.0, 360.0]),
     )
-    return sheet.flatmap(
+    return spec.flatmap(
         lambda of: st.tuples(
             st.just(of), st.lists(st.floats(0.12, 3.5) | st.just(inf), min_size=of.rays, max_size=of.rays)
         )
@@ -65,10 +65,10 @@ def scans():
 
 @given(scans())
 def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
-    sheet, range_m = drawn
+    spec, range_m = drawn
     range_m = np.array(range_m)
-    message = MESSAGES.decode(LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, sheet, range_m, 0)))
-    assert LaserAsScan(sheet, 0.0).range_m(message) == pytest.approx(range_m, rel=1e-6)
+    message = MESSAGES.decode(LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, spec, range_m, 0)))
+    assert LaserAsScan(spec, 0.0).range_m(message) == pytest.approx(range_m, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -76,10 +76,10 @@ def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
     [(1.0, 1.0), (inf, inf), (nan, inf), (0.0, inf), (-inf, 0.12), (0.05, 0.12), (11.0, inf), (5.0, inf), (3.5, 3.5)],
 )
 def test_a_return_that_is_none_reads_inf_and_one_too_near_the_least(told_m, reads_m):
-    sheet = load_body("turtlebot3-burger").scan
-    assert sheet
+    spec = load_body("turtlebot3-burger").scan
+    assert spec
     message = received(independent.laser_scan([told_m] * 8, range_min=0.1))
-    assert LaserAsScan(sheet, 0.0).range_m(message)[0] == pytest.approx(reads_m)
+    assert LaserAsScan(spec, 0.0).range_m(message)[0] == pytest.approx(reads_m)
 
 
 def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
@@ -91,9 +91,9 @@ def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
 
 def test_a_scanner_that_turns_clockwise_or_is_mounted_turned_is_read_where_it_looks():
     clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
-    sheet = Scan(rays=4, range_m=9.0)
-    assert LaserAsScan(sheet, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
-    assert LaserAsScan(sheet, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
+    spec = Scan(rays=4, range_m=9.0)
+    assert LaserAsScan(spec, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
+    assert LaserAsScan(spec, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
 
 
 def test_where_a_scanner_does_not_look_nothing_is_met():
@@ -133,8 +133,8 @@ def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
 def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers_nothing():
     far = np.full(360, 0.105 + 0.41)
     assert not near().value(received(independent.laser_scan(far))).any()
-    sheet = Proximity(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
-    alone = LaserAsProximity(sheet, 0.105, 0.0, 0.0)
+    spec = Proximity(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
+    alone = LaserAsProximity(spec, 0.105, 0.0, 0.0)
     ranges = np.full(360, inf)
     ranges[46:315] = 0.2
     assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([0.0])
@@ -150,9 +150,9 @@ def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m
         half = 0.5 * (low + high)
         inside = hypot(at_m + half * cos(angle_rad), half * sin(angle_rad)) < 0.105
         low, high = (half, high) if inside else (low, half)
-    sheet = Proximity(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
+    spec = Proximity(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
     message = received(independent.laser_scan([low + away_m], angle_rad - mounted_rad, 0.1, range_min=0.0))
-    value = LaserAsProximity(sheet, 0.105, at_m, mounted_rad).value(message)
+    value = LaserAsProximity(spec, 0.105, at_m, mounted_rad).value(message)
     assert value == pytest.approx([1.0 - 2.0 * away_m], abs=1e-5)
 
 

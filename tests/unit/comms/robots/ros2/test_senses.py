@@ -139,9 +139,9 @@ def test_what_is_not_measured_is_told_as_such_and_read_as_nan():
 
 
 def battery() -> Battery:
-    sheet = load_body("turtlebot3-burger").senses["battery"]
-    assert isinstance(sheet, Battery)
-    return sheet
+    spec = load_body("turtlebot3-burger").sensors["battery"]
+    assert isinstance(spec, Battery)
+    return spec
 
 
 @pytest.mark.parametrize(

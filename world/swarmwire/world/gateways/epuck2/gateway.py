@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.bodies.sensors import Light, Proximity
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import parameter
-from swarmwire.comms.robots.epuck2.commands import SENSES, check_fits
+from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import Received, SensorPackets
@@ -56,7 +56,7 @@ def differences_of(body: Body) -> tuple[str, ...]:
 
 
 def _looking(body: Body, model: Body) -> list[str]:
-    pairs = [(name, body.senses.get(name), model.senses.get(name)) for name in ("proximity", "light")]
+    pairs = [(name, body.sensors.get(name), model.sensors.get(name)) for name in ("proximity", "light")]
     return [
         f"its {name} looks to {_angles(its)}, not {_angles(usual)}"
         for name, its, usual in pairs
@@ -66,8 +66,8 @@ def _looking(body: Body, model: Body) -> list[str]:
     ]
 
 
-def _angles(sheet: Proximity | Light) -> str:
-    return f"{', '.join(f'{angle:g}' for angle in sheet.angles_deg[:SHOWN])}, ... deg"
+def _angles(spec: Proximity | Light) -> str:
+    return f"{', '.join(f'{angle:g}' for angle in spec.angles_deg[:SHOWN])}, ... deg"
 
 
 def _driving(body: Body, model: Body) -> list[str]:
@@ -80,7 +80,7 @@ def _driving(body: Body, model: Body) -> list[str]:
 
 
 def _at_rest(body: Body, model: Body) -> list[str]:
-    absent = [name for name in model.senses if name in SENSES and name not in body.senses]
+    absent = [name for name in model.sensors if name in READABLE_SENSORS and name not in body.sensors]
     return [f"it has no {', '.join(absent)}, which are told as of a robot at rest"] if absent else []
 
 
@@ -95,7 +95,7 @@ class Epuck2Gateway(Gateway):
     """
 
     options: ClassVar[type] = Epuck2GatewayOptions
-    senses: ClassVar[frozenset[str]] = SENSES
+    sensors: ClassVar[frozenset[str]] = READABLE_SENSORS
     unsaid: ClassVar[frozenset[str]] = frozenset({"bumper"})
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:

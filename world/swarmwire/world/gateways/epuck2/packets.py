@@ -130,9 +130,9 @@ class SensorPackets:
         self._rows[name] = np.where(np.isnan(value), self._rows[name], value)
 
     def _distance(self, range_m: FloatArray) -> AnyArray:
-        sheet = self._body.scan
-        assert sheet is not None
-        return readings.to_distance(range_m[:, 0], sheet)
+        spec = self._body.scan
+        assert spec is not None
+        return readings.to_distance(range_m[:, 0], spec)
 
     def _field_ut(self, heading_rad: FloatArray) -> FloatArray:
         return self._compass.field_ut(heading_rad, LEVEL_UT, DOWN_UT)

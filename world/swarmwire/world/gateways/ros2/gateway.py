@@ -31,7 +31,7 @@ class Ros2Gateway(Gateway):
     """
 
     options: ClassVar[type] = Ros2GatewayOptions
-    senses: ClassVar[frozenset[str]] = frozenset({"scan", "odometry", "imu", "compass", "battery", "light"})
+    sensors: ClassVar[frozenset[str]] = frozenset({"scan", "odometry", "imu", "compass", "battery", "light"})
 
     def __init__(
         self, names: Sequence[str], body: Body, address: str, options: Ros2GatewayOptions, clock: DatedClock

@@ -98,12 +98,12 @@ class ScanTeller(Teller):
     reads = ("scan.range_m",)
     topic = "scan"
 
-    def __init__(self, sheet: Scan) -> None:
-        self._sheet, self.rate_hz = sheet, sheet.rate_hz
+    def __init__(self, spec: Scan) -> None:
+        self._spec, self.rate_hz = spec, spec.rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
         """As `Teller.message`."""
-        return laser_scan(messages, self._sheet, fields["scan.range_m"][base], stamp_ns)
+        return laser_scan(messages, self._spec, fields["scan.range_m"][base], stamp_ns)
 
 
 class OdometryTeller(Teller):
@@ -184,11 +184,11 @@ def tellers_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Tel
         tellers.append(ScanTeller(body.scan))
     if body.odometry and wheel_base_m:
         tellers.append(OdometryTeller(body.odometry.rate_hz, bases, wheel_base_m))
-    rates_hz = tuple(body.senses[name].rate_hz for name in ("imu", "compass") if name in body.senses)
+    rates_hz = tuple(body.sensors[name].rate_hz for name in ("imu", "compass") if name in body.sensors)
     if rates_hz:
         tellers.append(ImuTeller(rates_hz, options.north_deg))
-    if "battery" in body.senses:
-        tellers.append(BatteryTeller(body.senses["battery"].rate_hz))
+    if "battery" in body.sensors:
+        tellers.append(BatteryTeller(body.sensors["battery"].rate_hz))
     if body.light:
         topics = topics_of_light("illuminance", len(body.light.angle_rad))
         tellers.extend(LightTeller(t, body.light.rate_hz, cell, options.full_lux) for cell, t in enumerate(topics))

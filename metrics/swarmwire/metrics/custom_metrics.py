@@ -3,7 +3,7 @@
 from typing import Any, get_args
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import own_class
+from swarmwire.comms.plugins import custom_class
 from swarmwire.metrics.metric import Kind, Metric
 from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 from swarmwire.metrics.registry import DELIVERY, METRICS
@@ -13,7 +13,7 @@ COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the t
 
 def own_kind(spec: str, where: str, key: str) -> type[Metric]:
     """The metric's class that "package.module:Class" or "/path/file.py:Class" names; else BadInput at `key`."""
-    kind = own_class(Metric, spec, where, key)
+    kind = custom_class(Metric, spec, where, key)
     fault = _fault(kind)
     if fault:
         raise BadInput(where, key, f"{kind.__name__}: {fault}")

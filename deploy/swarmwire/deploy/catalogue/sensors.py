@@ -8,7 +8,7 @@ from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
-from swarmwire.comms.bodies.sensors import SHEETS
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.packets import TxResult
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
@@ -16,17 +16,17 @@ from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 
 
-def senses() -> list[Entry]:
+def sensors() -> list[Entry]:
     """Those of bodies, then those of packets."""
     return [*_of_bodies(), *_of_packets(), _of_outcomes()]
 
 
 def _of_bodies() -> Iterator[Entry]:
     bodies = [load_body(name) for name in body_names()]
-    for name, sheet in SHEETS.items():
-        have = ", ".join(body.name for body in bodies if name in body.senses)
+    for name, sheet in SENSOR_SPECS.items():
+        have = ", ".join(body.name for body in bodies if name in body.sensors)
         told = first_line(getattr(Robot, name).__doc__)
-        yield _sense(name, sheet, f"robot.{name}: {told}", ("bodies", have or "none that comes with swarmwire"))
+        yield _sensor(name, sheet, f"robot.{name}: {told}", ("bodies", have or "none that comes with swarmwire"))
 
 
 def _of_packets() -> Iterator[Entry]:
@@ -35,7 +35,7 @@ def _of_packets() -> Iterator[Entry]:
         kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
         (column,) = Measures(**{of.name: kind()}).columns
         told = first_line(getattr(Packet, column).__doc__)
-        yield _sense(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
+        yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
 
 
 def _of_outcomes() -> Entry:
@@ -49,7 +49,7 @@ def _of_outcomes() -> Entry:
     return Entry(kind="sense", name=OUTCOMES, help=told, facts=(*facts, *results))
 
 
-def _sense(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:
+def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:
     parameters = parameters_of_dataclass(sheet)
     return Entry(
         kind="sense",

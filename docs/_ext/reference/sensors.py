@@ -1,0 +1,24 @@
+"""The senses that a body may have: what a data sheet says of each."""
+
+from dataclasses import fields
+from inspect import getdoc
+
+from reference.markdown import code, sentence, table
+from reference.parameters import HEAD, parameter_rows
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS, RangedSensorSpec, SensorSpec
+
+
+def sensor_tables() -> str:
+    """The keys that all senses share; then every sense, what it is, and its own keys in a body's data sheet."""
+    shared = [code(of.name) for of in fields(RangedSensorSpec)]
+    parts = ["Keys that every sense has:\n", table(HEAD, parameter_rows(SensorSpec))]
+    parts += [
+        "And every sense with a range:\n",
+        table(HEAD, parameter_rows(RangedSensorSpec)[len(fields(SensorSpec)) :]),
+    ]
+    for name, kind in SENSOR_SPECS.items():
+        rows = [row for row in parameter_rows(kind) if row[0] not in shared]
+        ranged = " It has a range." if issubclass(kind, RangedSensorSpec) else ""
+        parts.append(f"{code(f'[sensors.{name}]')}: {sentence(getdoc(kind) or '')}{ranged}\n")
+        parts.append(table(HEAD, rows) if rows else "It has no keys of its own.\n")
+    return "\n".join(parts)
