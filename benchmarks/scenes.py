@@ -44,7 +44,7 @@ def diffusion(
     }
     if neighbours:
         range_m = math.sqrt(neighbours / (math.pi * density_per_m2))
-        scenario["radio"] = {"model": "disk", "range_m": range_m, "bit_rate_bps": 250_000}
+        scenario["radio"] = {"model": "unit-disk", "range_m": range_m, "bit_rate_bps": 250_000}
     return scenario
 
 
@@ -68,7 +68,7 @@ def flocking(robots: int, duration_s: float, agent: str = "swarmwire.agent.behav
             }
         },
         "radio": {
-            "model": "disk",
+            "model": "unit-disk",
             "range_m": 2.0,
             "loss": 0.3,
             "latency_s": 0.1,

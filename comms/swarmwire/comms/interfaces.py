@@ -64,7 +64,7 @@ class Put(NamedTuple):
     sent: SentPackets
 
 
-class AirTime(Protocol):
+class SubtickMedium(Protocol):
     """The air while a tick goes on, with the poses of its start."""
 
     def send(self, put: Put) -> None:
@@ -80,7 +80,7 @@ class TimedBackend(AgentBackend, Protocol):
     """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """What every robot does in this tick, but for packets, which were put on the air.
 

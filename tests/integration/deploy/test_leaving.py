@@ -113,7 +113,7 @@ boundary = "torus"
 obstacles = [{ shape = "cylinder", radius_m = 0.05, count = 2, place = "random" }]
 """
 WORLDS = {
-    "disk": HEAD + EVENTS + ROOM + CHATTING + DISK,
+    "unit-disk": HEAD + EVENTS + ROOM + CHATTING + DISK,
     "signal": HEAD + EVENTS + ROOM + CHATTING + INSISTING + SIGNAL,
     "no radio": HEAD + ROOM + CHATTING.replace("Chatter", "Counter"),
     "movable obstacles": HEAD + FAILING + MOVABLE + WORN,
@@ -181,7 +181,7 @@ def test_an_arena_that_leaves_comes_to_what_it_comes_to_alone(tmp_path: Path, na
     together = packed(path, SEEDS)
     for seed in (1, 5):
         assert came_to(together, seed) == came_to(alone(path, seed), seed)
-    if name == "disk":
+    if name == "unit-disk":
         others = packed(path, (9, 3, 1, 8), {**OVER, 9: 3, 8: 12})
         for seed in (1, 3):
             assert came_to(others, seed) == came_to(together, seed)
@@ -192,7 +192,7 @@ def test_an_arena_that_leaves_comes_to_what_it_comes_to_alone(tmp_path: Path, na
 
 def test_the_worlds_above_have_something_to_lose(tmp_path: Path) -> None:
     """Or they would show nothing: something is on its way or waits as arenas leave, and faults are counted."""
-    for name in ("disk", "signal"):
+    for name in ("unit-disk", "signal"):
         result = packed(scenario(tmp_path, name), SEEDS)
         for arena in result.arenas:
             assert arena.radio is not None
@@ -207,7 +207,7 @@ def test_the_worlds_above_have_something_to_lose(tmp_path: Path) -> None:
 
 
 def test_a_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
-    path = scenario(tmp_path, "disk")
+    path = scenario(tmp_path, "unit-disk")
     result = packed(path, (1, 2))
     assert (result.ended, result.ticks, result.sim_time_s) == ("stopped", 17, 1.7)
     assert [(arena.ended, arena.ticks) for arena in result.arenas] == [("stopped", 6), ("stopped", 17)]
@@ -220,7 +220,7 @@ def test_a_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
     assert (at_the_end.ended, at_the_end.ticks) == ("stopped", TICKS)
 
 
-@pytest.mark.parametrize("name", ["disk", "signal"])
+@pytest.mark.parametrize("name", ["unit-disk", "signal"])
 def test_runners_do_not_mind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     path = scenario(tmp_path, name)
     here = packed(path, SEEDS[:3])
@@ -245,7 +245,7 @@ class Looks:
 
 def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_path: Path) -> None:
     looks = Looks()
-    packed(scenario(tmp_path, "disk"), SEEDS, observers=[looks])
+    packed(scenario(tmp_path, "unit-disk"), SEEDS, observers=[looks])
     rows = slice(0, 7)  # of the first arena, which leaves after tick 5
     last = looks.seen[6]
     for truth in looks.seen:
@@ -269,7 +269,7 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
 
 
 def test_every_metric_ends_where_its_arena_does(tmp_path: Path) -> None:
-    path = scenario(tmp_path, "disk")
+    path = scenario(tmp_path, "unit-disk")
     more = [f"metrics={[name for name, kind in METRICS.items() if not kind.standard]}"]
     together = packed(path, SEEDS, overrides=more)
     for seed in (1, 2):
@@ -277,7 +277,7 @@ def test_every_metric_ends_where_its_arena_does(tmp_path: Path) -> None:
 
 
 def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -> None:
-    path, what = scenario(tmp_path, "disk"), Recording(packets=1.0, links=True, rrd=False)
+    path, what = scenario(tmp_path, "unit-disk"), Recording(packets=1.0, links=True, rrd=False)
     packed(path, (3, 5, 1), out=tmp_path / "together", record=what)
     for at, seed in ((0, 3), (2, 1)):
         alone(path, seed, out=tmp_path / f"{seed}", record=what)
@@ -291,7 +291,7 @@ def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -
 
 
 def test_a_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
-    result = packed(scenario(tmp_path, "disk"), (5, 1), out=tmp_path / "together")
+    result = packed(scenario(tmp_path, "unit-disk"), (5, 1), out=tmp_path / "together")
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")
     rerun.simulation.judge = Stops((5, 1), OVER)

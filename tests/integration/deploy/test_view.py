@@ -18,7 +18,7 @@ from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_file import read_live
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.live.showing import Drawer, Way
+from swarmwire.deploy.live.showing import Drawer, RadioModel
 from swarmwire.deploy.live.whole_recording import whole
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.program import end, free_port, is_open, program
@@ -209,7 +209,7 @@ def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path):
 
     def follow():
         seen = held.enter_context(following(read_live(tmp_path)))
-        drawer = Drawer(seen, f"rerun+http://127.0.0.1:{port}/proxy", Way(clock, print, lambda: False))
+        drawer = Drawer(seen, f"rerun+http://127.0.0.1:{port}/proxy", RadioModel(clock, print, lambda: False))
         drawer.start()
         held.callback(drawer.join)
 

@@ -51,7 +51,7 @@ SCENARIO: dict[str, Any] = {
         },
     },
     "radio": {
-        "model": "disk",
+        "model": "unit-disk",
         "range_m": 1.5,
         "loss": 0.1,
         "bit_rate_bps": 250_000,

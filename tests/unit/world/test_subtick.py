@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.interfaces import Put, SubtickMedium
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Readings
@@ -16,7 +16,7 @@ from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.deploy.new_air import new_air
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
-from swarmwire.world.subtick import AirInTime
+from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.world import World
 from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_air, scattered
 from tests.support.comms.radio.traffic import RADIOS
@@ -35,10 +35,10 @@ def static(robots: int, arenas: int = 1) -> Static:
     return Static("", tuple(range(arenas)), RATE_HZ, (6.0, 5.0), "walls", ((),) * arenas, (), names)
 
 
-def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> AirInTime:
+def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> SubtickRadio:
     air = make_air(radio, robots, range(arenas))
     air.hold(scattered(robots * arenas), np.ones(robots * arenas, np.bool_))
-    return AirInTime(air, static(robots, arenas), lambda sent: sent)
+    return SubtickRadio(air, static(robots, arenas), lambda sent: sent)
 
 
 def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
@@ -142,7 +142,7 @@ class Sender:
         raise AssertionError("a backend that takes its time is asked in time")
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
@@ -207,7 +207,7 @@ class FromBoth(Sender):
     """Robot 0 of each arena sends late in each tick, also where the arena is over."""
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):

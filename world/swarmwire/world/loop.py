@@ -16,7 +16,7 @@ from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.world.event_scheduler import Events
 from swarmwire.world.live_events import Interventions
-from swarmwire.world.subtick import AirInTime
+from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
 
@@ -95,7 +95,7 @@ class Loop:
         self._events = Events(events, world.static, world.keys, air.radio if air else None, course)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
-        self._in_time = AirInTime(air, world.static, self._addressable) if air and timed else None
+        self._in_time = SubtickRadio(air, world.static, self._addressable) if air and timed else None
         self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did

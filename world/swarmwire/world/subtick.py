@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
-from swarmwire.comms.interfaces import AirTime, Put
+from swarmwire.comms.interfaces import Put, SubtickMedium
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import Air
 from swarmwire.comms.radio.results import News
@@ -24,7 +24,7 @@ from swarmwire.world.backends.pacing import Pace
 NEVER_NS = 2**63 - 1
 
 
-class AirInTime:
+class SubtickRadio:
     """An air between `begin` of one tick and that of the next."""
 
     def __init__(self, air: Air, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
@@ -131,7 +131,7 @@ class Subticks:
         self._last_ns = 0  # up to which the air has advanced
         self._wakes_late_ns = 0  # by how much sleeps ended late, of late
 
-    def pass_tick(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+    def pass_tick(self, tick: int, air: SubtickMedium, exchange: Exchange) -> None:
         """Return once the tick is over by the wall clock, and all that is due by then was handed over."""
         last_ns = self._pace.over_ns(tick) - self._subtick_ns  # later, there may not be the time before the tick's end
         wake_ns = self._clock.now_ns()
@@ -150,7 +150,7 @@ class Subticks:
             self._clock.sleep_until(early_ns)
             self._wakes_late_ns += (self._clock.now_ns() - early_ns - self._wakes_late_ns) // MEAN_OF
 
-    def exchange(self, tick: int, air: AirTime, exchange: Exchange) -> None:
+    def exchange(self, tick: int, air: SubtickMedium, exchange: Exchange) -> None:
         """Take in what came, and hand over what is due."""
         pace, came = self._pace, exchange.take_in()
         start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))

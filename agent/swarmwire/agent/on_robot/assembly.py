@@ -119,14 +119,14 @@ def _made_radio(
     say: Say,
 ) -> RobotRadio:
     """The radio of this kind, not open yet."""
-    from swarmwire.agent.radios.world_radio import AirRadio
+    from swarmwire.agent.radios.world_radio import WorldRadio
     from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 
     robots, own, radio = plan.settings.robots, plan.settings.name, plan.settings.radio
     if radio.kind == "zenoh":
         asks_pose = any(need in OF_POSES for need in plan.agent.needs)
         return ZenohRadio(session, keys, robots, own, radio.max_payload_bytes, clock, tracker, asks_pose, log, say)
-    return AirRadio(session, keys, robots, own, clock, log) if radio.kind == "air" else NoRadio()
+    return WorldRadio(session, keys, robots, own, clock, log) if radio.kind == "air" else NoRadio()
 
 
 def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Callable[[], list[str]]]:

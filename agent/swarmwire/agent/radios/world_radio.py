@@ -20,7 +20,7 @@ from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, t
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
-from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, decode_air
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_air
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 
@@ -40,7 +40,7 @@ class _Arrival(NamedTuple):
     utc_ns: int
 
 
-class AirRadio:
+class WorldRadio:
     """The radio of the robot `own`, one of `robots`, in the air of the world that answers in this network.
 
     Attributes:
@@ -66,7 +66,7 @@ class AirRadio:
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._sequence = self._frames = self._far_too_large = 0
         self._counted = Counter[str]()
-        self.terms: AirTerms | None = None
+        self.terms: BridgeInfo | None = None
         self.measures: tuple[str, ...] = ()
         self.needs: frozenset[str] = frozenset()
 
@@ -137,14 +137,14 @@ class AirRadio:
         if subscriber is not None and not self._session.is_closed():
             subscriber.undeclare()
 
-    def _join(self) -> AirTerms:
+    def _join(self) -> BridgeInfo:
         """The world's answer; the network may still be on its way up."""
         end_ns = self._wall.now_ns() + to_ns(JOIN_S)
         while (left_ns := end_ns - self._wall.now_ns()) > 0:
             for reply in self._session.get(self._keys.air_join(self._own), timeout=min(ONE_TRY_S, to_s(left_ns))):
                 if reply.ok is not None:
                     try:
-                        return AirTerms.decode(reply.ok.payload.to_bytes())
+                        return BridgeInfo.decode(reply.ok.payload.to_bytes())
                     except BadFrame as error:
                         raise BadInput("radio", "air", f"expected a world of this version: {error}") from error
                 if reply.err is not None and (error := reply.err.payload.to_string()) != "Timeout":
@@ -153,7 +153,7 @@ class AirRadio:
         expected = f"expected a world that lends its air to {self._own}; none in the network answers"
         raise BadInput("radio", "air", expected)
 
-    def _joined(self) -> AirTerms:
+    def _joined(self) -> BridgeInfo:
         if self.terms is None:
             raise RuntimeError("the radio is to be opened first")
         return self.terms

@@ -59,8 +59,8 @@ class Event(ABC):
 
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput, with a key within the event's table, for what does not fit this radio; it needs one."""
-        if self.needs_signals and not radio.is_signal:
-            raise BadInput("", "do", f"expected a radio with signals for {self.do!r}: a disk knows no strength")
+        if self.needs_signals and not radio.is_phy:
+            raise BadInput("", "do", f"expected a radio with a PHY for {self.do!r}: a disk knows no strength")
 
     def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:  # noqa: B027 - most fit any body
         """Raise BadInput, with a key within the event's table, for what does not fit the groups' bodies, by group."""

@@ -18,13 +18,13 @@ from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.counters import Accounts, Lives
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links
-from swarmwire.comms.radio.model import Way
-from swarmwire.comms.radio.phy.model import SignalWay
+from swarmwire.comms.radio.model import RadioModel
+from swarmwire.comms.radio.phy.model import SinrPhy
 from swarmwire.comms.radio.send_times import SendTimes
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.radio.unit_disk.model import DiskWay
+from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.truth import Boundary, Tally
 
 
@@ -90,15 +90,15 @@ class Air:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
         `radius_m` (robots,) are their radii, which count for bodies between two robots; 0 each if left out. `traces`
-        are what the file of the radio's trace holds, `antennas` those of a radio with signals. ValueError for a disk
+        are what the file of the radio's trace holds, `antennas` those of a radio with a PHY. ValueError for a unit disk
         without `range_m`, a trace without its file or the other way round, or what `unfit_for_torus` names on a torus.
         """
-        if not radio.is_signal and radio.range_m is None:
-            raise ValueError("range_m: expected a range, as a disk has one")
+        if not radio.is_phy and radio.range_m is None:
+            raise ValueError("range_m: expected a range, as a unit disk has one")
         if (radio.trace is None) != (traces is None):
             raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
         if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
-            raise ValueError(f"{unfit}: expected a disk without bodies_block on a torus")
+            raise ValueError(f"{unfit}: expected a unit disk without bodies_block on a torus")
         rows = len(keys) * robots
         self.radio = self._coming_radio = radio
         self._robots = robots
@@ -107,10 +107,10 @@ class Air:
         own = antennas or Antennas.alike(robots)
         self._running: BoolArray = np.ones(len(keys), np.bool_)
         fixed = keys, robots, obstacles, size_m, radii_m
-        medium = Medium(radio, *fixed, self._held, own, self._running, traces, boundary == "torus")
+        context = ChannelContext(radio, *fixed, self._held, own, self._running, traces, boundary == "torus")
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
-        self._way: Way = SignalWay(medium) if radio.is_signal else DiskWay(medium)
+        self._way: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
         self._accounts = Accounts(len(keys), robots)
         self._lives = Lives(rows)
         self._gone: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that left
@@ -121,7 +121,7 @@ class Air:
         self._links = self._no_links = Links.none(len(radio.measures.columns))
         nothing = (
             ReceivedPackets.none(radio.measures.columns),
-            *results.nothing_final(self._links, self._on_air, radio.is_signal),
+            *results.nothing_final(self._links, self._on_air, radio.is_phy),
         )
         self._nothing = results.Final(*nothing, NO_TX_STATUSES)
 
@@ -252,7 +252,7 @@ class Air:
             results.received(
                 rows.received, links, packets, self.radio.measures.columns, robots, len(self._others_alive)
             ),
-            results.finished(rows.finished, links, packets, robots, self.radio.is_signal),
+            results.finished(rows.finished, links, packets, robots, self.radio.is_phy),
             results.departed(rows.departed, links, packets, robots),
             self._way.tx_status(self._coming.alive & ~self._gone),
         )

@@ -13,7 +13,7 @@ from swarmwire.comms.radio.transmissions import Transmissions
 Decided = tuple[Transmissions, Links]
 
 
-class Way(ABC):
+class RadioModel(ABC):
     """From the senders' radios to the receivers.
 
     What `pass_time` and `disrupt` return are packets and what becomes of them at their receivers (`packet` is the row

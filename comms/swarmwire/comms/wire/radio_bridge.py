@@ -21,7 +21,7 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
 
 @dataclass(frozen=True, slots=True)
-class AirTerms:
+class BridgeInfo:
     """A radio of the world as one robot knows it."""
 
     row: int  # the robot's, in the world
@@ -36,7 +36,7 @@ class AirTerms:
         return msgpack.packb({"v": VERSION, **asdict(self)})
 
     @classmethod
-    def decode(cls, data: bytes) -> "AirTerms":
+    def decode(cls, data: bytes) -> "BridgeInfo":
         """The terms of these bytes; BadFrame if they are none, "version" if they are of another version."""
         values = versioned(data, MAX_BYTES)  # with the names of all robots
         del values["v"]
@@ -66,7 +66,7 @@ def encode_air(tick: int, row: int, received: ReceivedPackets, tx_status: TxStat
     return encode_tick(tick, {GROUP: GroupReadings(np.array([row]), {})}, received, tx_status)
 
 
-def decode_air(data: bytes, terms: AirTerms) -> tuple[int, ReceivedPackets, TxStatuses]:
+def decode_air(data: bytes, terms: BridgeInfo) -> tuple[int, ReceivedPackets, TxStatuses]:
     """The tick and what `encode_air` was given; BadFrame if the frame is none, contradicts itself or is for another."""
     frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
     if frame.kind != "tick" or not 0 <= tick_start_ns(frame.tick, terms.rate_hz) < LAST_NS:

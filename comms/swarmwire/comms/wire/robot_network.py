@@ -47,7 +47,7 @@ class SwarmKeys:
         return f"{self.root}/alive/{robot}"
 
     def air_join(self, robot: str) -> str:
-        """Queryable of the world's air: this robot asks for its terms (`AirTerms`)."""
+        """Queryable of the world's air: this robot asks for its terms (`BridgeInfo`)."""
         return f"{self.root}/air/{robot}/join"
 
     def air_sent(self, robot: str) -> str:

@@ -44,7 +44,7 @@ def ui_command(
     from swarmwire.deploy.control.run_finder import find_run
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.live.live_file import Live
-    from swarmwire.deploy.live.showing import Way
+    from swarmwire.deploy.live.showing import RadioModel
     from swarmwire.deploy.page.showing_page import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
@@ -56,7 +56,7 @@ def ui_command(
     else:
         live = Live(endpoint, run or only_run_at(endpoint, network), ELSEWHERE)
     with Interrupt() as interrupt:
-        way = Way(
+        way = RadioModel(
             clock=WallClock(),
             say=lambda text: typer.echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),

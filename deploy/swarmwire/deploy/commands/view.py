@@ -12,7 +12,7 @@ from swarmwire.deploy.commands.with_parent import WithParent, standard_input_clo
 from swarmwire.metrics.record.names import RECORDING
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.live.showing import Way
+    from swarmwire.deploy.live.showing import RadioModel
 
 
 def view_command(
@@ -29,14 +29,14 @@ def view_command(
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.interrupt import Interrupt
-    from swarmwire.deploy.live.showing import Way
+    from swarmwire.deploy.live.showing import RadioModel
     from swarmwire.deploy.live.viewer_program import has_screen
     from swarmwire.metrics.viewer.extra import need_view_extra
 
     need_view_extra("view")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     with Interrupt() as interrupt:
-        way = Way(
+        way = RadioModel(
             clock=WallClock(),
             say=lambda text: typer.echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
@@ -46,7 +46,7 @@ def view_command(
         _show(run, way)
 
 
-def _show(run: Path, way: "Way") -> None:
+def _show(run: Path, way: "RadioModel") -> None:
     """Show a run that goes on; if it is over by now, or was before, its recording."""
     from swarmwire.deploy.live.following import RunGone
     from swarmwire.deploy.live.live_file import read_live

@@ -17,7 +17,7 @@ from swarmwire.deploy.gateways.listening import listening_places
 from swarmwire.deploy.gateways.robot_settings import RobotSettings, write_settings
 from swarmwire.deploy.gateways.served import Served, ServedRobot
 from swarmwire.world.gateways.backend import GatewayGroup
-from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from swarmwire.world.gateways.tracker import Tracker
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
@@ -81,7 +81,7 @@ class Behind:
             groups, addresses = self._open(stack, static, scaled, say)
             rows = {static.robot_names[row]: int(row) for group in groups for row in group.rows}
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
-            bridge = stack.enter_context(closing(AirBridge(gateways.network, keys, rows, self._lent(static), access)))
+            bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, self._lent(static), access)))
             endpoints = bridge.open()
             tracker = Tracker(bridge.session, keys, scaled)
             tracker.begin(static)
@@ -126,10 +126,10 @@ class Behind:
         file = write_settings(folder, settings) if folder else None
         return ServedRobot(settings["name"], kind, settings["driver"]["address"], settings, file)
 
-    def _lent(self, static: Static) -> LentAir | None:
+    def _lent(self, static: Static) -> BridgedRadio | None:
         """What the scenario's radio is to agents elsewhere."""
         radio = self._scenario.radio
         if radio is None:
             return None
         told = radio.max_payload_bytes, radio.measures.columns, radio.tells
-        return LentAir(static.robot_names, static.rate_hz, *told)
+        return BridgedRadio(static.robot_names, static.rate_hz, *told)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.world.gateways.backend import GatewayGroup
-from swarmwire.world.gateways.radio_bridge import AirBridge
+from swarmwire.world.gateways.radio_bridge import RadioBridge
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Served:
 
     groups: tuple[GatewayGroup, ...]
     robots: tuple[ServedRobot, ...]
-    air: AirBridge | None
+    air: RadioBridge | None
     show: Callable[[], None]  # tells where all robots are
     show_counts: Callable[[], dict[str, int]]  # what of that nobody was told
     swarm: str

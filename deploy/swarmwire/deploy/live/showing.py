@@ -19,7 +19,7 @@ PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 
 
 @dataclass(frozen=True)
-class Way:
+class RadioModel:
     """How a run is shown, and for how long."""
 
     clock: Clock
@@ -37,7 +37,7 @@ class Way:
         self.clock.sleep_until(self.clock.now_ns() + PAUSE_NS)
 
 
-def show_recording(recording: Path, way: Way) -> None:
+def show_recording(recording: Path, way: RadioModel) -> None:
     """Show a recording, also of a run that was killed, until the viewer is closed or `way.stopped()`."""
     with whole(recording) as complete, way.viewer(complete) as shown:
         _say_where(shown, way)
@@ -45,7 +45,7 @@ def show_recording(recording: Path, way: Way) -> None:
             way.pause()
 
 
-def show_live(live: Live, way: Way) -> None:
+def show_live(live: Live, way: RadioModel) -> None:
     """Show a run while it goes on and what there was to see afterwards, until the viewer is closed or stopped.
 
     RunGone if the run does not answer.
@@ -70,7 +70,9 @@ class Drawer(threading.Thread):
     In a thread that nobody waits for: drawing stands still while the viewer does, and ends with it.
     """
 
-    def __init__(self, run: Following, url: str, way: Way, page: Callable[[Glimpse], None] | None = None) -> None:
+    def __init__(
+        self, run: Following, url: str, way: RadioModel, page: Callable[[Glimpse], None] | None = None
+    ) -> None:
         """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
         super().__init__(name="drawer", daemon=True)
         self._run, self._way, self._page, self._evened = run, way, page, Evened()
@@ -100,7 +102,7 @@ class Drawer(threading.Thread):
         return True
 
 
-def _say_where(shown: Viewer, way: Way) -> None:
+def _say_where(shown: Viewer, way: RadioModel) -> None:
     if shown.page is not None:
         way.say(f"open {shown.page} in a browser; Ctrl-C ends the view")
 

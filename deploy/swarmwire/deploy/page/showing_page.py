@@ -11,7 +11,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_file import Live
-from swarmwire.deploy.live.showing import Drawer, Way
+from swarmwire.deploy.live.showing import Drawer, RadioModel
 from swarmwire.deploy.live.viewer_program import has_screen
 from swarmwire.deploy.page.app import Shown, page_app
 from swarmwire.deploy.page.news import NewsThread
@@ -19,7 +19,7 @@ from swarmwire.deploy.page.seen import Seen
 from swarmwire.deploy.page.serving import serving
 
 
-def show_page(live: Live, way: Way, network: Network | None = None, *, begin: bool = False) -> None:
+def show_page(live: Live, way: RadioModel, network: Network | None = None, *, begin: bool = False) -> None:
     """Show the run until `way.stopped()` or its viewer is gone; afterwards it can still be looked at. RunGone if it is.
 
     `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that

@@ -76,7 +76,7 @@ def probe_coverage(
 
 def _as_sent_by(radio: Radio, scenario: Scenario, index: int) -> Radio:
     """The radio with the power and gain of a robot's group as that of the sender."""
-    if not radio.is_signal:
+    if not radio.is_phy:
         return radio
     antennas = Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values())
     antenna = radio.antenna_or_default

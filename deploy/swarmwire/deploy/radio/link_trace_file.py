@@ -24,8 +24,8 @@ def scenario_traces(scenario: Scenario) -> LinkTraces | None:
     if not path.is_file():
         raise BadInput(scenario.source, "radio.trace.file", f"expected a file beside the scenario: there is no {path}")
     traces = read_link_traces(path, scenario.robot_names())
-    if traces.rssi_dbm is not None and scenario.radio is not None and not scenario.radio.is_signal:
-        raise BadInput(str(path), "rssi_dbm", "expected a radio with signals: a disk knows no strength")
+    if traces.rssi_dbm is not None and scenario.radio is not None and not scenario.radio.is_phy:
+        raise BadInput(str(path), "rssi_dbm", "expected a radio with a PHY: a disk knows no strength")
     return traces
 
 

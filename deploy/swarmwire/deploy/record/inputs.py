@@ -19,7 +19,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.interfaces import AgentBackend, AirTime, Put, TimedBackend
+from swarmwire.comms.interfaces import AgentBackend, Put, SubtickMedium, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
@@ -63,7 +63,7 @@ class RecordedBackend:
         return actions
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """The same of a backend that puts packets on the air itself."""
         noted = _Noted(air)
@@ -197,7 +197,7 @@ class ReplayedBackend:
         return self._inputs.actions(tick, self._robots)
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):
@@ -209,7 +209,7 @@ class ReplayedBackend:
 class _Noted:
     """An air, and what is put on it."""
 
-    def __init__(self, air: AirTime) -> None:
+    def __init__(self, air: SubtickMedium) -> None:
         self._air = air
         self.puts: list[Put] = []
         self.advance = air.advance

@@ -51,9 +51,9 @@ class Link(NamedTuple):
 
 def link_of(radio: Radio) -> Link:
     """The link type whose frames this radio sends."""
-    if radio.is_signal and radio.frame != "plain":
+    if radio.is_phy and radio.frame != "plain":
         return Link(IEEE802_11_RADIOTAP, 1 << 24, partial(_headers_80211, radio))
-    if radio.is_signal and radio.reception_or_default.model == "802.15.4":
+    if radio.is_phy and radio.reception_or_default.model == "802.15.4":
         return Link(IEEE802_15_4_TAP, SHORT_ROBOTS, partial(_headers_802154, radio))
     return Link(USER0, EVERYBODY, _plain)
 

@@ -15,7 +15,7 @@ def network_table(fit: NetworkFit) -> dict[str, Any]:
     if isinstance(fit.losses, str) and isinstance(fit.latency, str):
         return {"radio": {}}
     range_m = EVERYWHERE_M if isinstance(fit.range, str) else rounded(fit.range.range_m.value)
-    radio: dict[str, Any] = {"model": "disk", "range_m": range_m}
+    radio: dict[str, Any] = {"model": "unit-disk", "range_m": range_m}
     if isinstance(fit.latency, LatencyFit):
         delays = fit.latency.delays
         radio["latency_s"] = rounded((fit.latency if delays is None else delays).latency_s.value)

@@ -8,12 +8,12 @@ import pytest
 
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.agent.radios.tracker import Tracker
-from swarmwire.agent.radios.world_radio import AirRadio
+from swarmwire.agent.radios.world_radio import WorldRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
-from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, peers, radio, words
 
 
@@ -31,12 +31,12 @@ def by_zenoh_and_tracker() -> Generator[RobotRadio]:
 
 @contextmanager
 def by_air() -> Generator[RobotRadio]:
-    bridge = AirBridge(
-        Network(ANY_PORT), KEYS, {"flock-1": 1}, LentAir(ROBOTS, 10, 100, ("rssi_dbm",), ("radio.rssi",))
+    bridge = RadioBridge(
+        Network(ANY_PORT), KEYS, {"flock-1": 1}, BridgedRadio(ROBOTS, 10, 100, ("rssi_dbm",), ("radio.rssi",))
     )
     session = open_swarm(Network(connect=bridge.open()))
     try:
-        made = AirRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
+        made = WorldRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
         made.open()
         yield made
     finally:

@@ -76,9 +76,9 @@ def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
     ("arguments", "where", "key"),
     [
         (("x", "--contention", "2,20,0.1"), "radio", ""),
-        (("disk", "--contention", "1,20,0.1"), "--contention", ""),
-        (("disk",), "--contention", ""),
-        (("disk", "--at", "0,0"), "--at", ""),
+        (("unit-disk", "--contention", "1,20,0.1"), "--contention", ""),
+        (("unit-disk",), "--contention", ""),
+        (("unit-disk", "--at", "0,0"), "--at", ""),
         (("ideal", "--contention", "2,20,0.1", "--set", "radio.trace.file=a.csv"), "radio", "radio.trace"),
         ((LOSSY, "--contention", "2,20,0.1"), "--contention", ""),
         ((LOSSY, "--at", "0,9"), "--at", ""),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.radios import world_radio
-from swarmwire.agent.radios.world_radio import AirRadio
+from swarmwire.agent.radios.world_radio import WorldRadio
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import (
@@ -23,13 +23,13 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_air
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from tests.support.clocks import FakeClock
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, received_by, words
 from tests.support.waiting import until
 
 MEASURES = ("range_m", "bearing_rad")
-AIR = LentAir(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))
+AIR = BridgedRadio(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))
 ROWS = {"flock-1": 1, "flock-2": 2}  # flock-0 is not driven from elsewhere
 
 
@@ -43,7 +43,7 @@ class DatedClock(FakeClock):
 @contextmanager
 def bridged(air=AIR):
     """A bridge, and a function that makes sessions that can call it."""
-    bridge, sessions = AirBridge(Network(listen=ANY_PORT), KEYS, ROWS, air), []
+    bridge, sessions = RadioBridge(Network(listen=ANY_PORT), KEYS, ROWS, air), []
     endpoints = bridge.open()
 
     def session():
@@ -59,9 +59,9 @@ def bridged(air=AIR):
         bridge.close()
 
 
-def joined(session, own="flock-1", clock=None, **given) -> AirRadio:
+def joined(session, own="flock-1", clock=None, **given) -> WorldRadio:
     """A radio that has joined, and hears the bridge."""
-    radio = AirRadio(session, KEYS, ROBOTS, own, clock or WallClock(), **given)
+    radio = WorldRadio(session, KEYS, ROBOTS, own, clock or WallClock(), **given)
     radio.open()
     return radio
 
@@ -75,7 +75,7 @@ def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPack
     return ReceivedPackets(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
 
 
-def exchange(bridge: AirBridge, radio: AirRadio) -> None:
+def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
     """Return once the radio hears what the bridge publishes, and nothing of it is on its way any more."""
     row = ROWS[radio._own]
     number = 1000
@@ -92,7 +92,7 @@ def exchange(bridge: AirBridge, radio: AirRadio) -> None:
     until(lambda: number in radio.received(0)[0].sequence.tolist())
 
 
-def taken(bridge: AirBridge, packets: int) -> SentPackets:
+def taken(bridge: RadioBridge, packets: int) -> SentPackets:
     parts: list[SentPackets] = []
     until(lambda: parts.append(bridge.take()) or sum(map(len, parts)) >= packets)
     return SentPackets.joined(parts)
@@ -146,7 +146,7 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
         bridge.publish(7, table, told)
         found: list[tuple[ReceivedPackets, TxStatuses]] = []
 
-        def of(radio: AirRadio, packets: int) -> tuple[ReceivedPackets, TxStatuses]:
+        def of(radio: WorldRadio, packets: int) -> tuple[ReceivedPackets, TxStatuses]:
             found.clear()
             until(lambda: found.append(radio.received(NS_PER_S)) or len(found[-1][0]) == packets)
             return found[-1]
@@ -210,7 +210,7 @@ def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
 )
 def test_a_robot_that_does_not_fit_the_world_is_refused_in_one_line(own, robots, air, said):
     with bridged(air) as (_, session), pytest.raises(BadInput, match=said) as caught:
-        AirRadio(session(), KEYS, robots, own, WallClock()).open()
+        WorldRadio(session(), KEYS, robots, own, WallClock()).open()
     assert "\n" not in str(caught.value)
 
 
@@ -219,7 +219,7 @@ def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
     clock = DatedClock()
     try:
         with pytest.raises(BadInput, match="expected a world that lends its air to flock-1; none in the network"):
-            AirRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
+            WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
     finally:
         close_session(session)
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S

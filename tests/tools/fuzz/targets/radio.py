@@ -9,15 +9,15 @@ from hypothesis.strategies import DrawFn
 
 from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import Tracker
-from swarmwire.agent.radios.world_radio import AirRadio, _Arrival
+from swarmwire.agent.radios.world_radio import WorldRadio, _Arrival
 from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import AirTerms, Pose, encode_air, encode_pose
+from swarmwire.comms.wire.radio_bridge import BridgeInfo, Pose, encode_air, encode_pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
-from swarmwire.world.gateways.radio_bridge import AirBridge, LentAir
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from tests.support.agent.players import Other, Word
 from tests.tools.fuzz.mutations import TEXTS, mutated_bytes, one_in, pick
 from tests.tools.fuzz.small_run import small_run
@@ -50,10 +50,10 @@ class Terms(DocumentTarget):
     name = "terms"
 
     def make_samples(self) -> list[bytes]:
-        return [AirTerms(row, ("a", "b", "c"), 10, 100, MEASURES, ("radio.range",)).encode() for row in (0, 2)]
+        return [BridgeInfo(row, ("a", "b", "c"), 10, 100, MEASURES, ("radio.range",)).encode() for row in (0, 2)]
 
     def feed(self, case: bytes) -> None:
-        AirTerms.decode(case)
+        BridgeInfo.decode(case)
 
 
 class AirReceived(FrameTarget):
@@ -64,7 +64,7 @@ class AirReceived(FrameTarget):
     def make_samples(self) -> list[bytes]:
         run, row = small_run(), 1
         self.robots = run.world.static.robot_names
-        self.terms = AirTerms(row, self.robots, 10, 100, MEASURES, ())
+        self.terms = BridgeInfo(row, self.robots, 10, 100, MEASURES, ())
         received = run.received.select(np.flatnonzero(run.received.receiver == row)).compacted()
         assert len(received), "the robot received something"
         statuses = TxStatuses(np.array([row]), np.array([4]), np.array([1]))
@@ -72,7 +72,7 @@ class AirReceived(FrameTarget):
         return [encode_air(11, row, received, statuses), encode_air(12, row, nothing, statuses)]
 
     def feed(self, case: bytes) -> str | None:
-        radio = AirRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
+        radio = WorldRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
         radio.terms, radio.measures = self.terms, MEASURES
         radio._inbox.put(_Arrival(case, CLOCK.now_ns(), CLOCK.utc_ns()))
         radio.received(3_000_000_000)
@@ -87,7 +87,7 @@ class AirSent(FrameTarget):
     def make_samples(self) -> list[bytes]:
         row, zero = np.array([1]), np.zeros(1)
         packets = SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.of([b"abc", b"defg"]))
-        self.bridge = AirBridge(Network(), KEYS, {"b": 1}, LentAir(("a", "b", "c"), 10, 100, MEASURES, ()))
+        self.bridge = RadioBridge(Network(), KEYS, {"b": 1}, BridgedRadio(("a", "b", "c"), 10, 100, MEASURES, ()))
         return [encode_actions(7, Actions(row, np.zeros(1, np.bool_), zero, zero, zero, packets))]
 
     def feed(self, case: bytes) -> str | None:

@@ -167,7 +167,7 @@ ROBOTS = 3
 ALIVE = np.ones(2 * ROBOTS, np.bool_)
 POSE = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
 PAYLOADS = [b"\x01\x02 of arena 0", b"\x03\x04 of arena 1, longer"]
-NEWS_RADIOS = {"disk": Radio(9.0, send_offset="tick"), "signals": with_access("aloha")}
+NEWS_RADIOS = {"unit-disk": Radio(9.0, send_offset="tick"), "signals": with_access("aloha")}
 ASKED: IntArray = np.array([41, 42])
 
 
@@ -191,7 +191,7 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
     for arena, size, tag, payload in zip(told.arena, told.size_bytes, told.tag, told.payload, strict=True):
         assert told.payloads.row(int(payload)) == PAYLOADS[arena]
         assert (size, tag) == (len(PAYLOADS[arena]), int.from_bytes(PAYLOADS[arena][:2], "little"))
-    assert (told.rssi_dbm is None) == (radio == "disk")
+    assert (told.rssi_dbm is None) == (radio == "unit-disk")
 
 
 @pytest.mark.parametrize("over", [0, 1])

@@ -16,7 +16,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.radio_bridge import (
     MAX_RADIO_FRAME_BYTES,
     POSE_BYTES,
-    AirTerms,
+    BridgeInfo,
     Pose,
     decode_air,
     decode_pose,
@@ -27,7 +27,7 @@ from swarmwire.comms.wire.tick_frames import decode_packets, decode_sent, encode
 from tests.support.agent.hosts import MEASURES, received_from
 
 ROW = 4  # of the robot, in the world; in its arena there are two
-TERMS = AirTerms(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
+TERMS = BridgeInfo(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
 # From both robots of the arena; the first message was received twice, and the last is empty.
 RECEIVED = ReceivedPackets(
     receiver=np.array([ROW, ROW, ROW]),
@@ -133,18 +133,18 @@ def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
         decode_air(encode_air(tick, ROW, RECEIVED, OUTCOMES), TERMS)
 
 
-TOLD_TERMS = AirTerms(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.tx_status"))
+TOLD_TERMS = BridgeInfo(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.tx_status"))
 GOOD = msgpack.unpackb(TOLD_TERMS.encode())
 
 
 def fault_of(data: bytes) -> str:
     with pytest.raises(BadFrame) as caught:
-        AirTerms.decode(data)
+        BridgeInfo.decode(data)
     return caught.value.fault
 
 
 def test_what_was_told_is_what_is_learned():
-    assert AirTerms.decode(TOLD_TERMS.encode()) == TOLD_TERMS
+    assert BridgeInfo.decode(TOLD_TERMS.encode()) == TOLD_TERMS
 
 
 @pytest.mark.parametrize(

@@ -104,11 +104,11 @@ def test_an_addressed_frame_keeps_the_air_for_its_acknowledgement(preset: str, d
 
 
 def test_a_radio_without_a_standard_has_a_plain_header():
-    for preset in ("disk", "kilobot", "ble-1M", "gz-rfcomms", "acoustic"):
+    for preset in ("unit-disk", "kilobot", "ble-1M", "gz-rfcomms", "acoustic"):
         radio = radio_of({"preset": preset})
         assert link_of(radio).link_type == 147
         assert header(radio, to=3, rssi_dbm=-64.0) == joined("00 14 0000 17000000 03000000 34120000 000080c2")
-    assert header(radio_of({"preset": "disk"})) == joined("00 14 0000 17000000 ffffffff 34120000 0000c07f")
+    assert header(radio_of({"preset": "unit-disk"})) == joined("00 14 0000 17000000 ffffffff 34120000 0000c07f")
 
 
 def test_blocks_are_those_of_the_specification():

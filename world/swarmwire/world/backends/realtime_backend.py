@@ -9,7 +9,7 @@ import zenoh
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
-from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
+from swarmwire.comms.interfaces import Put, ReceivingBackend, SubtickMedium
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.inbox import Item, RunnerInbox
@@ -69,7 +69,7 @@ class PacedBackend:
         return actions
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """The same, with packets handed over when they are due."""
         assert self._subticks
@@ -135,7 +135,7 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         return self._roster.take()
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """The same, with frames also between ticks, as packets come and are due."""
         assert self._subticks

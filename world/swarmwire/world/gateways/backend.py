@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import AirTime, Put, ReceivingBackend
+from swarmwire.comms.interfaces import Put, ReceivingBackend, SubtickMedium
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, LedChanges, Readings
 from swarmwire.comms.truth import Group
@@ -81,8 +81,8 @@ class GatewayGroup:
 CARRIED = ("packets_to_robots", "packets_from_robots")  # which is no fault
 
 
-class RobotsAir(Protocol):
-    """The world's air as robots behind gateways have it; `AirBridge` is one."""
+class RobotsRadio(Protocol):
+    """The world's air as robots behind gateways have it; `RadioBridge` is one."""
 
     def publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Hand out what these robots received, and learn of packets that they sent."""
@@ -104,7 +104,7 @@ class GatewayBackend:
         self,
         inner: ReceivingBackend,
         groups: Sequence[GatewayGroup],
-        air: RobotsAir | None,
+        air: RobotsRadio | None,
         pace: Pace,
         rate_hz: int,
         show: Callable[[], None] = lambda: None,
@@ -135,7 +135,7 @@ class GatewayBackend:
         return replace(told, sent=SentPackets.joined([told.sent, self._air.take()])) if self._air else told
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: AirTime
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
     ) -> Actions:
         """The same, with packets taken when they come and handed over when they are due."""
         assert self._subticks

@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, AirTerms, BoundedInbox, encode_air
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, encode_air
 from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
@@ -27,8 +27,8 @@ MAX_WAITING = 4096  # frames that may wait for the loop
 
 
 @dataclass(frozen=True, slots=True)
-class LentAir:
-    """What the world's radio is to every robot of an arena; `AirTerms` says the same to one of them."""
+class BridgedRadio:
+    """What the world's radio is to every robot of an arena; `BridgeInfo` says the same to one of them."""
 
     robots: tuple[str, ...]  # all of the arena, by index
     rate_hz: int
@@ -36,12 +36,12 @@ class LentAir:
     measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # what of an agent's needs it meets
 
-    def terms(self, row: int) -> AirTerms:
+    def terms(self, row: int) -> BridgeInfo:
         """The terms of the robot of this row."""
-        return AirTerms(row, self.robots, self.rate_hz, self.max_payload_bytes, self.measures, self.needs)
+        return BridgeInfo(row, self.robots, self.rate_hz, self.max_payload_bytes, self.measures, self.needs)
 
 
-class AirBridge:
+class RadioBridge:
     """Carries packets between the loop and driver-run robots, which say by their key who they are.
 
     Attributes:
@@ -53,7 +53,7 @@ class AirBridge:
         network: Network,
         keys: SwarmKeys,
         rows: Mapping[str, int],
-        air: LentAir | None,
+        air: BridgedRadio | None,
         access: Mapping[str, Any] | None = None,
     ) -> None:
         """`rows` are those of the world's robots that may take part, by name; `air` is None in a run without radio."""

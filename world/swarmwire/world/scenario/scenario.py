@@ -65,7 +65,7 @@ class RobotsTable(Table):
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
     radio: Annotated[RobotAntenna, AsTable()] | None = None
-    """Their own power and gain; only of a radio with signals."""
+    """Their own power and gain; only of a radio with a PHY."""
     place: PlaceTable = InArena(how="arena")
     """Where the robots stand at the start."""
 

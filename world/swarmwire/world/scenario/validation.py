@@ -151,9 +151,9 @@ def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
 
 def _check_antennas(scenario: Scenario, where: str) -> None:
     for group, table in scenario.robots.items():
-        if table.radio is not None and (scenario.radio is None or not scenario.radio.is_signal):
+        if table.radio is not None and (scenario.radio is None or not scenario.radio.is_phy):
             why = "a disk knows no strength" if scenario.radio else "there is no [radio]"
-            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with signals: {why}")
+            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {why}")
 
 
 def _check_push(scenario: Scenario, bodies: Mapping[str, Body], event: Push) -> None:

@@ -35,7 +35,7 @@ class Coverage:
     """A radio among the obstacles of one arena, between any two places.
 
     Attributes:
-        sensitivity_dbm: the least mean power that counts as in range; None for a disk.
+        sensitivity_dbm: the least mean power that counts as in range; None for a unit disk.
     """
 
     def __init__(self, radio: Radio, key: np.uint64, obstacles: Obstacles, payload_bytes: int) -> None:
@@ -43,8 +43,8 @@ class Coverage:
         self._radio, self._obstacles = radio, obstacles
         self._passes = passing_share(radio)
         self._range_m = math.inf if radio.range_m is None else radio.range_m
-        self.sensitivity_dbm = sensitivity_of(radio) if radio.is_signal else None
-        if radio.is_signal:
+        self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
+        if radio.is_phy:
             self._curve = radio.loss_model.curve(radio.frequency_hz)
             shadowing = radio.shadowing or Shadowing(deviation_db=0.0)
             self._waves = field_waves(np.array([key], np.uint64), shadowing)[0]
@@ -52,8 +52,8 @@ class Coverage:
             self._by_power = self._delivery_by_power(key, 8 * (payload_bytes + radio.overhead_bytes))
 
     def mean_dbm(self, start: FloatArray, end: FloatArray) -> FloatArray | None:
-        """The mean power between places (k, 2) in m, fading apart, (k,); None for a disk."""
-        if not self._radio.is_signal:
+        """The mean power between places (k, 2) in m, fading apart, (k,); None for a unit disk."""
+        if not self._radio.is_phy:
             return None
         antenna, walls = self._radio.antenna_or_default, self._radio.walls or Walls(0.0, 0.0)
         return _mean_dbm(
@@ -70,7 +70,7 @@ class Coverage:
         )
 
     def in_range(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Whether the mean power reaches the sensitivity, or a disk its range; nowhere that an obstacle blocks."""
+        """Whether the mean power reaches the sensitivity, or a unit disk its range; nowhere that an obstacle blocks."""
         mean_dbm, is_open = self.mean_dbm(start, end), self._open(start, end)
         if mean_dbm is None or self.sensitivity_dbm is None:
             return is_open
@@ -153,7 +153,7 @@ class CoverageMap:
     at_m: tuple[float, float]
     x_m: FloatArray  # (columns,) rising
     y_m: FloatArray  # (rows,) rising
-    mean_dbm: FloatArray | None  # (rows, columns) without fading; None for a disk
+    mean_dbm: FloatArray | None  # (rows, columns) without fading; None for a unit disk
     in_range: BoolArray  # (rows, columns)
     delivery: FloatArray  # (rows, columns) of lone packets
     is_free: BoolArray  # (rows, columns) of obstacles
@@ -177,7 +177,7 @@ class ByDistance:
 
     distance_m: FloatArray  # (distances,) rising
     delivery: Band
-    mean_dbm: Band | None  # None for a disk
+    mean_dbm: Band | None  # None for a unit disk
 
 
 def coverage_map(

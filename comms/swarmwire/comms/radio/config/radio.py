@@ -46,13 +46,13 @@ class Trace:
 # --- What a scenario says of its radio.
 
 
-MODELS = ("disk", "log-distance", "friis", "two-ray", "itu-indoor")
+MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
 FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
 
 
 @dataclass(frozen=True)
 class Radio:
-    """The radio: either reaches to a fixed distance (disk), or sends signals that fade with distance."""
+    """The radio: either reaches to a fixed distance (unit disk), or sends signals that fade with distance."""
 
     range_m: float | None = parameter(
         None,
@@ -60,14 +60,14 @@ class Radio:
         unit="m",
         above=0,
     )
-    model: str = parameter("disk", help="how the signal fades with distance", choices=MODELS)
+    model: str = parameter("unit-disk", help="how the signal fades with distance", choices=MODELS)
     preset: str | None = parameter(
         None, help="a kind of radio, whose values count where the scenario gives none", choices=tuple(PRESETS)
     )
     line_of_sight: bool | None = parameter(
-        None, help="obstacles block the signal; without it true for the disk, false for signals"
+        None, help="obstacles block the signal; without it true for the unit disk, false for signals"
     )
-    bodies_block: bool = parameter(False, help="of the disk: robots in between block the signal, as obstacles do")
+    bodies_block: bool = parameter(False, help="of the unit disk: robots in between block the signal, as obstacles do")
     loss: float = parameter(
         0.0, help="probability that a packet within reach is lost, for each receiver", at_least=0, at_most=1
     )
@@ -136,14 +136,14 @@ class Radio:
     measures: Measures = field(default_factory=Measures)
 
     @property
-    def is_signal(self) -> bool:
+    def is_phy(self) -> bool:
         """Whether there is a signal with a strength."""
-        return self.model != "disk"
+        return self.model != "unit-disk"
 
     @property
     def acknowledges(self) -> bool:
         """Whether senders learn what became of addressed packets."""
-        return self.is_signal and self.access_or_default.acknowledges
+        return self.is_phy and self.access_or_default.acknowledges
 
     @property
     def tells(self) -> tuple[str, ...]:
@@ -153,11 +153,11 @@ class Radio:
     @property
     def needs_line_of_sight(self) -> bool:
         """Whether obstacles block."""
-        return not self.is_signal if self.line_of_sight is None else self.line_of_sight
+        return not self.is_phy if self.line_of_sight is None else self.line_of_sight
 
     @property
     def loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
-        """Path loss by the signal's model; ValueError for the disk."""
+        """Path loss by the signal's model; ValueError for the unit disk."""
         if self.model == "log-distance":
             return self.log_distance or LogDistance()
         if self.model == "two-ray":
@@ -166,7 +166,7 @@ class Radio:
             return self.itu_indoor or ItuIndoor()
         if self.model == "friis":
             return Friis()
-        raise ValueError("model: a disk has no path loss")
+        raise ValueError("model: a unit disk has no path loss")
 
     @property
     def antenna_or_default(self) -> Antenna:
@@ -230,7 +230,7 @@ def check_radio(radio: Radio, where: str) -> None:
     for name, model in OF_MODELS.items():
         if getattr(radio, name) is not None and radio.model != model:
             raise BadInput(where, f"radio.{name}", f'expected model = "{model}" with it, got "{radio.model}"')
-    if radio.is_signal:
+    if radio.is_phy:
         _check_signal(radio, where)
     else:
         _check_disk(radio, where)
@@ -243,31 +243,33 @@ def check_radio(radio: Radio, where: str) -> None:
     if radio.bit_rate_bps not in rates_bps:
         listed = ", ".join(str(rate_bps) for rate_bps in rates_bps)
         raise BadInput(where, "radio.bit_rate_bps", f"{radio.frame} has {listed}; got {radio.bit_rate_bps} bit/s")
-    if radio.is_signal:
+    if radio.is_phy:
         _check_fits(radio, where)
 
 
 def unfit_for_torus(radio: Radio) -> str | None:
-    """The key by which a radio cannot be that of a torus, if any: only a disk's distances are known across its seam."""
-    return "model" if radio.is_signal else "bodies_block" if radio.bodies_block else None
+    """The key by which a radio cannot be that of a torus, if any: only a unit disk knows distances across the seam."""
+    return "model" if radio.is_phy else "bodies_block" if radio.bodies_block else None
 
 
 def _check_disk(radio: Radio, where: str) -> None:
     if radio.range_m is None:
-        raise BadInput(where, "radio.range_m", "is missing; expected a number above 0 (m), as the model disk has one")
+        raise BadInput(
+            where, "radio.range_m", "is missing; expected a number above 0 (m), as the model unit disk has one"
+        )
     for name in OF_SIGNALS:
         if getattr(radio, name) is not None:
-            raise BadInput(where, f"radio.{name}", "expected a model with signals: a disk knows no strength")
+            raise BadInput(where, f"radio.{name}", "expected a model with signals: a unit disk knows no strength")
     if radio.measures.rssi is not None:
-        raise BadInput(where, "radio.measures.rssi", "expected a model with signals: a disk knows no strength")
+        raise BadInput(where, "radio.measures.rssi", "expected a model with signals: a unit disk knows no strength")
     if radio.cut_off_db != Radio.cut_off_db:
-        raise BadInput(where, "radio.cut_off_db", "expected a model with signals: a disk knows no strength")
+        raise BadInput(where, "radio.cut_off_db", "expected a model with signals: a unit disk knows no strength")
 
 
 def _check_signal(radio: Radio, where: str) -> None:
     refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
     if radio.bodies_block:
-        raise BadInput(where, "radio.bodies_block", "expected the model disk with it; signals have radio.bodies")
+        raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; signals have radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
         raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
     if radio.access_or_default.method == "dcf" and radio.frame == "plain":

@@ -15,7 +15,7 @@ from swarmwire.comms.radio.phy.losses import MeasuredLinks, passing_share
 from swarmwire.comms.radio.phy.pairs import Pairs
 from swarmwire.comms.radio.phy.params import Rules
 from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.unit_disk.model import ROUNDING
 
 NEGLIGIBLE = 1e-3  # power of a jammer over that of the noise
@@ -24,9 +24,11 @@ NEGLIGIBLE = 1e-3  # power of a jammer over that of the noise
 class RadioGraph:
     """Joins pairs of links held; jammers and measured ratios count, carrier sense does not."""
 
-    def __init__(self, medium: Medium, rules: Rules, links: LinksHeld, jam: JamHeld, measured: MeasuredLinks | None):
-        self._disruption, self._links, self._jam, self._measured = medium.disruption, links, jam, measured
-        self.tune(medium.radio, rules)
+    def __init__(
+        self, context: ChannelContext, rules: Rules, links: LinksHeld, jam: JamHeld, measured: MeasuredLinks | None
+    ):
+        self._disruption, self._links, self._jam, self._measured = context.disruption, links, jam, measured
+        self.tune(context.radio, rules)
 
     def tune(self, radio: Radio, rules: Rules) -> None:
         """The radio has these numbers from now on."""

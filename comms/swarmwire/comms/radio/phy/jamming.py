@@ -17,15 +17,15 @@ from swarmwire.comms.radio.phy.reception import count_chunk
 from swarmwire.comms.radio.phy.state import Jam
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import loss_between_db
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
 class JamHeld:
     """What jammers do to robots, and when."""
 
-    def __init__(self, medium: Medium) -> None:
-        self._medium, self._jammers = medium, Jammers.none()
-        self._power_mw = np.empty((0, medium.robots))
+    def __init__(self, context: ChannelContext) -> None:
+        self._context, self._jammers = context, Jammers.none()
+        self._power_mw = np.empty((0, context.robots))
 
     @property
     def anything(self) -> bool:
@@ -34,11 +34,11 @@ class JamHeld:
 
     def move(self, pose: FloatArray, around: Surroundings) -> None:
         """Robots stand at `pose` (rows, 3) from now on, and jammers are those of the disruption that holds."""
-        self._jammers = self._medium.disruption.jammers
+        self._jammers = self._context.disruption.jammers
         if not self.anything:
-            self._power_mw = np.empty((0, self._medium.robots))
+            self._power_mw = np.empty((0, self._context.robots))
             return
-        self._power_mw = powers_of(self._jammers, pose, self._medium.robots, self._medium.obstacles, around)
+        self._power_mw = powers_of(self._jammers, pose, self._context.robots, self._context.obstacles, around)
 
     def between(self, from_ns: int, until_ns: int) -> Jam:
         """The jammers as they are just before `from_ns`, and when they go on or off from then to before `until_ns`."""
@@ -51,7 +51,7 @@ class JamHeld:
 
         Clear is when none of the others is on; less than `least_mw` of one does not count.
         """
-        shape = len(self._medium.keys), self._medium.robots
+        shape = len(self._context.keys), self._context.robots
         steady_mw, all_mw, clear = np.zeros(shape), np.zeros(shape), np.ones(shape)
         for jammer, arena in enumerate(self._jammers.arena.tolist()):
             power_mw, duty = self._power_mw[jammer], self._jammers.duty[jammer]

@@ -15,7 +15,7 @@ from swarmwire.comms.radio.phy.pairs import Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import Surroundings
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.truth import NOBODY
 
 RECEIVED = int(Fate.RECEIVED)
@@ -113,20 +113,22 @@ class LinksHeld:
         around: what links go by.
     """
 
-    def __init__(self, medium: Medium, around: Surroundings, levels: Levels, measured: MeasuredLinks | None) -> None:
+    def __init__(
+        self, context: ChannelContext, around: Surroundings, levels: Levels, measured: MeasuredLinks | None
+    ) -> None:
         """`measured` are the links of the radio's trace, kept up to date by others."""
-        self._medium, self._measured = medium, measured
+        self._context, self._measured = context, measured
         self.around, self._levels = around, levels
-        rows = len(medium.keys) * medium.robots
+        rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 3))
         self.pairs = self.pairs_at(self.pose)
         self.link, self.places = self._links(np.empty(0, LINK))
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """The pairs of robots that stand at `pose` (rows, 3)."""
-        medium = self._medium
-        arenas = medium.keys, medium.running
-        return pairs_of(pose, medium.size_m, *arenas, medium.obstacles, self.around, self._measured)
+        context = self._context
+        arenas = context.keys, context.running
+        return pairs_of(pose, context.size_m, *arenas, context.obstacles, self.around, self._measured)
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """The mean power of each pair from a to b, and back, (k,) each."""
@@ -153,7 +155,7 @@ class LinksHeld:
         return at[counts_as], self.link["receiver"][link[counts_as]].astype(np.int64)
 
     def _links(self, kept: Table) -> tuple[Table, LinkPlaces]:
-        pairs, now = self.pairs, self._medium.disruption
+        pairs, now = self.pairs, self._context.disruption
         fate = np.stack([_fates(now, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
         return links_by_sender(pairs, self.around.send_dbm, self.around.receive_dbi, fate, self._levels, kept)
 

@@ -1,6 +1,6 @@
 """Losses: what takes a frame that was received right, beside noise and interference.
 
-A further loss is a field of `Losses`, its line in each of the functions below, and, for the disk, a stage.
+A further loss is a field of `Losses`, its line in each of the functions below, and, for the unit disk, a stage.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,7 +17,7 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.reception.bursts import Bursting, BurstStates, takes
 from swarmwire.comms.radio.stages.losses import LOSS, TRACE
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 
 ANSWER_LOSS, ANSWER_TRACE = purpose("fixed loss of an acknowledgement"), purpose("trace of an acknowledgement")
@@ -112,13 +112,13 @@ class MeasuredLinks:
         self.move_to(0)
 
     @classmethod
-    def of(cls, medium: Medium) -> "MeasuredLinks | None":
+    def of(cls, context: ChannelContext) -> "MeasuredLinks | None":
         """Those of the radio's trace; None without one."""
-        if medium.traces is None or medium.radio.trace is None:
+        if context.traces is None or context.radio.trace is None:
             return None
-        antennas, antenna = medium.antennas, medium.radio.antenna_or_default
+        antennas, antenna = context.antennas, context.radio.antenna_or_default
         own = antennas.send_dbm(antenna), antennas.receive_dbi(antenna)
-        return cls(medium.traces, medium.radio.trace.others, medium.robots, len(medium.keys), *own)
+        return cls(context.traces, context.radio.trace.others, context.robots, len(context.keys), *own)
 
     def move_to(self, now_ns: int) -> None:
         """It is this time from now on."""

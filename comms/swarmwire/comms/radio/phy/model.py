@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
-from swarmwire.comms.radio.model import Decided, Way
+from swarmwire.comms.radio.model import Decided, RadioModel
 from swarmwire.comms.radio.phy import jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
@@ -27,7 +27,7 @@ from swarmwire.comms.radio.phy.results import RECEIVED, Told, room_for, taken_ou
 from swarmwire.comms.radio.phy.state import NOTHING, SILENT, State, Table, receptions_of_nothing, robots_at_rest
 from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.comms.radio.stages.chain import chain_after_reception
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Intake, Transmissions
 from swarmwire.comms.truth import NOBODY
 
@@ -37,13 +37,13 @@ Poses = dict[int, FloatArray]  # by hold
 class Reports:
     """Makes links of what was told, and takes them through the stages that follow reception."""
 
-    def __init__(self, medium: Medium, links: LinksHeld) -> None:
-        self._robots, self._links, self._columns = medium.robots, links, len(medium.radio.measures.columns)
-        self.tune(medium)
+    def __init__(self, context: ChannelContext, links: LinksHeld) -> None:
+        self._robots, self._links, self._columns = context.robots, links, len(context.radio.measures.columns)
+        self.tune(context)
 
-    def tune(self, medium: Medium) -> None:
+    def tune(self, context: ChannelContext) -> None:
         """The medium's radio has other numbers."""
-        self._stages = chain_after_reception(medium)
+        self._stages = chain_after_reception(context)
 
     def decided(self, parts: list[Told], queued: Transmissions, packet: Table, poses: Poses, lives: Lives) -> Decided:
         """What was told in one go or several, of packets `queued`, which are also the rows of `packet`."""
@@ -113,21 +113,21 @@ def _meant(queued: Transmissions, row: Told, lives: Lives) -> BoolArray:
 MIN_ROOM = 4096
 
 
-class SignalWay(Way):
+class SinrPhy(RadioModel):
     """Packets queue, go on air by the access method, and are received or not by signal, noise and interference."""
 
-    def __init__(self, medium: Medium) -> None:
-        self._medium, self._radio = medium, medium.radio
-        rows = len(medium.keys) * medium.robots
-        self._rules = rules_of(medium.radio, medium.robots)
-        self._measured = MeasuredLinks.of(medium)
-        levels = levels_of(medium.radio, self._rules)
-        self._links = LinksHeld(medium, self._around(), levels, self._measured)
-        self._jam, self._was_jammed = JamHeld(medium), False
-        self._graph = RadioGraph(medium, self._rules, self._links, self._jam, self._measured)
-        self._reports = Reports(medium, self._links)
+    def __init__(self, context: ChannelContext) -> None:
+        self._context, self._radio = context, context.radio
+        rows = len(context.keys) * context.robots
+        self._rules = rules_of(context.radio, context.robots)
+        self._measured = MeasuredLinks.of(context)
+        levels = levels_of(context.radio, self._rules)
+        self._links = LinksHeld(context, self._around(), levels, self._measured)
+        self._jam, self._was_jammed = JamHeld(context), False
+        self._graph = RadioGraph(context, self._rules, self._links, self._jam, self._measured)
+        self._reports = Reports(context, self._links)
         self._intake = Intake(rows)
-        self._bursts = BurstStates(medium.radio.bursts or Bursts(), medium.keys, medium.robots)
+        self._bursts = BurstStates(context.radio.bursts or Bursts(), context.keys, context.robots)
         self._events = event_queue(rows)
         self._robot, self._reception = robots_at_rest(rows), receptions_of_nothing(rows)
         self._packets = PacketsHeld()
@@ -149,7 +149,7 @@ class SignalWay(Way):
         self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
         if self._measured is not None:
             self._measured.move_to(self._now_ns)
-        now = self._medium.disruption
+        now = self._context.disruption
         if not all(map(np.array_equal, self._gains, (now.send_gain_db, now.receive_gain_db))):
             self._links.tune(self._around(), levels_of(self._radio, self._rules))
         self._links.move(pose, self._robot, self._reception)
@@ -163,9 +163,9 @@ class SignalWay(Way):
         self._refresh()
         if radio.bursts is not None:
             self._bursts.change(radio.bursts, at_ns)
-        self._radio, self._rules = radio, rules_of(radio, self._medium.robots)
+        self._radio, self._rules = radio, rules_of(radio, self._context.robots)
         self._graph.tune(radio, self._rules)
-        self._reports.tune(replace(self._medium, radio=radio))
+        self._reports.tune(replace(self._context, radio=radio))
         self._links.tune(self._around(), levels_of(radio, self._rules))
         self._refresh()
 
@@ -174,14 +174,14 @@ class SignalWay(Way):
         if self._rules.acknowledged:
             self._tx_status.append(sent_in_vain(sent, self._radio.max_payload_bytes))
         taken = self._intake.take(sent_at_ns, sent, others_alive, epoch)
-        self._packets.add(taken, self._radio, self._medium.robots)
+        self._packets.add(taken, self._radio, self._context.robots)
         return taken
 
     def pass_time(self, until_ns: int, lives: Lives) -> Decided:
         """Let happen what is due before `until_ns`."""
         parts: list[Told] = []
         if len(self._packets) or self._events.size[0] or self._jam.anything:
-            state, start = self._state(self._medium.disruption, until_ns)
+            state, start = self._state(self._context.disruption, until_ns)
             losses = self._losses()
             mac.line_up(state, self._events, start)
             most = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
@@ -221,20 +221,20 @@ class SignalWay(Way):
         return self._graph.edges(pose, alive)
 
     def _around(self) -> Surroundings:
-        now = self._medium.disruption
+        now = self._context.disruption
         self._gains = now.send_gain_db.copy(), now.receive_gain_db.copy()
-        return surroundings_of(self._radio, self._medium)
+        return surroundings_of(self._radio, self._context)
 
     def _refresh(self) -> None:
         """Noise, or what it is made of, has changed, or is about to."""
-        state, _ = self._state(self._medium.disruption, self._now_ns)
+        state, _ = self._state(self._context.disruption, self._now_ns)
         jamming.refresh(self._rules, state, self._events, self._now_ns)
 
     def _state(self, held: Disruption, until_ns: int) -> tuple[State, IntArray]:
         """What events work on until then, and where each robot's packets start in its order, (rows + 1,)."""
         order, start = self._packets.by_sender(len(self._robot))
         state = State(
-            self._medium.keys,
+            self._context.keys,
             self._robot,
             self._reception,
             self._links.link,

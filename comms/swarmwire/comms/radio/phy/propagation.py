@@ -14,7 +14,7 @@ from swarmwire.comms.radio.propagation.fading import FadingLaw, fading_law, scat
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sensitivity_dbm
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 
 # What counts as sensitivity in data sheets: share of frames that are right, and their bytes (see `sensitivity_dbm`).
 SENSOR_SPECS = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
@@ -36,8 +36,11 @@ def sensitivity_of(radio: Radio) -> float:
 
 
 def range_of(radio: Radio) -> float | None:
-    """Nominal reach in m: where path loss alone leaves the sensitivity, or the disk's radius; never above `range_m`."""
-    if not radio.is_signal:
+    """Nominal reach in m: where path loss alone leaves the sensitivity, or the unit disk's radius.
+
+    Never above `range_m`.
+    """
+    if not radio.is_phy:
         return radio.range_m
     antenna = radio.antenna_or_default
     most_db = antenna.power_dbm + 2.0 * antenna.gain_dbi - sensitivity_of(radio)
@@ -81,10 +84,10 @@ class Surroundings(NamedTuple):
     scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
 
 
-def surroundings_of(radio: Radio, medium: Medium) -> Surroundings:
+def surroundings_of(radio: Radio, context: ChannelContext) -> Surroundings:
     """What links go by: a radio, which may have other numbers than the medium's, under events."""
-    send_dbm, receive_dbi = _antennas_of(radio, medium)
-    keys, radius_m = medium.keys, medium.radius_m
+    send_dbm, receive_dbi = _antennas_of(radio, context)
+    keys, radius_m = context.keys, context.radius_m
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve = radio.loss_model.curve(radio.frequency_hz)
     law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
@@ -115,8 +118,8 @@ def surroundings_of(radio: Radio, medium: Medium) -> Surroundings:
     )
 
 
-def _antennas_of(radio: Radio, medium: Medium) -> tuple[FloatArray, FloatArray]:
+def _antennas_of(radio: Radio, context: ChannelContext) -> tuple[FloatArray, FloatArray]:
     """What each robot radiates in dBm, and the gain in dBi with which it hears, under events too, (rows,) each."""
-    own, antenna, now, arenas = medium.antennas, radio.antenna_or_default, medium.disruption, len(medium.keys)
+    own, antenna, now, arenas = context.antennas, radio.antenna_or_default, context.disruption, len(context.keys)
     send_dbm = np.tile(own.send_dbm(antenna), arenas) + now.send_gain_db
     return send_dbm, np.tile(own.receive_dbi(antenna), arenas) + now.receive_gain_db

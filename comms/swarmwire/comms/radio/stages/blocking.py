@@ -11,7 +11,7 @@ from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
-from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 
 class LineOfSight(Stage):
@@ -21,13 +21,13 @@ class LineOfSight(Stage):
     keys = ("line_of_sight",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio needs a line of sight and there are obstacles."""
-        any_obstacle = len(medium.obstacles.circle) or len(medium.obstacles.polygon)
-        return LineOfSight(medium) if medium.radio.needs_line_of_sight and any_obstacle else None
+        any_obstacle = len(context.obstacles.circle) or len(context.obstacles.polygon)
+        return LineOfSight(context) if context.radio.needs_line_of_sight and any_obstacle else None
 
-    def __init__(self, medium: Medium) -> None:
-        self._obstacles, self._robots, self._wrap_m = medium.obstacles, medium.robots, medium.wrap_m
+    def __init__(self, context: ChannelContext) -> None:
+        self._obstacles, self._robots, self._wrap_m = context.obstacles, context.robots, context.wrap_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Blocked links end, and were not in range."""
@@ -59,7 +59,7 @@ def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     return ends
 
 
-# --- Bodies block: robots between two others stop the signal of a disk, as with infrared.
+# --- Bodies block: robots between two others stop the signal of a unit disk, as with infrared.
 
 
 class BodiesBlock(Stage):
@@ -69,14 +69,14 @@ class BodiesBlock(Stage):
     keys = ("bodies_block",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio says so and there are bodies."""
-        return BodiesBlock(medium) if medium.radio.bodies_block and medium.radius_m.any() else None
+        return BodiesBlock(context) if context.radio.bodies_block and context.radius_m.any() else None
 
-    def __init__(self, medium: Medium) -> None:
-        assert medium.radio.range_m is not None  # `Air` has refused a disk without
-        self._running, self._robots, self._size_m = medium.running, medium.robots, medium.size_m
-        self._radius_m, self._range_m = medium.radius_m, medium.radio.range_m
+    def __init__(self, context: ChannelContext) -> None:
+        assert context.radio.range_m is not None  # `Air` has refused a unit disk without
+        self._running, self._robots, self._size_m = context.running, context.robots, context.size_m
+        self._radius_m, self._range_m = context.radius_m, context.radio.range_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Blocked links end, and were not in range."""
@@ -118,12 +118,12 @@ class Disrupted(Stage):
     keys = ()  # events bring them
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage; every radio has it, since events may come."""
-        return Disrupted(medium)
+        return Disrupted(context)
 
-    def __init__(self, medium: Medium) -> None:
-        self._disruption = medium.disruption
+    def __init__(self, context: ChannelContext) -> None:
+        self._disruption = context.disruption
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """RECEIVER_DEAD before BLACKOUT before PARTITIONED; that the sender is dead or off, its own side has told."""

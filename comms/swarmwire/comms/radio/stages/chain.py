@@ -6,7 +6,7 @@ To add a stage:
    default. The scenario's table `[radio.<name>]` follows from it. One number alone is just a field of `Radio`.
 2. Write `stages/<name>.py` with the keys of [radio] that it goes by (`KEYS`), one small compiled function (formula,
    source and units in its docstring; arrays in, one array out), a `Stage` that applies it to the links, and
-   `stage(medium)`, which returns it, or None where this radio has none. Draws are keyed by the arena's key, (sender,
+   `stage(context)`, which returns it, or None where this radio has none. Draws are keyed by the arena's key, (sender,
    receiver, sequence) as indices in the arena, and a purpose of its own, so that no stage shifts the draws of another.
    A new way to end a packet is a new `Fate`; a column that later stages read, a new field of `Links`.
 3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
@@ -20,7 +20,7 @@ from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOf
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
 from swarmwire.comms.radio.stages.losses import BurstLoss, FixedLoss, Replay
 from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
-from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 AFTER_RECEPTION: tuple[type[Stage], ...] = (
     Replay,
@@ -41,13 +41,13 @@ ORDER: tuple[type[Stage], ...] = (
 )  # order has a meaning
 
 
-def chain(medium: Medium) -> tuple[Stage, ...]:
+def chain(context: ChannelContext) -> tuple[Stage, ...]:
     """The stages that this medium has, in order."""
-    made = (kind.of(medium) for kind in ORDER)
+    made = (kind.of(context) for kind in ORDER)
     return tuple(stage for stage in made if stage is not None)
 
 
-def chain_after_reception(medium: Medium) -> tuple[Stage, ...]:
+def chain_after_reception(context: ChannelContext) -> tuple[Stage, ...]:
     """Those of them that a signal passes once it was received: what comes before is one with its events."""
-    made = (kind.of(medium) for kind in AFTER_RECEPTION)
+    made = (kind.of(context) for kind in AFTER_RECEPTION)
     return tuple(stage for stage in made if stage is not None)

@@ -15,7 +15,7 @@ from swarmwire.comms.draws_compiled import normal_quantile, uniform
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.measurements import to_sender_m
-from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
 MAX_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
@@ -82,13 +82,13 @@ class Latency(Stage):
     keys = ("latency_s", "jitter_s")
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio has latency or jitter."""
-        return Latency(medium) if medium.radio.latency_s > 0.0 or medium.radio.jitter_s > 0.0 else None
+        return Latency(context) if context.radio.latency_s > 0.0 or context.radio.jitter_s > 0.0 else None
 
-    def __init__(self, medium: Medium) -> None:
-        self._latency_ns, self._jitter_ns = to_ns(medium.radio.latency_s), to_ns(medium.radio.jitter_s)
-        self._keys, self._robots = medium.keys, medium.robots
+    def __init__(self, context: ChannelContext) -> None:
+        self._latency_ns, self._jitter_ns = to_ns(context.radio.latency_s), to_ns(context.radio.jitter_s)
+        self._keys, self._robots = context.keys, context.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""
@@ -135,13 +135,13 @@ class VaryingDelay(Stage):
     keys = ("delays",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio has such delays."""
-        return VaryingDelay(medium) if medium.radio.delays is not None else None
+        return VaryingDelay(context) if context.radio.delays is not None else None
 
-    def __init__(self, medium: Medium) -> None:
-        assert medium.radio.delays is not None
-        self._law, self._keys, self._robots = delay_law(medium.radio.delays), medium.keys, medium.robots
+    def __init__(self, context: ChannelContext) -> None:
+        assert context.radio.delays is not None
+        self._law, self._keys, self._robots = delay_law(context.radio.delays), context.keys, context.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""
@@ -172,10 +172,10 @@ class PropagationDelay(Stage):
     keys = ("propagation_mps",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio says how fast its waves are."""
-        speed_mps = medium.radio.propagation_mps
-        return None if speed_mps is None else PropagationDelay(speed_mps, medium.wrap_m)
+        speed_mps = context.radio.propagation_mps
+        return None if speed_mps is None else PropagationDelay(speed_mps, context.wrap_m)
 
     def __init__(self, speed_mps: float, wrap_m: tuple[float, float]) -> None:
         self._speed_mps, self._wrap_m = speed_mps, wrap_m

@@ -12,7 +12,7 @@ from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.reception.bursts import BurstStates
-from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.traces import LinkTrace
 
 LOSS = purpose("fixed loss")
@@ -25,12 +25,12 @@ class FixedLoss(Stage):
     keys = ("loss",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio loses anything."""
-        return FixedLoss(medium) if medium.radio.loss > 0.0 else None
+        return FixedLoss(context) if context.radio.loss > 0.0 else None
 
-    def __init__(self, medium: Medium) -> None:
-        self._loss, self._keys, self._robots = medium.radio.loss, medium.keys, medium.robots
+    def __init__(self, context: ChannelContext) -> None:
+        self._loss, self._keys, self._robots = context.radio.loss, context.keys, context.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Lost links end; they were in range."""
@@ -63,16 +63,16 @@ class BurstLoss(Stage):
     keys = ("bursts",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio has bursts; of a signal, its reception asks for them."""
-        return BurstLoss(medium) if medium.radio.bursts is not None and not medium.radio.is_signal else None
+        return BurstLoss(context) if context.radio.bursts is not None and not context.radio.is_phy else None
 
     remembers = True
 
-    def __init__(self, medium: Medium) -> None:
-        assert medium.radio.bursts is not None
-        self._bursts, self._loss = medium.radio.bursts, medium.radio.bursts.loss
-        self._states = BurstStates(medium.radio.bursts, medium.keys, medium.robots)
+    def __init__(self, context: ChannelContext) -> None:
+        assert context.radio.bursts is not None
+        self._bursts, self._loss = context.radio.bursts, context.radio.bursts.loss
+        self._states = BurstStates(context.radio.bursts, context.keys, context.robots)
 
     def go_on_from(self, before: Stage, at_ns: int) -> None:
         """Links are as good or bad as they were."""
@@ -109,16 +109,16 @@ class Replay(Stage):
     keys = ("trace",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
-        return None if medium.traces is None else Replay(medium)
+        return None if context.traces is None else Replay(context)
 
-    def __init__(self, medium: Medium) -> None:
-        assert medium.traces is not None
-        assert medium.radio.trace is not None
-        self._traces, self._keys, self._robots = medium.traces, medium.keys, medium.robots
-        self._others_end = medium.radio.trace.others == "none"
-        self._only_delays = medium.radio.is_signal
+    def __init__(self, context: ChannelContext) -> None:
+        assert context.traces is not None
+        assert context.radio.trace is not None
+        self._traces, self._keys, self._robots = context.traces, context.keys, context.robots
+        self._others_end = context.radio.trace.others == "none"
+        self._only_delays = context.radio.is_phy
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links end that are lost, or that nobody measured; those that are received become final later."""

@@ -12,7 +12,7 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.radio.links import RECEIVED, Links
-from swarmwire.comms.radio.stages.stage import Medium, Stage
+from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 
 @njit(cache=True)
@@ -35,9 +35,9 @@ class Given(Stage):
         measured: kernel of (keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise): (k,).
     """
 
-    def __init__(self, medium: Medium, column: str, noise: float, measured: Callable[..., FloatArray]) -> None:
-        self._keys, self._robots, self._wrap_m = medium.keys, medium.robots, medium.wrap_m
-        self._column = medium.radio.measures.columns.index(column)
+    def __init__(self, context: ChannelContext, column: str, noise: float, measured: Callable[..., FloatArray]) -> None:
+        self._keys, self._robots, self._wrap_m = context.keys, context.robots, context.wrap_m
+        self._column = context.radio.measures.columns.index(column)
         self._noise, self._measured = noise, measured
 
     def decide(self, links: Links, pose: FloatArray) -> None:
@@ -61,13 +61,13 @@ class MeasuredRange(Given):
     keys = ("measures.range",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio gives the range."""
-        asked = medium.radio.measures.range
-        return None if asked is None else MeasuredRange(medium, asked.noise_m)
+        asked = context.radio.measures.range
+        return None if asked is None else MeasuredRange(context, asked.noise_m)
 
-    def __init__(self, medium: Medium, noise_m: float) -> None:
-        super().__init__(medium, "range_m", noise_m, range_m)
+    def __init__(self, context: ChannelContext, noise_m: float) -> None:
+        super().__init__(context, "range_m", noise_m, range_m)
 
 
 @njit(cache=True)
@@ -102,13 +102,13 @@ class MeasuredBearing(Given):
     keys = ("measures.bearing",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio gives the bearing."""
-        asked = medium.radio.measures.bearing
-        return None if asked is None else MeasuredBearing(medium, asked.noise_rad)
+        asked = context.radio.measures.bearing
+        return None if asked is None else MeasuredBearing(context, asked.noise_rad)
 
-    def __init__(self, medium: Medium, noise_rad: float) -> None:
-        super().__init__(medium, "bearing_rad", noise_rad, bearing_rad)
+    def __init__(self, context: ChannelContext, noise_rad: float) -> None:
+        super().__init__(context, "bearing_rad", noise_rad, bearing_rad)
 
 
 @njit(cache=True)
@@ -148,14 +148,14 @@ class MeasuredRssi(Stage):
     keys = ("measures.rssi",)
 
     @classmethod
-    def of(cls, medium: Medium) -> Stage | None:
+    def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio gives the strength."""
-        given = medium.radio.measures.rssi
-        return None if given is None else MeasuredRssi(medium, given.noise_db)
+        given = context.radio.measures.rssi
+        return None if given is None else MeasuredRssi(context, given.noise_db)
 
-    def __init__(self, medium: Medium, noise_db: float) -> None:
-        self._noise_db, self._keys, self._robots = noise_db, medium.keys, medium.robots
-        self._column = medium.radio.measures.columns.index("rssi_dbm")
+    def __init__(self, context: ChannelContext, noise_db: float) -> None:
+        self._noise_db, self._keys, self._robots = noise_db, context.keys, context.robots
+        self._column = context.radio.measures.columns.index("rssi_dbm")
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Fill the column "rssi_dbm"."""

@@ -14,7 +14,7 @@ from swarmwire.comms.radio.traces import LinkTraces
 
 
 @dataclass(frozen=True, slots=True)
-class Medium:
+class ChannelContext:
     """What stages are made from."""
 
     radio: Radio
@@ -44,7 +44,7 @@ class Stage(ABC):
 
     @classmethod
     @abstractmethod
-    def of(cls, medium: Medium) -> "Stage | None":
+    def of(cls, context: ChannelContext) -> "Stage | None":
         """The stage of this medium; None where it has none."""
 
     @abstractmethod

@@ -10,9 +10,9 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Lives
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
-from swarmwire.comms.radio.model import Decided, Way
+from swarmwire.comms.radio.model import Decided, RadioModel
 from swarmwire.comms.radio.stages.chain import chain
-from swarmwire.comms.radio.stages.stage import Medium
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import Reach, links_in_reach, pairs_in_reach, reach, reach_on_torus
 from swarmwire.comms.radio.unit_disk.tx_queue import Senders
@@ -24,18 +24,18 @@ ROUNDING = 1e-9
 class Channel:
     """Decides what becomes of packets at robots that stand at given poses: arrays that nobody writes to any more."""
 
-    def __init__(self, medium: Medium) -> None:
-        self._radio, self._size_m = medium.radio, medium.size_m
-        self._arenas, self._running = len(medium.keys), medium.running
-        self._find_reach = reach_on_torus if medium.is_torus else reach
-        self._columns = len(medium.radio.measures.columns)
-        self._stages = chain(medium)
+    def __init__(self, context: ChannelContext) -> None:
+        self._radio, self._size_m = context.radio, context.size_m
+        self._arenas, self._running = len(context.keys), context.running
+        self._find_reach = reach_on_torus if context.is_torus else reach
+        self._columns = len(context.radio.measures.columns)
+        self._stages = chain(context)
         self._known_pose: FloatArray | None = None  # for which it is known who is in range
 
-    def tune(self, at_ns: int, medium: Medium) -> None:
+    def tune(self, at_ns: int, context: ChannelContext) -> None:
         """The medium's radio has other numbers from `at_ns` on; stages keep what they remember."""
         before = {type(stage): stage for stage in self._stages if stage.remembers}
-        self._radio, self._stages, self._known_pose = medium.radio, chain(medium), None
+        self._radio, self._stages, self._known_pose = context.radio, chain(context), None
         for stage in self._stages:
             if type(stage) in before:
                 stage.go_on_from(before[type(stage)], at_ns)
@@ -91,27 +91,27 @@ class Channel:
     def _reach(self, pose: FloatArray) -> Reach:
         """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
         if pose is not self._known_pose:
-            assert self._radio.range_m is not None  # `Air` has refused a disk without
+            assert self._radio.range_m is not None  # `Air` has refused a unit disk without
             self._known = self._find_reach(pose, self._running, self._size_m, self._radio.range_m)
             self._known_pose = pose
         return self._known
 
 
-# --- The disk's way: a packet's fates are decided when it goes on air, since no other packet changes them.
+# --- The unit disk's way: a packet's fates are decided when it goes on air, since no other packet changes them.
 
 
 NEVER_NS = 2**63 - 1
 
 
-class DiskWay(Way):
+class UnitDisk(RadioModel):
     """Senders with a queue each, then the chain of stages."""
 
-    def __init__(self, medium: Medium) -> None:
-        self._medium = medium
-        self._senders = Senders(medium.radio, len(medium.keys) * medium.robots)
-        self._channel = Channel(medium)
-        self._pose = np.zeros((len(medium.keys) * medium.robots, 3))
-        self._held, self._columns = medium.disruption, len(medium.radio.measures.columns)
+    def __init__(self, context: ChannelContext) -> None:
+        self._context = context
+        self._senders = Senders(context.radio, len(context.keys) * context.robots)
+        self._channel = Channel(context)
+        self._pose = np.zeros((len(context.keys) * context.robots, 3))
+        self._held, self._columns = context.disruption, len(context.radio.measures.columns)
         self._now_ns = 0
 
     @property
@@ -126,7 +126,7 @@ class DiskWay(Way):
     def tune(self, at_ns: int, radio: Radio) -> None:
         """The radio has other numbers for packets handed over, or on air, from `at_ns` on."""
         self._senders.tune(radio)
-        self._channel.tune(at_ns, replace(self._medium, radio=radio))
+        self._channel.tune(at_ns, replace(self._context, radio=radio))
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets: when they will go on air, or be refused, is known at once."""

@@ -1,4 +1,4 @@
-"""Which robots a packet might reach: the links of a disk, found on a grid."""
+"""Which robots a packet might reach: the links of a unit disk, found on a grid."""
 
 # pyright: basic, reportUnknownMemberType=false
 

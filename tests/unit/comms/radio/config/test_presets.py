@@ -102,7 +102,7 @@ def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
     assert loss_db(curve, range_m) == pytest.approx(27.2 - sensitivity_of(radio), abs=1e-6)
 
 
-@pytest.mark.parametrize("model", ["disk", "log-distance"])
+@pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
 def test_what_is_slow_is_received_later_with_distance(model: str):
     """150 m at 1500 m/s take 100 ms, 75 m half of it; of the disk and of signals."""
     place = at((0, 0), (75, 0), (150, 0))

@@ -183,9 +183,9 @@ def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told
     assert results(Radio(range_m=2.0), NEAR, packets([0, 0], [1, NOWHERE])) == []
 
 
-@pytest.mark.parametrize("method", ["disk", *METHODS])
+@pytest.mark.parametrize("method", ["unit-disk", *METHODS])
 def test_a_packet_to_nobody_takes_a_number_and_is_not_acknowledged(method: str):
-    radio = Radio(range_m=2.0) if method == "disk" else with_access(method)
+    radio = Radio(range_m=2.0) if method == "unit-disk" else with_access(method)
     ask = Asking(2)
     of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
     assert of.received("sequence").tolist() == [1, 4]

@@ -1,4 +1,4 @@
-"""A radio with signals whose numbers, antennas or switches change while it runs."""
+"""A radio with a PHY whose numbers, antennas or switches change while it runs."""
 
 from collections.abc import Callable
 from dataclasses import replace
