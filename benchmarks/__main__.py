@@ -10,8 +10,8 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.agent_overhead import agent_overhead
-from benchmarks.air import CASES as AIRS
-from benchmarks.air import air_cost, air_scaling
+from benchmarks.radio import CASES as AIRS
+from benchmarks.radio import air_cost, air_scaling
 from benchmarks.campaign import campaign
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile

@@ -1,4 +1,4 @@
-"""What ns-3 has and what the air has, side by side: Markdown tables for the docs.
+"""What ns-3 has and what the medium has, side by side: Markdown tables for the docs.
 
 `python -m benchmarks.ns3_agreement [TABLE ...] [--runs N] [--ours MODULE:FUNCTION]`; the tables are `contention`,
 `hidden-node` and `distance`, all unless some are named. Figures of ns-3 stand in `tests/support/comms/reference/`.
@@ -28,7 +28,7 @@ TABLES = {
 
 
 class Contention(Protocol):
-    """What the air offers: nodes in one spot that send to all, each at a phase and jitter of its own."""
+    """What the medium offers: nodes in one spot that send to all, each at a phase and jitter of its own."""
 
     def __call__(
         self, *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
@@ -81,7 +81,7 @@ def scenarios() -> list[Scenario]:
 
 
 def measured(contention: Contention, scenario: Scenario, seeds: Sequence[int]) -> Ours:
-    """What the air makes of a scenario."""
+    """What the medium makes of a scenario."""
     found = [
         contention(
             technology=scenario.technology,
@@ -146,7 +146,7 @@ def milliseconds(delay_s: float | None) -> str:
 def of_presets(
     *, technology: str, nodes: int, payload_bytes: int, interval_s: float, seed: int
 ) -> Mapping[str, float | None]:
-    """What the air makes of nodes in one spot with the preset of this technology."""
+    """What the medium makes of nodes in one spot with the preset of this technology."""
     found = contend(radio_in_one_spot(technology), nodes, payload_bytes, interval_s, [seed])
     return {"delivery_ratio": found.delivery_ratio, "mean_delay_s": found.mean_delay_s}
 

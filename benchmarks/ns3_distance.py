@@ -1,4 +1,4 @@
-"""Delivery of 802.15.4 over distance: ns-3's, the formula's, and what the air makes of it."""
+"""Delivery of 802.15.4 over distance: ns-3's, the formula's, and what the medium makes of it."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -12,7 +12,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.reception.error_rates import oqpsk_success
@@ -62,7 +62,7 @@ def delivered(distance_m: float, payload_bytes: int, seeds: Sequence[int], packe
     radio = radio_far_apart("802.15.4")
     arenas = len(seeds)
     keys = np.array([derive_key("distance", seed) for seed in seeds], np.uint64)
-    air = Air(radio, keys, 2, (2.0 * distance_m, 2.0), obstacle_arrays(((),) * arenas), RATE_HZ)
+    air = RadioMedium(radio, keys, 2, (2.0 * distance_m, 2.0), obstacle_arrays(((),) * arenas), RATE_HZ)
     pose = np.tile([[-0.5 * distance_m, 0.0, 0.0], [0.5 * distance_m, 0.0, 0.0]], (arenas, 1))
     sender = 2 * np.arange(arenas)
     sent = SentPackets(sender, np.full(arenas, BROADCAST), Payloads.of([bytes(payload_bytes)] * arenas))

@@ -1,4 +1,4 @@
-"""Hidden nodes: two senders that do not hear each other and one that hears both, in ns-3 and in the air."""
+"""Hidden nodes: two senders that do not hear each other and one that hears both, in ns-3 and in the medium."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -14,7 +14,7 @@ from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Walls
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.truth import Obstacle
 
@@ -59,7 +59,7 @@ def delivered(case: Case, seeds: Sequence[int], packets: int) -> tuple[float, fl
     pose, pillar = places(float(reach_m(curve, case.loss_a_db)), float(reach_m(curve, case.loss_b_db)))
     rate_hz = round(STEPS / case.interval_s)
     keys = np.array([derive_key("hidden node", seed) for seed in seeds], np.uint64)
-    air = Air(radio, keys, ROBOTS, SIZE_M, obstacle_arrays(((pillar,),) * arenas), rate_hz)
+    air = RadioMedium(radio, keys, ROBOTS, SIZE_M, obstacle_arrays(((pillar,),) * arenas), rate_hz)
     air.hold(np.tile(pose, (arenas, 1)), np.ones(ROBOTS * arenas, np.bool_))
     last = WARM_UP + packets
     received = np.zeros(2, np.int64)

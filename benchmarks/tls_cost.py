@@ -27,7 +27,7 @@ from swarmwire.deploy import Simulation
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.folder_access import network_in
 from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import Door, Terms
 from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
@@ -130,7 +130,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
             backends[kind] = backend
         in_turn = InTurn(backends)
         simulation.metrics.begin(simulation.static)
-        loop = Loop(simulation.world, new_air(scenario, simulation.world, None), in_turn, [simulation.metrics])
+        loop = Loop(simulation.world, new_medium(scenario, simulation.world, None), in_turn, [simulation.metrics])
         steps_ns = list[int]()
         for _ in range(ticks):
             before_ns = clock.now_ns()

@@ -88,7 +88,7 @@ def _giver(value: ast.expr, givers: dict[str, str]) -> str:
 
 
 def _lane(node: ast.expr) -> str:
-    """Whose attribute `self.air.x`, `self._events.x` or `world.x` is; empty where it is nobody's of the tick."""
+    """Whose attribute `self.medium.x`, `self._events.x` or `world.x` is; empty where it is nobody's of the tick."""
     if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Attribute | ast.Name):
         return ""
     whose = node.value.attr if isinstance(node.value, ast.Attribute) else node.value.id

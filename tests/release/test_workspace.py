@@ -24,7 +24,7 @@ def requirements(of: dict[str, Any]) -> list[str]:
 
 
 def distribution(requirement: str) -> str:
-    """The name in a requirement such as `swarmwire-comms[air]==0.1.0`."""
+    """The name in a requirement such as `swarmwire-comms[medium]==0.1.0`."""
     return requirement.split("==", maxsplit=1)[0].split(">=", maxsplit=1)[0].split("[", maxsplit=1)[0].strip()
 
 

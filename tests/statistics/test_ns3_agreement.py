@@ -12,7 +12,7 @@ ROW = Scenario("802.15.4", 20, 20, 0.1, 0.9, 0.004, compares_delay=True)
 
 
 def off_by(ratio: float, relative_delay: float) -> Contention:
-    """An air that misses every scenario by so much."""
+    """a medium that misses every scenario by so much."""
     recorded = {
         (row.technology, row.nodes, row.payload_bytes, row.interval_s): row for row in ns3_agreement.scenarios()
     }

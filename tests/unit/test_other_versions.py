@@ -113,7 +113,7 @@ WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
     "request to join": (BadFrame, lambda v: JoinRequest.decode(packed(v=v))),
     "offer": (BadFrame, lambda v: Offer.decode(packed(v=v))),
     "assignment": (BadFrame, lambda v: given_robots(packed(v=v))),
-    "terms of an air": (BadFrame, lambda v: BridgeInfo.decode(packed(v=v))),
+    "terms of a medium": (BadFrame, lambda v: BridgeInfo.decode(packed(v=v))),
     "scene": (BadFrame, lambda v: observer_frames.decode_scene(frame("scene", v))),
     "truth": (BadFrame, lambda v: observer_frames.decode_truth(frame("truth", v), Scene.__new__(Scene))),
     "control": (BadInput, lambda v: control_frames.decode_request(packed(v=v, do="pause"))),

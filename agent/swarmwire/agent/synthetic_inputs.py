@@ -67,7 +67,7 @@ class _Ether:
         self._untold = TxStatuses.joined([self._untold, new])
 
     def tx_status(self, tick: int) -> TxStatuses:
-        """As the air would tell them: also to robots that have dropped out, and to those that have forgotten."""
+        """As the medium would tell them: also to robots that have dropped out, and to those that have forgotten."""
         comes = _uniform(self._key, tick, "learning", (len(self._untold),)) < LEARNING
         told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
         return told

@@ -1,1 +1,1 @@
-"""The contract between world and agents, the wire between them, and the air: what both sides may know."""
+"""The contract between world and agents, the wire between them, and the medium: what both sides may know."""

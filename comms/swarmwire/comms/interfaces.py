@@ -65,7 +65,7 @@ class Put(NamedTuple):
 
 
 class SubtickMedium(Protocol):
-    """The air while a tick goes on, with the poses of its start."""
+    """The medium while a tick goes on, with the poses of its start."""
 
     def send(self, put: Put) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -80,9 +80,9 @@ class TimedBackend(AgentBackend, Protocol):
     """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """What every robot does in this tick, but for packets, which were put on the air.
+        """What every robot does in this tick, but for packets, which were put on air.
 
         `received` and `tx_status` are what came since the last tick, for robots that do not act in this one as well.
         """

@@ -25,14 +25,14 @@ class Fate(Explained):
     TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
     COLLIDED = 12, "other packets on air disturbed it, or the receiver was busy with another or sending itself"
     BURST = 13, "lost by a burst, while the link was in its bad state"
-    CHANNEL_BUSY = 14, "the sender found the air busy each time it listened: never on air"
+    CHANNEL_BUSY = 14, "the sender found the medium busy each time it listened: never on air"
     JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summaries and tables have them
 
 
-# --- Packets as tables: what agents hand to the air, and what the air hands to agents.
+# --- Packets as tables: what agents hand to the medium, and what the medium hands to agents.
 
 
 BROADCAST = -1  # addressed to whoever is within reach
@@ -232,7 +232,7 @@ class TxResult(Explained):
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
     NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not received, or the answer was not"
-    CHANNEL_BUSY = 2, "the radio found the air busy each time it listened, and gave up"
+    CHANNEL_BUSY = 2, "the radio found the medium busy each time it listened, and gave up"
     QUEUE_FULL = 3, "the radio's queue was full: never on air"
     TOO_LARGE = 4, "above the medium's largest payload: never on air"
 

@@ -56,7 +56,7 @@ class Backends:
                 yield GatewayBackend(
                     local,
                     served.groups,
-                    served.air,
+                    served.medium,
                     self.pace,
                     self.static.rate_hz,
                     served.show,

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
@@ -21,12 +21,12 @@ TICKS = 5  # by which packets of the first have come, and are over
 PACKET = b"\0"
 
 
-def rehearse(world: World, air: Air | None, metrics: Iterable[Metric]) -> None:
-    """Run a world and an air that nobody needs any more: every robot drives and sends, and metrics are measured."""
+def rehearse(world: World, medium: RadioMedium | None, metrics: Iterable[Metric]) -> None:
+    """Run a world and a medium that nobody needs any more: every robot drives and sends, and metrics are measured."""
     observers = [Metrics(tuple(metrics)), RadioTally()]
     for observer in observers:
         observer.begin(world.static)
-    Loop(world, air, _Extras(world.static, sends=air is not None), observers).run(TICKS)
+    Loop(world, medium, _Extras(world.static, sends=medium is not None), observers).run(TICKS)
 
 
 class _Extras:

@@ -36,7 +36,7 @@ from swarmwire.deploy.kept_memory import keep_memory
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedBackend
@@ -215,7 +215,7 @@ class Simulation:
             self._origin = self._begin_record()
             if self._pace:  # before anything answers, and the pace begins
                 world = self._new_world(None, self.static.seeds)
-                rehearse(world, new_air(self.scenario, world, self._traces), self.metrics.metrics)
+                rehearse(world, new_medium(self.scenario, world, self._traces), self.metrics.metrics)
             pace = self._pace.factor if self._pace else 1.0
             served = self._behind.served(self.world, self.agents, self._clock, pace, self.folder, self._record.say)
             self.served = stack.enter_context(served)
@@ -319,7 +319,7 @@ class Simulation:
         acting = self._record.recorded(acting, self._from_outside)
         return Loop(
             self.world,
-            new_air(self.scenario, self.world, self._traces),
+            new_medium(self.scenario, self.world, self._traces),
             acting,
             self._watching,
             self.scenario.events,

@@ -13,7 +13,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.analysis.contention import contention
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.deploy.radio.probe import radio_of
 from swarmwire.metrics.drawing.looks import INK
 
@@ -86,14 +86,14 @@ def throughput(load: float) -> float:
     settings += ["radio.reception.model=threshold", "radio.reception.least_sinr_db=3"]
     radio = radio_of("ieee802154", settings)
     keys = np.array([derive_key("figure of access")], np.uint64)
-    air = Air(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
+    medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
     rows = np.arange(SENDERS)
     sent = SentPackets(rows, np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
-    air.hold(np.zeros((SENDERS + 1, 3)), np.ones(SENDERS + 1, np.bool_))
+    medium.hold(np.zeros((SENDERS + 1, 3)), np.ones(SENDERS + 1, np.bool_))
     received = 0
     for tick in range(TICKS + 2):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        received += int(air.advance(at_ns).tally.fates[0, Fate.RECEIVED])
+        received += int(medium.advance(at_ns).tally.fates[0, Fate.RECEIVED])
         if tick < TICKS:
-            air.send(at_ns, tick, sent)
+            medium.send(at_ns, tick, sent)
     return load * received / (SENDERS * TICKS)

@@ -13,7 +13,7 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 
 WANTED_LOSS_DB = 70.0
@@ -48,17 +48,17 @@ def share_received(radio: Radio, sir_db: float, place: int) -> float:
     curve = radio.loss_model.curve(radio.frequency_hz)
     wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
     keys = np.array([derive_key("figure of capture", arena) for arena in range(ARENAS)], np.uint64)
-    air = Air(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
+    medium = RadioMedium(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
     pose = np.array([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]])
-    air.hold(np.tile(pose, (ARENAS, 1)), np.ones(3 * ARENAS, np.bool_))
+    medium.hold(np.tile(pose, (ARENAS, 1)), np.ones(3 * ARENAS, np.bool_))
     received = 0
     for frame in range(FRAMES):
         for sender, at_ns in order(place, frame * PAIR_NS):
-            received += told(air, at_ns)
+            received += told(medium, at_ns)
             rows = 3 * np.arange(ARENAS) + sender
             payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * ARENAS)
-            air.send(at_ns, frame, SentPackets(rows, np.full(ARENAS, 2), payloads))
-    received += told(air, FRAMES * PAIR_NS)
+            medium.send(at_ns, frame, SentPackets(rows, np.full(ARENAS, 2), payloads))
+    received += told(medium, FRAMES * PAIR_NS)
     return received / (ARENAS * FRAMES)
 
 
@@ -67,7 +67,7 @@ def order(place: int, at_ns: int) -> list[tuple[int, int]]:
     return sorted([(0, at_ns + LATER_NS * (place > 0)), (1, at_ns + LATER_NS * (place < 0))], key=lambda one: one[1])
 
 
-def told(air: Air, until_ns: int) -> int:
+def told(medium: RadioMedium, until_ns: int) -> int:
     """How many frames of robot 0 were received."""
-    done = air.advance(until_ns).finished
+    done = medium.advance(until_ns).finished
     return int(np.count_nonzero((done.sender == 0) & (done.fate == Fate.RECEIVED)))

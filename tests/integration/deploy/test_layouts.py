@@ -9,7 +9,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.agents import agent_specs
 from swarmwire.deploy.endpoint import local_endpoint, new_run_id
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.backends import allocation as assignments
@@ -58,7 +58,7 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
         processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
         try:
             backend.start()
-            loop = Loop(simulation.world, new_air(simulation.scenario, simulation.world, traces=None), backend, [])
+            loop = Loop(simulation.world, new_medium(simulation.scenario, simulation.world, traces=None), backend, [])
             loop.run(simulation.ticks)
         finally:
             backend.close()

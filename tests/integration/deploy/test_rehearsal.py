@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation
 from swarmwire.deploy import simulation as simulation_module
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.deploy.rehearsal import rehearse
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.swarm.speed import Speed
@@ -28,7 +28,7 @@ def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measure
 
     monkeypatch.setattr(Metrics, "see", seen)
     before = world.pose.copy()
-    rehearse(world, new_air(scenario, world, None), [Speed()])
+    rehearse(world, new_medium(scenario, world, None), [Speed()])
     assert np.hypot(*(world.pose - before)[:, :2].T).min() > 0.0
     assert fates[Fate.RECEIVED] > 0
 

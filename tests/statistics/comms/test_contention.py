@@ -10,7 +10,7 @@ from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Antenna, Noise, Reception
 from swarmwire.comms.radio.config.radio import Radio
 from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import at, make_air, packets, run
+from tests.support.comms.radio.runs import at, make_medium, packets, run
 
 CSMA = replace(with_access("csma-802154"), send_offset="uniform", queue_limit=10**6)
 DCF_B = replace(
@@ -76,7 +76,7 @@ def test_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stated: 
     """12,000 frames or more, lost in pairs: standard errors of 0.005 at most, so that 0.02 are 4 (1 in 16,000 each)."""
     pose = at(*((0.01 * i, 0.0) for i in range(nodes)))
     sent = packets(np.repeat(np.arange(nodes), PER_TICK[radio.frame]), size=100)
-    told = run(make_air(radio, nodes), pose, lambda _: sent, TICKS[radio.frame])
+    told = run(make_medium(radio, nodes), pose, lambda _: sent, TICKS[radio.frame])
     fate = told.on_air("fate")
     received, collided = (int(np.count_nonzero(fate == kind)) for kind in (Fate.RECEIVED, Fate.COLLIDED))
     frames = (received + collided) / (nodes - 1)

@@ -50,7 +50,7 @@ def readings(tick: int, rows: list[int], rays: int = 8) -> GroupReadings:
 
 
 def received_from(sent: SentPackets, receivers: list[int]) -> ReceivedPackets:
-    """What was sent, received by all of these robots but its sender, in the order that the air keeps."""
+    """What was sent, received by all of these robots but its sender, in the order that the medium keeps."""
     sent = by_sender(sent)
     pairs = [(to, p) for to in receivers for p in range(len(sent)) if sent.sender[p] != to]
     receiver, payload = (np.array([pair[i] for pair in pairs], np.int64) for i in (0, 1))

@@ -12,7 +12,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.truth import Static, Truth
 from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import make_air, scattered
+from tests.support.comms.radio.runs import make_medium, scattered
 from tests.support.metrics.truths import static, truth
 from tests.unit.comms.radio.test_accounts import OBSTACLES, random_traffic
 
@@ -30,20 +30,20 @@ def ticks(radio: Radio, of: Static, seed: int, count: int = 12) -> Iterator[Trut
     """So many ticks in the loop's order; a robot dies in the midst, and lives again."""
     rng = np.random.default_rng(seed)
     rows = of.arenas * of.robots
-    air = make_air(radio, of.robots, of.seeds, [OBSTACLES] * of.arenas)
+    medium = make_medium(radio, of.robots, of.seeds, [OBSTACLES] * of.arenas)
     pose, states = scattered(rows, seed), Disruption.none(rows)
     for tick in range(count):
         at_ns = tick_start_ns(tick, of.rate_hz)
         alive = np.ones(rows, np.bool_)
         alive[0] = not count // 3 <= tick < 2 * count // 3
-        air.disrupt(replace(states, alive=alive))
-        news = air.advance(at_ns)
+        medium.disrupt(replace(states, alive=alive))
+        news = medium.advance(at_ns)
         pose = pose + rng.normal(0.0, 0.2, pose.shape)
-        air.hold(pose, alive)
+        medium.hold(pose, alive)
         sent = random_traffic(rng, of.arenas, of.robots)
         living = np.flatnonzero(alive[sent.sender])
         sent = replace(sent, sender=sent.sender[living], to=sent.to[living], payloads=sent.payloads.rows(living))
-        air.send(at_ns, tick, sent)
+        medium.send(at_ns, tick, sent)
         yield truth(of, tick, pose=pose, alive=alive, tally=news.tally, finished=news.finished, departed=news.departed)
 
 

@@ -17,7 +17,7 @@ from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.backends.allocation import split, whole
 from swarmwire.world.backends.join_policy import Terms
 from swarmwire.world.backends.lockstep import Lockstep
@@ -77,7 +77,7 @@ class SmallRun:
         agents = {name: group.agent for name, group in scenario.robots.items()}
         kinds = {name: load_agent(agent) for name, agent in agents.items()}
         self.world = World(scenario, (1,), {name: kind.needs for name, kind in kinds.items()})
-        self.loop = Loop(self.world, new_air(scenario, self.world, None), self, ())
+        self.loop = Loop(self.world, new_medium(scenario, self.world, None), self, ())
         self.whole = whole(scenario, self.world.static, agents)
         self.parts: Sequence[Assignment] = split(self.whole, len(RUNNERS))
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}

@@ -9,7 +9,7 @@ from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
 from swarmwire.world.backends import allocation as assignments
@@ -60,8 +60,8 @@ def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30,
     world = World(scenario, [1], {})
     keys, size_m = world.keys, scenario.arena.size_m
     assert scenario.radio
-    air = Air(scenario.radio, keys, len(poses), size_m, obstacle_arrays(world.static.obstacles), 10)
-    Loop(world, air, backend or Ahead(), [watch], scenario.events).run(ticks)
+    medium = RadioMedium(scenario.radio, keys, len(poses), size_m, obstacle_arrays(world.static.obstacles), 10)
+    Loop(world, medium, backend or Ahead(), [watch], scenario.events).run(ticks)
     return watch.seen
 
 
@@ -173,7 +173,7 @@ def test_a_ramp_changes_the_radio_tick_by_tick_and_only_while_it_moves():
 
 def test_the_air_is_tuned_only_when_a_number_changes(monkeypatch: pytest.MonkeyPatch):
     tuned: list[float] = []
-    monkeypatch.setattr(Air, "tune", lambda _, radio: tuned.append(radio.loss))
+    monkeypatch.setattr(RadioMedium, "tune", lambda _, radio: tuned.append(radio.loss))
     ran(TWO, [{"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}], 20)
     assert tuned == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
 

@@ -1,4 +1,4 @@
-"""The air of a backend that takes its time: no packet is lost between ticks, and nothing depends on when one looks."""
+"""The radio between ticks: no packet is lost there, and nothing depends on when one looks."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,12 +13,12 @@ from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, Receive
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.deploy.new_air import new_air
+from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.world import World
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_air, scattered
+from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_medium, scattered
 from tests.support.comms.radio.traffic import RADIOS
 from tests.support.world.samples import SAMPLE
 
@@ -36,9 +36,9 @@ def static(robots: int, arenas: int = 1) -> Static:
 
 
 def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> SubtickRadio:
-    air = make_air(radio, robots, range(arenas))
-    air.hold(scattered(robots * arenas), np.ones(robots * arenas, np.bool_))
-    return SubtickRadio(air, static(robots, arenas), lambda sent: sent)
+    medium = make_medium(radio, robots, range(arenas))
+    medium.hold(scattered(robots * arenas), np.ones(robots * arenas, np.bool_))
+    return SubtickRadio(medium, static(robots, arenas), lambda sent: sent)
 
 
 def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
@@ -48,13 +48,13 @@ def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int,
 
 
 def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
-    air = in_time(Radio(99.0, latency_s=0.002))
-    air.begin(0)
-    air.send(Put(10 * MS, None, packet(0)))
-    assert received_at(air.advance(12 * MS)[0]) == []
-    assert received_at(air.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
-    assert received_at(air.advance(13 * MS)[0]) == []
-    told, rest, _ = air.begin(TICK_NS)
+    medium = in_time(Radio(99.0, latency_s=0.002))
+    medium.begin(0)
+    medium.send(Put(10 * MS, None, packet(0)))
+    assert received_at(medium.advance(12 * MS)[0]) == []
+    assert received_at(medium.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
+    assert received_at(medium.advance(13 * MS)[0]) == []
+    told, rest, _ = medium.begin(TICK_NS)
     assert (received_at(told.received), received_at(rest)) == (
         [(0, 12 * MS)],
         [],
@@ -62,25 +62,25 @@ def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
 
 
 def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
-    air = in_time(Radio(99.0, send_offset=0.05))
-    air.begin(0)
-    air.send(Put(1 * MS, 0, packet(0)))
-    air.send(Put(2 * MS, None, packet(0)))
-    air.send(Put(60 * MS, 0, packet(2)))  # too late for its turn: at once
-    assert received_at(air.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
+    medium = in_time(Radio(99.0, send_offset=0.05))
+    medium.begin(0)
+    medium.send(Put(1 * MS, 0, packet(0)))
+    medium.send(Put(2 * MS, None, packet(0)))
+    medium.send(Put(60 * MS, 0, packet(2)))  # too late for its turn: at once
+    assert received_at(medium.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
 
 
 def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
-    air = in_time(Radio(99.0, send_offset=0.25))
-    air.begin(0)
-    air.send(Put(1 * MS, 0, packet(0)))
-    air.send(Put(2 * MS, 0, packet(1)))
+    medium = in_time(Radio(99.0, send_offset=0.25))
+    medium.begin(0)
+    medium.send(Put(1 * MS, 0, packet(0)))
+    medium.send(Put(2 * MS, 0, packet(1)))
     for tick in (1, 2):
-        assert not len(air.begin(tick * TICK_NS)[0].received)
-    assert received_at(air.begin(3 * TICK_NS)[0].received) == [(0, 250 * MS)]
-    air.send(Put(301 * MS, 3, packet(3)))
-    air.end()
-    assert air._air.end().intended.sum() == 3
+        assert not len(medium.begin(tick * TICK_NS)[0].received)
+    assert received_at(medium.begin(3 * TICK_NS)[0].received) == [(0, 250 * MS)]
+    medium.send(Put(301 * MS, 3, packet(3)))
+    medium.end()
+    assert medium._medium.end().intended.sum() == 3
 
 
 @settings(max_examples=60, deadline=None)
@@ -94,7 +94,7 @@ def test_fates_add_up_and_subticks_change_nothing(radio: Radio, seed: int, subti
 
 def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
     rng = np.random.default_rng(seed)
-    air, robots = in_time(radio, 5, 2), 5
+    medium, robots = in_time(radio, 5, 2), 5
     received, tallies = list[Any](), list[Tally]()
 
     def keep(told: ReceivedPackets) -> None:
@@ -103,7 +103,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
 
     for tick in range(5):
         start_ns = tick_start_ns(tick, RATE_HZ)
-        news, rest, _ = air.begin(start_ns)
+        news, rest, _ = medium.begin(start_ns)
         tallies.append(news.tally)
         keep(rest)
         arenas = 1 if one_leaves and tick > 2 else 2
@@ -113,16 +113,16 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
         ]
         for at_ns, sender, at_once in sorted([*puts, *((start_ns + look * MS, -1, True) for look in looks_ms)]):
             if sender < 0:
-                keep(air.advance(at_ns)[0])
+                keep(medium.advance(at_ns)[0])
             else:
-                air.send(Put(at_ns, None if at_once else tick, packet(sender)))
-        keep(air.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
+                medium.send(Put(at_ns, None if at_once else tick, packet(sender)))
+        keep(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
         if one_leaves and tick == 2:
             over = np.array([False, True])
-            air.leave(over)
-            tallies.append(air._air.leave(over))
-    air.end()
-    tallies.append(air._air.end())
+            medium.leave(over)
+            tallies.append(medium._medium.leave(over))
+    medium.end()
+    tallies.append(medium._medium.end())
     total = sum(tallies[1:], tallies[0])
     return (sorted(received), total.fates.tolist(), total.in_range.tolist()), total.fates.sum(), total.intended.sum()
 
@@ -142,14 +142,14 @@ class Sender:
         raise AssertionError("a backend that takes its time is asked in time")
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
-        air.send(Put(start_ns + 5 * MS, None, packet(0)))
+        medium.send(Put(start_ns + 5 * MS, None, packet(0)))
         wrong = packet(0)
-        air.send(Put(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
-        self.told += received_at(air.advance(start_ns + 50 * MS)[0])
+        medium.send(Put(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
+        self.told += received_at(medium.advance(start_ns + 50 * MS)[0])
         return Actions.joined([])
 
     def counts(self) -> dict[str, int]:
@@ -181,7 +181,7 @@ class Tallies:
 def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1], {}), Sender(), Tallies()
-    loop = Loop(world, new_air(scenario, world, None), backend, [seen], timed=backend)
+    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], timed=backend)
     loop.run(5)
     last = loop.end()
     assert last is not None
@@ -207,20 +207,20 @@ class FromBoth(Sender):
     """Robot 0 of each arena sends late in each tick, also where the arena is over."""
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):
-            air.send(Put(start_ns + 5 * MS, None, packet(sender)))
-            air.send(Put(start_ns + 5 * MS, tick, packet(sender + 1)))
-        air.advance(start_ns + 99 * MS)
+            medium.send(Put(start_ns + 5 * MS, None, packet(sender)))
+            medium.send(Put(start_ns + 5 * MS, tick, packet(sender + 1)))
+        medium.advance(start_ns + 99 * MS)
         return Actions.joined([])
 
 
 def test_of_an_arena_that_leaves_what_was_received_within_its_last_tick_counts_and_the_rest_is_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
-    loop = Loop(world, new_air(scenario, world, None), backend, [seen], judge=OverAfter(3), timed=backend)
+    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], judge=OverAfter(3), timed=backend)
     loop.run(6)
     last = loop.end()
     assert last is not None

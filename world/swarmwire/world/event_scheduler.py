@@ -12,7 +12,7 @@ from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Happened, Static
 from swarmwire.world.world import World
 
@@ -66,7 +66,7 @@ class Events:
         if serial in self._course.begun and serial not in self._course.over:
             insort(self._coming, (start_ns, False, serial))
 
-    def apply(self, start_ns: int, world: World, air: Air | None) -> tuple[Happened, ...]:
+    def apply(self, start_ns: int, world: World, medium: RadioMedium | None) -> tuple[Happened, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
         happened: list[Happened] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
@@ -83,16 +83,16 @@ class Events:
             world.fail(self._conditions.failed_parts)
             if (by_mps := self._conditions.take_pushes()) is not None:
                 world.push(by_mps)
-            if air:
-                air.disrupt(self._conditions.disruption())
-        if air and self._radio:
-            self._tune(air, self._conditions.radio_at(self._radio, start_ns))
+            if medium:
+                medium.disrupt(self._conditions.disruption())
+        if medium and self._radio:
+            self._tune(medium, self._conditions.radio_at(self._radio, start_ns))
         return tuple(happened)
 
-    def _tune(self, air: Air, radio: Radio) -> None:
+    def _tune(self, medium: RadioMedium, radio: Radio) -> None:
         known = self._course.radio
         if radio is not known and radio != known:  # as most often it is the same, which costs nothing
-            air.tune(radio)
+            medium.tune(radio)
             self._course.radio = radio
 
     def _plan(self, serial: int, event: Event, at_ns: int) -> None:

@@ -10,7 +10,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static, Tally, Truth
@@ -73,7 +73,7 @@ class Loop:
     def __init__(
         self,
         world: World,
-        air: Air | None,
+        medium: RadioMedium | None,
         backend: AgentBackend,
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
@@ -84,18 +84,18 @@ class Loop:
         """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
 
         `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it
-        is to put packets on the air and hand them over while a tick goes on.
+        is to put packets on air and hand them over while a tick goes on.
         """
-        self.world, self.air, self.backend, self.observers = world, air, backend, observers
+        self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
         self._judge = judge
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._interventions = interventions
         course = interventions.course if interventions else None
-        self._events = Events(events, world.static, world.keys, air.radio if air else None, course)
+        self._events = Events(events, world.static, world.keys, medium.radio if medium else None, course)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
-        self._in_time = SubtickRadio(air, world.static, self._addressable) if air and timed else None
+        self._in_time = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
         self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
         self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
         self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
@@ -119,7 +119,7 @@ class Loop:
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
-        events = self._events.apply(start_ns, world, self.air)
+        events = self._events.apply(start_ns, world, self.medium)
         news, packets, tx_status = self._receive(start_ns)
         readings = world.sense(tick)
         actions = self._act(start_ns, readings, packets, tx_status)
@@ -128,7 +128,7 @@ class Loop:
         onsets = world.move(actions)
         command = world.command
         self._hash.add(pose, velocity, command, received)
-        edges = self.air.edges(pose, alive) if self.air else None
+        edges = self.medium.edges(pose, alive) if self.medium else None
         tally, finished = (news.tally, news.finished) if news else (None, None)
         self._open = None
         truth = Truth(
@@ -161,12 +161,12 @@ class Loop:
         return truth
 
     def end(self) -> Tally | None:
-        """End the air: what was in flight, and what no observer has seen of a tick that was broken off."""
-        if self.air is None:
+        """End the medium: what was in flight, and what no observer has seen of a tick that was broken off."""
+        if self.medium is None:
             return None
         if self._in_time:
             self._in_time.end()
-        last = self.air.end()
+        last = self.medium.end()
         for more in (self._stranded, self._open):
             last = last if more is None else last + more
         return last
@@ -206,22 +206,22 @@ class Loop:
             self._open = news.tally
             return news, packets, tx_status
         tick, alive = self.ticks_done, self.world.alive
-        news = self.air.advance(start_ns) if self.air else None
+        news = self.medium.advance(start_ns) if self.medium else None
         self._open = news.tally if news else None
         packets = self._mailbox.hand_over(tick, news.received if news else ReceivedPackets.none(), alive)
         tx_status = self._mailbox.hand_over_tx_status(tick, news.tx_status if news else NO_TX_STATUSES, alive)
         return news, packets, tx_status
 
     def _act(self, start_ns: int, readings: Readings, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        """What the robots do in a tick; what they send is the air's."""
+        """What the robots do in a tick; what they send is the medium's."""
         world, tick = self.world, self.ticks_done
-        if self.air:
-            self.air.hold(world.pose, world.alive.copy())
+        if self.medium:
+            self.medium.hold(world.pose, world.alive.copy())
         if self._timed and self._in_time:
             return self._timed.act_in_time(tick, readings, packets, tx_status, self._in_time)
         actions = self.backend.act(tick, readings, packets, tx_status)
-        if self.air:
-            self.air.send(start_ns, tick, self._addressable(actions.sent))
+        if self.medium:
+            self.medium.send(start_ns, tick, self._addressable(actions.sent))
         elif len(actions.sent):
             np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         return actions
@@ -244,10 +244,10 @@ class Loop:
         self._left_after[over] = self.ticks_done
         self._hash.close(over)
         self.world.leave(over)
-        if self.air:
+        if self.medium:
             if self._in_time:
                 self._in_time.leave(over)
-            stranded = self.air.leave(over)
+            stranded = self.medium.leave(over)
             self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def _addressable(self, sent: SentPackets) -> SentPackets:

@@ -1,4 +1,4 @@
-"""The air of a loop whose backend takes its time: packets are put on it, and received, also in the middle of a tick.
+"""The medium of a loop whose backend takes its time: packets are put on it, and received, also in the middle of a tick.
 
     a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
     it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once
@@ -16,7 +16,7 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import Put, SubtickMedium
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Static
 from swarmwire.world.backends.pacing import Pace
@@ -25,13 +25,13 @@ NEVER_NS = 2**63 - 1
 
 
 class SubtickRadio:
-    """An air between `begin` of one tick and that of the next."""
+    """a medium between `begin` of one tick and that of the next."""
 
-    def __init__(self, air: Air, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
-        """`addressable` makes packets fit for the air, and counts what was wrong with them."""
-        self._air, self._static, self._addressable = air, static, addressable
+    def __init__(self, medium: RadioMedium, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
+        """`addressable` makes packets fit for the medium, and counts what was wrong with them."""
+        self._medium, self._static, self._addressable = medium, static, addressable
         self._rows = static.arenas * static.robots
-        self._waiting = SentPackets.none()  # (k,) that were put on the air, each until its robot's turn comes
+        self._waiting = SentPackets.none()  # (k,) that were put on air, each until its robot's turn comes
         self._turn_ns = np.empty(0, np.int64)  # (k,) NEVER_NS: it came
         self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
@@ -41,8 +41,8 @@ class SubtickRadio:
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
-        received, tx_status = self._air.advance_within(start_ns)
-        return self._air.advance(start_ns), received, tx_status
+        received, tx_status = self._medium.advance_within(start_ns)
+        return self._medium.advance(start_ns), received, tx_status
 
     def send(self, put: Put) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -52,10 +52,10 @@ class SubtickRadio:
         self._release(at_ns)
         sent = self._addressable(put.sent)
         if put.tick is None:
-            self._air.send_at(np.full(self._rows, at_ns), sent)
+            self._medium.send_at(np.full(self._rows, at_ns), sent)
             return
         start_ns = tick_start_ns(put.tick, self._static.rate_hz)
-        turn_ns = np.maximum(at_ns, self._air.turns(start_ns, put.tick)[sent.sender])
+        turn_ns = np.maximum(at_ns, self._medium.turns(start_ns, put.tick)[sent.sender])
         waits = np.flatnonzero(self._turn_ns < NEVER_NS)
         self._waiting = SentPackets.joined([self._waiting.select(waits), sent]) if len(waits) else sent
         self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
@@ -66,14 +66,14 @@ class SubtickRadio:
         """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         self._release(until_ns)
         self._now_ns = until_ns
-        return self._air.advance_within(until_ns)
+        return self._medium.advance_within(until_ns)
 
     def leave(self, over: BoolArray) -> None:
-        """The arenas (arenas,) are over: what waits there for a turn is the air's to end."""
+        """The arenas (arenas,) are over: what waits there for a turn is the medium's to end."""
         self._release(NEVER_NS, over)
 
     def end(self) -> None:
-        """The run is over: what waits for a turn is the air's to end."""
+        """The run is over: what waits for a turn is the medium's to end."""
         self._release(NEVER_NS)
 
     def _release(self, until_ns: int, arenas: BoolArray | None = None) -> None:
@@ -90,14 +90,14 @@ class SubtickRadio:
             first_ns = np.full(self._rows, NEVER_NS)
             first_ns[sender[::-1]] = turn_ns[::-1]
             going = place[turn_ns == first_ns[sender]]
-            self._air.send_at(first_ns, self._waiting.select(going))
+            self._medium.send_at(first_ns, self._waiting.select(going))
             self._turn_ns[going] = NEVER_NS
             self._next_ns = int(self._turn_ns.min())
 
 
 # --- A tick in subticks: the loop wakes many times in it, to take in what came and hand over what is due.
 #
-# In every subtick `take_in` gives what agents sent since, with the time at which it came; these packets go on the air,
+# In every subtick `take_in` gives what agents sent since, with the time at which it came; these packets go on air,
 # it advances to now, and `hand_over` takes what was received. So once more at the tick's end, where commands are taken
 # as ever.
 
@@ -128,20 +128,20 @@ class Subticks:
     def __init__(self, clock: Clock, pace: Pace, rate_hz: int, subtick_s: float) -> None:
         self.subtick_s = subtick_s
         self._clock, self._pace, self._rate_hz, self._subtick_ns = clock, pace, rate_hz, to_ns(subtick_s)
-        self._last_ns = 0  # up to which the air has advanced
+        self._last_ns = 0  # up to which the medium has advanced
         self._wakes_late_ns = 0  # by how much sleeps ended late, of late
 
-    def pass_tick(self, tick: int, air: SubtickMedium, exchange: Exchange) -> None:
+    def pass_tick(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
         """Return once the tick is over by the wall clock, and all that is due by then was handed over."""
         last_ns = self._pace.over_ns(tick) - self._subtick_ns  # later, there may not be the time before the tick's end
         wake_ns = self._clock.now_ns()
         while wake_ns <= last_ns:
             self._sleep_until(wake_ns)
-            self.exchange(tick, air, exchange)
+            self.exchange(tick, medium, exchange)
             # Whoever woke late goes on from there: subticks that were missed are not made up for.
             wake_ns = max(wake_ns + self._subtick_ns, self._clock.now_ns())
         self._pace.hold(tick)
-        self.exchange(tick, air, exchange)
+        self.exchange(tick, medium, exchange)
 
     def _sleep_until(self, at_ns: int) -> None:
         """Sleep, for less by what the machine takes to wake; a little early or late does not matter here."""
@@ -150,7 +150,7 @@ class Subticks:
             self._clock.sleep_until(early_ns)
             self._wakes_late_ns += (self._clock.now_ns() - early_ns - self._wakes_late_ns) // MEAN_OF
 
-    def exchange(self, tick: int, air: SubtickMedium, exchange: Exchange) -> None:
+    def exchange(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
         """Take in what came, and hand over what is due."""
         pace, came = self._pace, exchange.take_in()
         start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
@@ -159,9 +159,9 @@ class Subticks:
         for put in came:
             # The network's threads put in what came in nearly the order in which it did.
             from_ns = min(max(from_ns, pace.simulated_ns(put.at_ns)), now_ns)
-            air.send(put._replace(at_ns=from_ns))
+            medium.send(put._replace(at_ns=from_ns))
         self._last_ns = now_ns
-        received, tx_status = air.advance(now_ns)
+        received, tx_status = medium.advance(now_ns)
         if len(received) or len(tx_status):
             exchange.hand_over(tick, now_ns, received, tx_status)
             pace.handed_over(received.received_at_ns)

@@ -53,7 +53,7 @@ class BeaconAvoidance(VectorAgent[Traffic]):
     has to turn.
 
     Our own rule, of the kind of Reynolds's unaligned collision avoidance (Steering Behaviors, 1999). No packet tells
-    how long the air had it: what `latency_s` does not name makes neighbours seem where they were.
+    how long the medium had it: what `latency_s` does not name makes neighbours seem where they were.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("compass", "radio.range", "radio.bearing")

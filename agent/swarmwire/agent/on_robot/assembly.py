@@ -98,7 +98,7 @@ def network_parts(plan: Plan, clock: DatedClock, log: RadioLog | None, say: Say,
 def _opened_tracker(
     settings: RobotSettings, session: "zenoh.Session", keys: "SwarmKeys", closing: ExitStack
 ) -> "Tracker | None":
-    """Poses of all robots, or only its own: the air of a world tells range and bearing itself."""
+    """Poses of all robots, or only its own: the medium of a world tells range and bearing itself."""
     from swarmwire.agent.radios.tracker import Tracker
 
     if not settings.tracker:
@@ -126,7 +126,7 @@ def _made_radio(
     if radio.kind == "zenoh":
         asks_pose = any(need in OF_POSES for need in plan.agent.needs)
         return ZenohRadio(session, keys, robots, own, radio.max_payload_bytes, clock, tracker, asks_pose, log, say)
-    return WorldRadio(session, keys, robots, own, clock, log) if radio.kind == "air" else NoRadio()
+    return WorldRadio(session, keys, robots, own, clock, log) if radio.kind == "world" else NoRadio()
 
 
 def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Callable[[], list[str]]]:
@@ -227,7 +227,7 @@ def _assembled(
     network = network_parts(plan, clock, log, onlookers.say, closing)
     onlookers.look = network.look
     offer = plan.offer
-    if settings.radio.kind == "air":
+    if settings.radio.kind == "world":
         offer = replace(offer, radio_gives=network.radio.needs)
         check_needs(plan.agent.__name__, plan.agent.needs, offer, plan.where)
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, settings.seed)

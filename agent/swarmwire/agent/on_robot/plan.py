@@ -68,7 +68,7 @@ def _of_radio(need: str, offer: Offer) -> str | None:
     if need in offer.radio_gives:
         return None
     if offer.radio == "none":
-        return 'only a radio tells: expected radio.kind "zenoh" or "air"'
+        return 'only a radio tells: expected radio.kind "zenoh" or "world"'
     if need in OF_POSES and offer.radio == "zenoh":
         return "a real radio does not tell: expected tracker = true"
     measures = ", ".join(sorted(offer.radio_gives)) or "nothing of a packet"
@@ -180,7 +180,7 @@ def plan_of(settings: RobotSettings, where: str, clock: DatedClock) -> Plan:
     limits = limits_for(body, settings.max_linear_mps, settings.max_angular_radps, where)
     plan = Plan(settings, where, agent, params, body, driver, limits)
     needs = agent.needs
-    if settings.radio.kind == "air":  # what the air tells is known once it was joined
+    if settings.radio.kind == "world":  # what the medium tells is known once it was joined
         needs = tuple(need for need in needs if not need.startswith("radio."))
     check_needs(agent.__name__, needs, plan.offer, where)
     if settings.network and settings.network.proves:

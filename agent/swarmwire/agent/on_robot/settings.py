@@ -32,8 +32,8 @@ class RadioSettings:
 
     kind: str = parameter(
         "none",
-        help="the robots' own network, the air of a world that emulates others nearby, or none",
-        choices=("zenoh", "air", "none"),
+        help="the robots' own network, the medium of a world that emulates others nearby, or none",
+        choices=("zenoh", "world", "none"),
     )
     max_payload_bytes: int = parameter(
         100, help="largest message, its tag included; larger ones are not sent", unit="B", at_least=2, at_most=65535
@@ -217,7 +217,7 @@ CURES = {  # as errors name the keys
     "ca, certificate and key": "--ca, --certificate and --key",
     "insecure = true": "--insecure",
     "tracker = true": "--tracker",
-    'radio.kind "zenoh" or "air"': "--radio zenoh or --radio air",
+    'radio.kind "zenoh" or "world"': "--radio zenoh or --radio world",
     "rate_hz": "--rate-hz",
 }
 
@@ -269,8 +269,8 @@ def _in_flags(text: str) -> str:
 
     >>> _in_flags("expected listen, connect or multicast = true")
     'expected --listen, --connect or --multicast'
-    >>> _in_flags('expected radio.kind "zenoh" or "air"')
-    'expected --radio zenoh or --radio air'
+    >>> _in_flags('expected radio.kind "zenoh" or "world"')
+    'expected --radio zenoh or --radio world'
     """
     for keys, told in CURES.items():
         text = text.replace(keys, told)

@@ -1,1 +1,1 @@
-"""Radios of an agent on a robot: the robots' own network, or the air of a world nearby."""
+"""Radios of an agent on a robot: the robots' own network, or the medium of a world nearby."""

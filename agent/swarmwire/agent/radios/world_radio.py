@@ -1,4 +1,4 @@
-"""The air of a world nearby as a radio: what this robot sends is on air there, and it hears what it would there.
+"""The medium of a world nearby as a radio: what this robot sends is on air there, and it hears what it would there.
 
 It joins by asking for its terms, which say what the world's radio gives; then `actions` frames go there, of which only
 the packets count, and `tick` frames come back, which hold no senses.
@@ -20,7 +20,7 @@ from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, t
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
-from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_air
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_bridged
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 
@@ -41,7 +41,7 @@ class _Arrival(NamedTuple):
 
 
 class WorldRadio:
-    """The radio of the robot `own`, one of `robots`, in the air of the world that answers in this network.
+    """The radio of the robot `own`, one of `robots`, in the medium of the world that answers in this network.
 
     Attributes:
         terms: what the world's radio is to this robot; None before `open`. So are `needs` and `measures` empty.
@@ -71,14 +71,14 @@ class WorldRadio:
         self.needs: frozenset[str] = frozenset()
 
     def open(self) -> None:
-        """Join the air; BadInput if there is no world in the network, or this robot or its swarm is not in it."""
+        """Join the medium; BadInput if there is no world in the network, or this robot or its swarm is not in it."""
         terms = self._join()
         if terms.robots != self._robots:
             given = ", ".join(terms.robots)
             raise BadInput("robots", "", f"expected the robots of the world, in its order: {given}")
         self.terms, self.measures, self.needs = terms, terms.measures, frozenset(terms.needs)
         self._subscriber = self._session.declare_subscriber(
-            self._keys.air_received(self._own), Callback(self._arrive, indirect=False)
+            self._keys.bridge_received(self._own), Callback(self._arrive, indirect=False)
         )
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
@@ -87,7 +87,7 @@ class WorldRadio:
         started_ns = self._clock.now_ns() - now_ns
         for arrival in self._inbox.take():
             try:
-                tick, its, told = decode_air(arrival.frame, terms)
+                tick, its, told = decode_bridged(arrival.frame, terms)
             except BadFrame as error:
                 self._counted[f"frames_{error.fault}"] += 1
                 continue
@@ -117,7 +117,7 @@ class WorldRadio:
         self._frames += 1
         try:
             self._session.put(
-                self._keys.air_sent(self._own),
+                self._keys.bridge_sent(self._own),
                 encode_actions(self._frames, still),
                 congestion_control=zenoh.CongestionControl.DROP,
             )
@@ -141,17 +141,17 @@ class WorldRadio:
         """The world's answer; the network may still be on its way up."""
         end_ns = self._wall.now_ns() + to_ns(JOIN_S)
         while (left_ns := end_ns - self._wall.now_ns()) > 0:
-            for reply in self._session.get(self._keys.air_join(self._own), timeout=min(ONE_TRY_S, to_s(left_ns))):
+            for reply in self._session.get(self._keys.bridge_join(self._own), timeout=min(ONE_TRY_S, to_s(left_ns))):
                 if reply.ok is not None:
                     try:
                         return BridgeInfo.decode(reply.ok.payload.to_bytes())
                     except BadFrame as error:
-                        raise BadInput("radio", "air", f"expected a world of this version: {error}") from error
+                        raise BadInput("radio", "world", f"expected a world of this version: {error}") from error
                 if reply.err is not None and (error := reply.err.payload.to_string()) != "Timeout":
-                    raise BadInput("radio", "air", error)
+                    raise BadInput("radio", "world", error)
             self._wall.sleep_until(min(self._wall.now_ns() + AGAIN_NS, end_ns))
         expected = f"expected a world that lends its air to {self._own}; none in the network answers"
-        raise BadInput("radio", "air", expected)
+        raise BadInput("radio", "world", expected)
 
     def _joined(self) -> BridgeInfo:
         if self.terms is None:
@@ -184,7 +184,7 @@ class WorldRadio:
                 utc_ns=int(received.received_at_ns[at]) + dated_ns,
                 sender=int(received.sender[at]),
                 sequence=int(received.sequence[at]),
-                to=BROADCAST,  # whom it was addressed to the air does not tell
+                to=BROADCAST,  # whom it was addressed to the medium does not tell
                 size_bytes=int(sizes[payload]),
                 tag=int(tags[payload]),
                 latency_ns=None,

@@ -152,7 +152,7 @@ class Conditions:
         return radio_at(radio, self.slopes.values(), at_ns) if self.slopes else radio
 
     def disruption(self) -> Disruption:
-        """All that matters to the air, as it is now."""
+        """All that matters to the medium, as it is now."""
         gain_db = sum(self.gains.values(), np.zeros((2, self.rows)))
         return Disruption(
             alive=self.alive,

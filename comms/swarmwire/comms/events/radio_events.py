@@ -89,7 +89,7 @@ MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes a
 
 @dataclass(frozen=True, kw_only=True)
 class Jammer(LastingEvent):
-    """A jammer adds its power to the noise of every robot of its arena: frames drown, and the air counts as busy.
+    """A jammer adds its power to the noise of every robot of its arena: frames drown, and the medium counts as busy.
 
     It stands at a place, or robots carry it; who carries one is spared by it, and goes on carrying it when dead. Its
     power falls by the radio's own path loss, shadowing and walls. It is on for `duty` of each period, from a phase

@@ -1,7 +1,7 @@
 """Actions by the name that a scenario's `do` gives. A new one is a file like `kill.py` and its line here.
 
 What an action changes lies in `Conditions`: a new kind of effect is a new field there, read by world or, as part of
-the `Disruption` that it makes, by the air.
+the `Disruption` that it makes, by the medium.
 """
 
 from swarmwire.comms.events.event import Event

@@ -1,4 +1,4 @@
-"""Obstacles as arrays, and rays against them. Compiled; shared by the world's sensors and the air's line of sight.
+"""Obstacles as arrays, and rays against them. Compiled; shared by the world's sensors and the medium's line of sight.
 
 A box is a polygon with four sides: there are circles and convex polygons, nothing else.
 """

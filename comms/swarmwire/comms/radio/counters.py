@@ -1,4 +1,4 @@
-"""The books of the air: packets and receivers counted between two reports."""
+"""The books of the medium: packets and receivers counted between two reports."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -13,9 +13,9 @@ from swarmwire.comms.truth import Tally
 
 
 class Accounts:
-    """Counts by arena. Over a run, `end` of the air included, the fates add up to the intended receivers.
+    """Counts by arena. Over a run, `end` of the medium included, the fates add up to the intended receivers.
 
-    - `sent`, `intended`: when a packet is handed to the air, refused packets included.
+    - `sent`, `intended`: when a packet is handed to the medium, refused packets included.
     - `fates`: when a fate becomes final, once for each intended receiver.
     - `in_range`: with the fate, for receivers that range and walls did not keep off; also those that a packet refused
       for a full queue would have had. Never those of packets too large or in flight at the end.
@@ -26,7 +26,7 @@ class Accounts:
         self._open()
 
     def take_up(self, packets: Transmissions) -> None:
-        """Count packets that were handed to the air."""
+        """Count packets that were handed to the medium."""
         arena = packets.sender // self._robots
         np.add.at(self._sent, arena, 1)
         np.add.at(self._intended, arena, packets.intended)

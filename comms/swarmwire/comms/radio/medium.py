@@ -1,6 +1,6 @@
 """Kept order: packets of a link are received in the order in which they went on air, whatever their delays.
 
-What counts of the past are receptions that are still to come: they are all among the links that the air keeps, so
+What counts of the past are receptions that are still to come: they are all among the links that the medium keeps, so
 that there is no state beside these. A reception that an event has ended holds up nothing.
 """
 
@@ -48,14 +48,14 @@ def _wait(sender, receiver, final_at_ns, order, first):
             final_at_ns[now] = max(final_at_ns[now], final_at_ns[before])
 
 
-# --- The air as a state machine: packets and poses go in, time passes, and what was received comes out. No I/O, no
+# --- The medium as a state machine: packets and poses go in, time passes, and what was received comes out. No I/O, no
 # clock.
 
 
 PARTS = 8  # of what is told within a tick that are kept before they are put together
 
 
-class Air:
+class RadioMedium:
     """The emulated medium of every arena of a world; robot row r is robot r % robots of arena r // robots.
 
     `radio` is what it goes by at the moment.

@@ -1,4 +1,4 @@
-"""A way through the medium: what the air asks of it, whatever the radio's model."""
+"""A way through the medium: what the medium asks of it, whatever the radio's model."""
 
 from abc import ABC, abstractmethod
 

@@ -77,7 +77,7 @@ def _insertion_sort(order, receiver, at_ns):
         order[place] = moved
 
 
-# --- What the air tells after time has passed: packets received, and links whose fate became final.
+# --- What the medium tells after time has passed: packets received, and links whose fate became final.
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +200,7 @@ def _finished(index, of_link, of_packet, robots):
 
 
 def nothing_final(links: Links, packets: Transmissions, has_strength: bool) -> tuple[Finished, Departed]:
-    """The tables of none, for an air with these kinds of links and packets."""
+    """The tables of none, for a medium with these kinds of links and packets."""
     none = np.empty(0, np.int64)
     return finished(none, links, packets, 1, has_strength), departed(none, links, packets, 1)
 

@@ -1,4 +1,4 @@
-"""Airtime: how long a frame occupies the air, in whole ns. Octets may be a number or an array of integers.
+"""Airtime: how long a frame occupies the medium, in whole ns. Octets may be a number or an array of integers.
 
 Which octets count is stated with each standard; headers of higher layers are the caller's to add.
 """
@@ -61,8 +61,9 @@ def ieee80211g_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
 class UnslottedCsma:
     """Unslotted CSMA/CA of IEEE 802.15.4 at 2.4 GHz, with the standard's defaults (2006: 6.4.2, 7.4.2, 7.5.1.4).
 
-    A sender waits U{0 .. 2^BE - 1} backoff periods, then listens for `cca_ns`; if the air is busy BE grows by one, and
-    after more than `most_backoffs` busy times the frame fails. Sent `turnaround_ns` after the air was found free.
+    A sender waits U{0 .. 2^BE - 1} backoff periods, then listens for `cca_ns`; if the medium is busy BE grows by one,
+    and after more than `most_backoffs` busy times the frame fails. Sent `turnaround_ns` after the medium was found
+    free.
     """
 
     symbol_ns: int = 16 * US
@@ -88,8 +89,8 @@ class UnslottedCsma:
 class Dcf:
     """The distributed coordination function of IEEE 802.11 (2007: 9.2, and 15 to 19 for the numbers).
 
-    A sender waits until the air was free for DIFS, then U{0 .. CW} slots of free air. A broadcast goes out at a basic
-    rate, without acknowledgement and retries, so its CW stays at the least.
+    A sender waits until the medium was free for DIFS, then U{0 .. CW} slots of free air. A broadcast goes out at a
+    basic rate, without acknowledgement and retries, so its CW stays at the least.
     """
 
     short_space_ns: int  # SIFS

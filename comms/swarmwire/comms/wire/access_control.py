@@ -13,7 +13,7 @@ these, not for one of them. And whoever may not subscribe at a peer never learns
     operator    asks control/*; hears radio and poses
     a name that is revoked, another name, no certificate: nothing
 
-The tracker is a camera system that tells poses, or the world of a run, which tells poses and serves the air.
+The tracker is a camera system that tells poses, or the world of a run, which tells poses and serves the medium.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -72,20 +72,20 @@ def access_control(
 
 def _of_robot(keys: SwarmKeys, robot: str) -> list[Right]:
     return [
-        (["put"], [keys.any_radio_of(robot), keys.air_sent(robot)]),
+        (["put"], [keys.any_radio_of(robot), keys.bridge_sent(robot)]),
         (["liveliness_token"], [keys.alive(robot)]),
         (["declare_queryable", "reply"], [keys.control(robot)]),
-        (["query"], [keys.air_join(robot)]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.air_received(robot)]),
+        (["query"], [keys.bridge_join(robot)]),
+        (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.bridge_received(robot)]),
         _sees_who_lives(keys),
     ]
 
 
 def _of_tracker(keys: SwarmKeys) -> list[Right]:
     return [
-        (["put"], [keys.any_pose, keys.air_received("*")]),
-        (["declare_queryable", "reply"], [keys.any_air_join]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_air_sent]),
+        (["put"], [keys.any_pose, keys.bridge_received("*")]),
+        (["declare_queryable", "reply"], [keys.any_bridge_join]),
+        (["declare_subscriber"], [keys.any_radio, keys.any_bridge_sent]),
         _sees_who_lives(keys),
     ]
 

@@ -26,7 +26,7 @@ class Network:
         certificate: this member's certificate, with its name as common name.
         key: its key, which its owner alone may read.
         operator: name in the certificate of whoever may ask robots for their state and stop them.
-        tracker: name in the certificate of whoever may tell poses and plays the air.
+        tracker: name in the certificate of whoever may tell poses and plays the medium.
         revoked: names whose certificates count no more.
         insecure: whether it may do without certificates beyond this machine.
     """

@@ -1,4 +1,4 @@
-"""What a driver-run robot learns when it joins the air of a world: msgpack, checked on arrival."""
+"""What a driver-run robot learns when it joins the medium of a world: msgpack, checked on arrival."""
 
 import math
 import struct
@@ -41,7 +41,7 @@ class BridgeInfo:
         values = versioned(data, MAX_BYTES)  # with the names of all robots
         del values["v"]
         if values.keys() != {of.name for of in fields(cls)}:
-            raise BadFrame("malformed", "expected the terms of an air")
+            raise BadFrame("malformed", "expected the terms of a medium")
         for name in ("row", "rate_hz", "max_payload_bytes"):
             if type(values[name]) is not int or values[name] < (name == "rate_hz"):
                 raise BadFrame("malformed", f"{name}: expected a whole number")
@@ -61,13 +61,16 @@ MAX_RADIO_FRAME_BYTES = 2**20  # of a frame, either way
 LAST_NS = 2**62  # no run comes so far; later times do not fit those that are told with packets
 
 
-def encode_air(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
+def encode_bridged(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
     """The frame to the robot of this row: what it received, and what became of its packets."""
     return encode_tick(tick, {GROUP: GroupReadings(np.array([row]), {})}, received, tx_status)
 
 
-def decode_air(data: bytes, terms: BridgeInfo) -> tuple[int, ReceivedPackets, TxStatuses]:
-    """The tick and what `encode_air` was given; BadFrame if the frame is none, contradicts itself or is for another."""
+def decode_bridged(data: bytes, terms: BridgeInfo) -> tuple[int, ReceivedPackets, TxStatuses]:
+    """The tick and what `encode_bridged` was given.
+
+    BadFrame if the frame is none, contradicts itself or is for another.
+    """
     frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
     if frame.kind != "tick" or not 0 <= tick_start_ns(frame.tick, terms.rate_hz) < LAST_NS:
         raise BadFrame("malformed", f"{frame.kind} {frame.tick}, expected a tick")

@@ -23,8 +23,8 @@ class SwarmKeys:
         self.any_radio = f"{self.root}/radio/*/*"
         self.any_pose = f"{self.root}/pose/*"
         self.any_control = f"{self.root}/control/*"
-        self.any_air_sent = f"{self.root}/air/*/sent"
-        self.any_air_join = f"{self.root}/air/*/join"
+        self.any_bridge_sent = f"{self.root}/bridge/*/sent"
+        self.any_bridge_join = f"{self.root}/bridge/*/join"
 
     def radio(self, robot: str, tag: int) -> str:
         """A packet of this robot's; the tag of its message is its topic."""
@@ -46,17 +46,17 @@ class SwarmKeys:
         """Liveliness token of this robot's agent."""
         return f"{self.root}/alive/{robot}"
 
-    def air_join(self, robot: str) -> str:
+    def bridge_join(self, robot: str) -> str:
         """Queryable of the world's air: this robot asks for its terms (`BridgeInfo`)."""
-        return f"{self.root}/air/{robot}/join"
+        return f"{self.root}/bridge/{robot}/join"
 
-    def air_sent(self, robot: str) -> str:
-        """From a robot with `--radio air` to the world's air: `actions` frames, of which the packets count."""
-        return f"{self.root}/air/{robot}/sent"
+    def bridge_sent(self, robot: str) -> str:
+        """From a robot with `--radio medium` to the world's air: `actions` frames, of which the packets count."""
+        return f"{self.root}/bridge/{robot}/sent"
 
-    def air_received(self, robot: str) -> str:
+    def bridge_received(self, robot: str) -> str:
         """From the world's air to that robot, a `tick` frame for each tick in which it received something."""
-        return f"{self.root}/air/{robot}/received"
+        return f"{self.root}/bridge/{robot}/received"
 
 
 # --- zenoh sessions of the robots' network: peers that link with all that they list, or find by multicast.

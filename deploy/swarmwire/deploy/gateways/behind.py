@@ -96,7 +96,7 @@ class Behind:
             yield Served(
                 groups=groups,
                 robots=tuple(robots),
-                air=bridge,
+                medium=bridge,
                 show=lambda: tracker.tell(world.pose, world.alive),
                 show_counts=tracker.counts,
                 swarm=gateways.swarm,

@@ -45,7 +45,7 @@ class RobotSettings:
         if table.body_overrides:
             expected = "expected none: robots read their body's sheet from a file, which `body` may name"
             raise BadInput(self.scenario.source, f"robots.{group.name}.body_overrides", expected)
-        sheet, air = sheet_path(table.body, self.scenario.source), self.scenario.radio
+        sheet, medium = sheet_path(table.body, self.scenario.source), self.scenario.radio
         rate_hz = max(1, round(self.static.rate_hz / group.act_every_ticks))
         return {
             "format": 1,
@@ -60,7 +60,7 @@ class RobotSettings:
             "max_linear_mps": drive.max_linear_mps,
             "max_angular_radps": drive.max_angular_radps,
             "driver": {"name": chosen.kind, "address": address, **_shared_options(chosen)},
-            "radio": {"kind": "air", "max_payload_bytes": air.max_payload_bytes} if air else {"kind": "none"},
+            "radio": {"kind": "world", "max_payload_bytes": medium.max_payload_bytes} if medium else {"kind": "none"},
             "tracker": True,
             "network": self._network(names[row]),
             "pace": self.pace,

@@ -26,7 +26,7 @@ class Served:
 
     groups: tuple[GatewayGroup, ...]
     robots: tuple[ServedRobot, ...]
-    air: RadioBridge | None
+    medium: RadioBridge | None
     show: Callable[[], None]  # tells where all robots are
     show_counts: Callable[[], dict[str, int]]  # what of that nobody was told
     swarm: str

@@ -1,4 +1,4 @@
-"""Measured links, read from CSV or Parquet for the air to replay."""
+"""Measured links, read from CSV or Parquet for the medium to replay."""
 
 from collections.abc import Sequence
 from pathlib import Path

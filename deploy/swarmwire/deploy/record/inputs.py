@@ -63,10 +63,10 @@ class RecordedBackend:
         return actions
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """The same of a backend that puts packets on the air itself."""
-        noted = _Noted(air)
+        """The same of a backend that puts packets on air itself."""
+        noted = _Noted(medium)
         actions = cast("TimedBackend", self._backend).act_in_time(tick, readings, received, tx_status, noted)
         if self._first_tick is not None or self._outside(tick):
             self._record(tick, actions, _puts_arrays(noted.puts))
@@ -197,32 +197,32 @@ class ReplayedBackend:
         return self._inputs.actions(tick, self._robots)
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """What every robot did; packets go on the air when they did. Nobody hears: who would is in the record."""
+        """What every robot did; packets go on air when they did. Nobody hears: who would is in the record."""
         for put in self._inputs.puts(tick, self._robots):
-            air.send(put)
-        air.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick
+            medium.send(put)
+        medium.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick
         return self._inputs.actions(tick, self._robots)
 
 
 class _Noted:
-    """An air, and what is put on it."""
+    """a medium, and what is put on it."""
 
-    def __init__(self, air: SubtickMedium) -> None:
-        self._air = air
+    def __init__(self, medium: SubtickMedium) -> None:
+        self._medium = medium
         self.puts: list[Put] = []
-        self.advance = air.advance
+        self.advance = medium.advance
 
     def send(self, put: Put) -> None:
         """Take packets."""
-        self._air.send(put)
+        self._medium.send(put)
         if len(put.sent):
             self.puts.append(put)
 
 
 def _puts_arrays(puts: Sequence[Put]) -> dict[str, AnyArray]:
-    """What was put on the air within a tick, as arrays of its frame."""
+    """What was put on air within a tick, as arrays of its frame."""
     if not puts:
         return {}
     rows = [(put.at_ns, AT_ONCE if put.tick is None else put.tick, len(put.sent)) for put in puts]

@@ -125,7 +125,7 @@ def _station(robot: int) -> bytes:
 
 
 def _answer_us(radio: Radio) -> int:
-    """How long the air is taken after a frame that is acknowledged: SIFS and the acknowledgement."""
+    """How long the medium is taken after a frame that is acknowledged: SIFS and the acknowledgement."""
     if not (radio.access_or_default.acknowledged and radio.access_or_default.method == "dcf"):
         return 0
     dcf = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}[radio.frame]

@@ -20,7 +20,7 @@ class Airtime(Metric):
 
     A packet counts in the tick in which its end is known, and what of it is longer than a tick in those that follow. Of
     a packet sent again for want of an acknowledgement one try counts, and acknowledgements do not. NaN without a radio,
-    or if no robot is alive. What fills the air around a robot is this times the robots whose signals reach it.
+    or if no robot is alive. What fills the medium around a robot is this times the robots whose signals reach it.
     """
 
     name = "airtime"

@@ -27,7 +27,7 @@ class AboutRobot:
     body: Body
     rate_hz: float
     started_utc_ns: int
-    radio_kind: str  # "air": the packets went over a run's radio
+    radio_kind: str  # "world": the packets went over a run's radio
 
 
 def read_about_robot(path: Path) -> AboutRobot:

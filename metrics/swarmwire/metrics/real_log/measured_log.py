@@ -12,7 +12,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.real_log.not_in_log import AIR, why_not
+from swarmwire.metrics.real_log.not_in_log import WORLD, why_not
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.truths import real_run
 
@@ -40,7 +40,7 @@ def measured_log(
     """
     run = real_run(logs, place)
     ticks = math.floor(min(longest_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
-    has_air = any(robot.about.radio_kind == AIR for robot in logs.robots)
+    has_air = any(robot.about.radio_kind == WORLD for robot in logs.robots)
     lacks = {metric.name: why_not(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
     kept = Metrics([metric for metric in metrics if lacks[metric.name] is None])
     tally = RadioTally()

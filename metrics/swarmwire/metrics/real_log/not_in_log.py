@@ -6,7 +6,7 @@ from swarmwire.metrics.registry import METRICS
 CONTACTS = "contacts are not in the log"
 RANGE = "a real network knows no range, so there is no radio graph in the log"
 AIRTIME = "times on air are not in the log"
-AIR = "air"  # a robot's kind of radio
+WORLD = "world"  # a robot's kind of radio
 ON_AIR = "the robots' radio was that of a run, whose latencies robots know to the agent alone: see latency_agent"
 POSES = "poses are not in the log: no tracker"
 OWN = "a metric of users' own may rest on poses, which are not in the log"

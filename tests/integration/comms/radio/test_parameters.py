@@ -1,4 +1,4 @@
-"""A scenario with parameters of the air is read without a compiler."""
+"""A scenario with parameters of the medium is read without a compiler."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A run whose network has certificates: the agents of its robots join the air, and hear one another."""
+"""A run whose network has certificates: the agents of its robots join the medium, and hear one another."""
 
 from pathlib import Path
 from shutil import copy

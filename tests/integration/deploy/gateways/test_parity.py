@@ -112,7 +112,7 @@ def test_a_flock_whose_robots_speak_over_their_own_network_comes_to_what_an_emul
     found, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")
     assert not outside(found, expected, CASES["flocking"].judged), (found, result.realtime, result.counts)
     assert result.radio is not None
-    assert result.radio.sent == 0, "the air of the run carried nothing"
+    assert result.radio.sent == 0, "the medium of the run carried nothing"
 
 
 @pytest.mark.slow

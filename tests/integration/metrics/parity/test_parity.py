@@ -184,7 +184,7 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
 
 def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, tmp_path):
     watched_runs, many = runs
-    folder = as_logs(watched_runs[0], tmp_path, about={"radio": {"kind": "air"}})
+    folder = as_logs(watched_runs[0], tmp_path, about={"radio": {"kind": "world"}})
     for path in folder.glob("*/received.csv"):  # such robots do not know when a packet was sent
         head, *rows = (line.split(",") for line in path.read_text().splitlines())
         at = head.index("latency_s")

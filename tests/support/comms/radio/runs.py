@@ -1,4 +1,4 @@
-"""Small runs of the air: fixed poses, packets by tick, everything that became final."""
+"""Small runs of the medium: fixed poses, packets by tick, everything that became final."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
@@ -11,7 +11,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.truth import Obstacle, Tally
@@ -23,9 +23,9 @@ SIZE_M = (6.0, 5.0)
 
 @dataclass
 class Run:
-    """What an air told over a run, tick by tick."""
+    """What a medium told over a run, tick by tick."""
 
-    air: Air
+    medium: RadioMedium
     news: list[News] = field(default_factory=list)
     last: Tally | None = None
     edges: IntArray = field(
@@ -59,30 +59,32 @@ class Run:
         return self.finished(name)[self.finished("receiver") >= 0]
 
 
-def make_air(
+def make_medium(
     radio: Radio,
     robots: int,
     seeds: Sequence[int] = (1,),
     obstacles: Sequence[Sequence[Obstacle]] | None = None,
     traces: LinkTraces | None = None,
-) -> Air:
-    """An air over arenas of SIZE_M at RATE_HZ, an arena per seed."""
+) -> RadioMedium:
+    """a medium over arenas of SIZE_M at RATE_HZ, an arena per seed."""
     keys = np.array([derive_key(seed, "air") for seed in seeds], np.uint64)
     placed = obstacle_arrays(tuple(map(tuple, obstacles or [()] * len(seeds))))
-    return Air(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces)
+    return RadioMedium(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces)
 
 
-def run(air: Air, pose: FloatArray, sent_in: Callable[[int], SentPackets], ticks: int, quiet_ticks: int = 0) -> Run:
+def run(
+    medium: RadioMedium, pose: FloatArray, sent_in: Callable[[int], SentPackets], ticks: int, quiet_ticks: int = 0
+) -> Run:
     """Ticks in the loop's order with robots at rest, then quiet ones, then the end."""
-    out = Run(air)
+    out = Run(medium)
     alive = np.ones(len(pose), np.bool_)
     for tick in range(ticks + quiet_ticks + 1):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        out.news.append(air.advance(at_ns))
+        out.news.append(medium.advance(at_ns))
         if tick < ticks:
-            air.hold(pose, alive)
-            air.send(at_ns, tick, sent_in(tick))
-    out.last = air.end()
+            medium.hold(pose, alive)
+            medium.send(at_ns, tick, sent_in(tick))
+    out.last = medium.end()
     return out
 
 

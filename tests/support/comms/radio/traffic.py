@@ -8,7 +8,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.runs import RATE_HZ, Run, packets
 
@@ -37,16 +37,16 @@ def random_traffic(rng: np.random.Generator, arenas: int, robots: int) -> SentPa
 
 
 def run_disrupted(
-    air: Air, pose: FloatArray, sent: dict[int, SentPackets], now: dict[int, Disruption], ticks: int
+    medium: RadioMedium, pose: FloatArray, sent: dict[int, SentPackets], now: dict[int, Disruption], ticks: int
 ) -> Run:
     """What is sent, and what holds from then on, by tick."""
-    out, current = Run(air), Disruption.none(len(pose))
+    out, current = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)
         current = now.get(tick, current)
-        air.disrupt(current)
-        out.news.append(air.advance(at_ns))
-        air.hold(pose, current.alive)
-        air.send(at_ns, tick, sent.get(tick, SentPackets.none()))
-    out.last = air.end()
+        medium.disrupt(current)
+        out.news.append(medium.advance(at_ns))
+        medium.hold(pose, current.alive)
+        medium.send(at_ns, tick, sent.get(tick, SentPackets.none()))
+    out.last = medium.end()
     return out

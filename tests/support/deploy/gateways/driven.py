@@ -87,7 +87,7 @@ def driven(
 ) -> Result:
     """The result of a run whose robots stand behind gateways, driven through their protocol.
 
-    `radio` is that of the robots, if it is not the air of the run.
+    `radio` is that of the robots, if it is not the medium of the run.
     """
     simulation = Simulation(
         scenario, gateways=gateways, realtime=pace, overrides=overrides, observers=observers, out=folder, record=BARE

@@ -14,7 +14,7 @@ from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import BridgeInfo, Pose, encode_air, encode_pose
+from swarmwire.comms.wire.radio_bridge import BridgeInfo, Pose, encode_bridged, encode_pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
@@ -56,7 +56,7 @@ class Terms(DocumentTarget):
         BridgeInfo.decode(case)
 
 
-class AirReceived(FrameTarget):
+class BridgeReceived(FrameTarget):
     """What a robot receives of a world's radio: taken or counted."""
 
     name = "air-received"
@@ -69,7 +69,7 @@ class AirReceived(FrameTarget):
         assert len(received), "the robot received something"
         statuses = TxStatuses(np.array([row]), np.array([4]), np.array([1]))
         nothing = received.select(np.array([], np.int64))
-        return [encode_air(11, row, received, statuses), encode_air(12, row, nothing, statuses)]
+        return [encode_bridged(11, row, received, statuses), encode_bridged(12, row, nothing, statuses)]
 
     def feed(self, case: bytes) -> str | None:
         radio = WorldRadio(None, KEYS, self.robots, self.robots[1], CLOCK)
@@ -79,7 +79,7 @@ class AirReceived(FrameTarget):
         return " ".join(name for name in radio.counts() if name.startswith("frames_")) or None
 
 
-class AirSent(FrameTarget):
+class BridgeSent(FrameTarget):
     """What a robot sends through a world's radio: taken or counted, and of that robot alone."""
 
     name = "air-sent"

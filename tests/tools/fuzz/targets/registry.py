@@ -6,7 +6,7 @@ from tests.tools.fuzz.targets import folders, joining, radio, robots, settings, 
 _ALL: tuple[type[Target], ...] = (
     *(wire.WorldFrames, wire.RunnerFrames, wire.Scenes, wire.Truths),
     *(joining.Join, joining.Offers, joining.Assignments, joining.Control, joining.Replies, joining.PageOrders),
-    *(radio.Terms, radio.AirReceived, radio.AirSent, radio.Packets, radio.Poses, radio.Questions),
+    *(radio.Terms, radio.BridgeReceived, radio.BridgeSent, radio.Packets, radio.Poses, radio.Questions),
     *(robots.Epuck2Commands, robots.Epuck2Answers, robots.Ros2Sensors, robots.Ros2Commands),
     *(settings.Scenarios, settings.Bodies, settings.Campaigns),
     *(settings.Fleets, settings.RobotSettings, settings.Certificates),

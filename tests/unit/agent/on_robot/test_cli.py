@@ -127,7 +127,7 @@ def test_an_agent_that_is_none_or_lacks_something_is_refused(installed, capsys, 
 
 @pytest.mark.parametrize(
     ("flags", "cure"),
-    [((), "expected --radio zenoh or --radio air"), (("--radio", "zenoh"), "expected --tracker")],
+    [((), "expected --radio zenoh or --radio world"), (("--radio", "zenoh"), "expected --tracker")],
 )
 def test_what_an_agent_needs_is_told_in_the_flags_that_would_give_it(installed, capsys, flags, cure):
     listen = ("--listen", "tcp/127.0.0.1:0") if flags else ()

@@ -11,7 +11,7 @@ from swarmwire.comms.events.effects import Conditions
 from swarmwire.comms.events.partition import Partition, Region
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
-from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_air
+from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium
 
 # Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.
 POSE = at((-1, 0.5), (-0.5, -0.5), (-0.2, 0.3), (0.3, -0.2), (0.6, 0.7), (1, -0.7))
@@ -32,16 +32,16 @@ def held(event: Partition, swarm: Swarm = SWARM) -> Conditions:
 
 def broadcasts(conditions: Conditions, pose: FloatArray = POSE) -> Run:
     """Everybody broadcasts once under these conditions."""
-    air = make_air(Radio(9.0, send_offset="tick"), len(pose))
-    told = Run(air)
+    medium = make_medium(Radio(9.0, send_offset="tick"), len(pose))
+    told = Run(medium)
     for tick in range(3):
-        air.disrupt(conditions.disruption())
-        told.news.append(air.advance(tick_start_ns(tick, RATE_HZ)))
-        air.hold(pose, conditions.alive)
+        medium.disrupt(conditions.disruption())
+        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
+        medium.hold(pose, conditions.alive)
         if tick == 1:
-            told.edges = air.edges(pose, conditions.alive)
-            air.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
-    told.last = air.end()
+            told.edges = medium.edges(pose, conditions.alive)
+            medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
+    told.last = medium.end()
     return told
 
 

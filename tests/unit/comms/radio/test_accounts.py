@@ -12,18 +12,18 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import Accounts, Lives
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.transmissions import Intake, Transmissions
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, RADIOS, random_traffic
 
 
 def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int) -> Run:
     """Four ticks of random traffic among robots at random places."""
     rng = np.random.default_rng(seed)
-    air = make_air(radio, robots, range(arenas), [OBSTACLES] * arenas)
-    return run(air, scattered(arenas * robots, seed), lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
+    medium = make_medium(radio, robots, range(arenas), [OBSTACLES] * arenas)
+    return run(medium, scattered(arenas * robots, seed), lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
 
 
 @given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
@@ -51,17 +51,17 @@ def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int
 
 def test_sent_and_intended_are_counted_when_the_air_takes_a_packet_up():
     """Even if it goes on air ticks later."""
-    told = run(make_air(Radio(2.0, send_offset=0.25), 4), at((0, 0), (1, 0), (2, 0), (5, 0)), everybody(4), 1, 4)
+    told = run(make_medium(Radio(2.0, send_offset=0.25), 4), at((0, 0), (1, 0), (2, 0), (5, 0)), everybody(4), 1, 4)
     assert [int(one.tally.intended[0]) for one in told.news] == [0, 12, 0, 0, 0, 0]
     assert [int(one.tally.sent[0]) for one in told.news] == [0, 4, 0, 0, 0, 0]
     assert [int(one.tally.fates.sum()) for one in told.news] == [0, 0, 0, 12, 0, 0]
 
 
 def test_a_broadcast_intends_only_robots_alive():
-    air = make_air(Radio(9.0, send_offset="tick"), 4)
-    air.hold(scattered(4), np.array([True, True, False, True]))
-    air.send(0, 0, packets([0]))
-    tally = air.advance(10**8).tally
+    medium = make_medium(Radio(9.0, send_offset="tick"), 4)
+    medium.hold(scattered(4), np.array([True, True, False, True]))
+    medium.send(0, 0, packets([0]))
+    tally = medium.advance(10**8).tally
     assert tally.intended.tolist() == [2]
     assert tally.fates[0, Fate.RECEIVED] == 2
 
@@ -69,10 +69,10 @@ def test_a_broadcast_intends_only_robots_alive():
 def test_what_the_run_ends_under_way_or_queued_is_in_flight():
     """Three packets of 40 ms each: one delivered late, one on air, one waiting; none of them final, none in range."""
     radio = Radio(9.0, latency_s=1.0, bit_rate_bps=2000, send_offset="tick")
-    told = run(make_air(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0, 0, 0, 0]), 1)
+    told = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0, 0, 0, 0]), 1)
     assert told.fates() == {"IN_FLIGHT": 8}
     assert told.tally.in_range.tolist() == [0]
-    assert told.air.end().fates.sum() == 0
+    assert told.medium.end().fates.sum() == 0
 
 
 def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
@@ -109,9 +109,9 @@ def check_packets(ended: Run) -> None:
 @given(RADIOS, st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
 def test_each_packet_departs_once_over_a_disk(radio: Radio, arenas: int, robots: int, seed: int):
     rng = np.random.default_rng(seed)
-    air = make_air(replace(radio, bit_rate_bps=250_000), robots, range(arenas), [OBSTACLES] * arenas)
+    medium = make_medium(replace(radio, bit_rate_bps=250_000), robots, range(arenas), [OBSTACLES] * arenas)
     pose = scattered(arenas * robots, seed)
-    check_packets(run(air, pose, lambda _: random_traffic(rng, arenas, robots), 4, 8))
+    check_packets(run(medium, pose, lambda _: random_traffic(rng, arenas, robots), 4, 8))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -119,7 +119,7 @@ def test_each_packet_departs_once_over_a_disk(radio: Radio, arenas: int, robots:
 def test_each_packet_departs_once_over_signals_acknowledged_or_not(method: str, seed: int):
     rng = np.random.default_rng(seed)
     ended = run(
-        make_air(with_access(method), 6, range(2)), scattered(12, seed), lambda _: random_traffic(rng, 2, 6), 4, 8
+        make_medium(with_access(method), 6, range(2)), scattered(12, seed), lambda _: random_traffic(rng, 2, 6), 4, 8
     )
     check_packets(ended)
 
@@ -127,7 +127,9 @@ def test_each_packet_departs_once_over_signals_acknowledged_or_not(method: str, 
 def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
     radio = Radio(range_m=1.0, bit_rate_bps=8_000, send_offset="tick", queue_limit=0)
     sent = packets([0, 2, 2], [BROADCAST, 1, BROADCAST], 20)
-    ended = run(make_air(radio, 3), at((0, 0), (0.5, 0), (2, 0)), lambda tick: sent if tick == 0 else packets([]), 1, 1)
+    ended = run(
+        make_medium(radio, 3), at((0, 0), (0.5, 0), (2, 0)), lambda tick: sent if tick == 0 else packets([]), 1, 1
+    )
     columns = ("sender", "to", "intended", "out_of_range", "fate", "on_air_at_ns", "off_air_at_ns")
     rows = sorted(zip(*(told(ended, name).tolist() for name in columns), strict=True))
     airtime_ns = 20_000_000
@@ -171,13 +173,13 @@ NEWS_RADIOS = {"unit-disk": Radio(9.0, send_offset="tick"), "signals": with_acce
 ASKED: IntArray = np.array([41, 42])
 
 
-def sent(radio: str) -> Air:
+def sent(radio: str) -> RadioMedium:
     """Robot 1 of arena 0 has sent to all, robot 2 of arena 1 to robot 0."""
-    air = make_air(NEWS_RADIOS[radio], ROBOTS, [1, 2])
-    air.advance(0)
-    air.hold(POSE, ALIVE)
-    air.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
-    return air
+    medium = make_medium(NEWS_RADIOS[radio], ROBOTS, [1, 2])
+    medium.advance(0)
+    medium.hold(POSE, ALIVE)
+    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
+    return medium
 
 
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
@@ -197,11 +199,11 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
 @pytest.mark.parametrize("over", [0, 1])
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
 def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
-    air = sent(radio)
-    received, _ = air.advance_within(TICK_NS // 2)
+    medium = sent(radio)
+    received, _ = medium.advance_within(TICK_NS // 2)
     assert received.receiver.tolist() == [0, 2, 3]
-    air.leave(np.arange(2) == over)
-    news, left = air.advance(TICK_NS), 1 - over
+    medium.leave(np.arange(2) == over)
+    news, left = medium.advance(TICK_NS), 1 - over
     assert news.received.receiver.tolist() == [[0, 2], [3]][left]
     assert {news.received.payloads.row(int(row)) for row in news.received.payload} == {PAYLOADS[left]}
     assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {left}
@@ -209,13 +211,13 @@ def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
 
 @pytest.mark.parametrize("over", [0, 1])
 def test_nor_what_its_senders_learned(over: int):
-    air = make_air(with_access("csma-802154"), ROBOTS, [1, 2])
-    air.advance(0)
-    air.hold(POSE, ALIVE)
-    air.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
-    _, learned = air.advance_within(TICK_NS // 2)
+    medium = make_medium(with_access("csma-802154"), ROBOTS, [1, 2])
+    medium.advance(0)
+    medium.hold(POSE, ALIVE)
+    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
+    _, learned = medium.advance_within(TICK_NS // 2)
     assert learned.row.tolist() == [1, 5]
-    air.leave(np.arange(2) == over)
-    tx_status = air.advance(TICK_NS).tx_status
+    medium.leave(np.arange(2) == over)
+    tx_status = medium.advance(TICK_NS).tx_status
     assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])
     assert tx_status.result.tolist() == [int(TxResult.ACKNOWLEDGED)]

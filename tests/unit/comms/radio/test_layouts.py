@@ -15,11 +15,11 @@ from swarmwire.comms.packets import ReceivedPackets, SentPackets
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import News
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import RADIOS, random_traffic
 
 ROBOTS = 7
@@ -58,10 +58,10 @@ def two_each(arenas: int) -> SentPackets:
 def test_an_arena_alone_gives_the_same_as_beside_others():
     seeds = (11, 12, 13)
     pose = scattered(3 * ROBOTS)
-    beside = run(make_air(RADIO, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
+    beside = run(make_medium(RADIO, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
     for arena, seed in enumerate(seeds):
-        alone_air = make_air(RADIO, ROBOTS, [seed], [OBSTACLES[arena]])
-        alone = run(alone_air, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
+        alone_medium = make_medium(RADIO, ROBOTS, [seed], [OBSTACLES[arena]])
+        alone = run(alone_medium, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
         assert len(story(alone)) > 50
         assert story(alone) == story(beside, arena)
 
@@ -79,8 +79,8 @@ def test_the_order_among_senders_is_indifferent(shuffle):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
     mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
     pose = scattered(ROBOTS)
-    assert story(run(make_air(RADIO, ROBOTS), pose, lambda _: mixed, 3, 2)) == story(
-        run(make_air(RADIO, ROBOTS), pose, lambda _: sent, 3, 2)
+    assert story(run(make_medium(RADIO, ROBOTS), pose, lambda _: mixed, 3, 2)) == story(
+        run(make_medium(RADIO, ROBOTS), pose, lambda _: sent, 3, 2)
     )
 
 
@@ -88,7 +88,7 @@ def test_no_stage_shifts_the_draws_of_another():
     """With and without noise in what is given, the same packets are lost, equally late."""
     pose = scattered(ROBOTS)
     full, bare = (
-        run(make_air(radio, ROBOTS), pose, lambda _: two_each(1), 5, 2)
+        run(make_medium(radio, ROBOTS), pose, lambda _: two_each(1), 5, 2)
         for radio in (RADIO, replace(RADIO, measures=Measures()))
     )
     for name in COLUMNS:
@@ -98,7 +98,7 @@ def test_no_stage_shifts_the_draws_of_another():
 def test_received_is_sorted_by_receiver_time_sender_and_sequence():
     """Also where times tie, and for robots that hear many."""
     for radio in (RADIO, Radio(99.0, send_offset="tick", jitter_s=0.2), Radio(99.0, send_offset="tick", latency_s=0.1)):
-        told = run(make_air(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
+        told = run(make_medium(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
         for one in told.news:
             h = one.received
             order = np.lexsort((h.sequence, h.sender, h.received_at_ns, h.receiver))
@@ -108,15 +108,15 @@ def test_received_is_sorted_by_receiver_time_sender_and_sequence():
 
 def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
     """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are received at 150 ms."""
-    air = make_air(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
-    told = run(air, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
+    medium = make_medium(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
+    told = run(medium, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
     received_by_0 = told.received("receiver") == 0
     assert told.received("received_at_ns")[received_by_0].tolist() == [150_000_000] * 2
     assert told.received("sender")[received_by_0].tolist() == [1, 2]
 
 
 def test_payloads_hold_only_packets_that_somebody_received():
-    told = run(make_air(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
+    told = run(make_medium(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
     for one in told.news:
         np.testing.assert_array_equal(np.unique(one.received.payload), np.arange(len(one.received.payloads)))
 
@@ -141,7 +141,7 @@ def told(news: list[News]) -> list[Any]:
     return sorted(out)
 
 
-def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[list[Any], list[int]]:
+def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) -> tuple[list[Any], list[int]]:
     """What becomes of packets sent at several times within ticks, where time passes in these parts of a tick, too.
 
     Where robots are out, one is dead and one's radio is off for two ticks. What is received by a tick's start is told
@@ -156,21 +156,21 @@ def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[li
             off = Disruption.none(SIX)
             if tick == 1:
                 off.radio_on[out] = off.alive[(out + 1) % SIX] = False
-            air.disrupt(off)
+            medium.disrupt(off)
             alive = off.alive.copy()
-        within.append(air.advance_within(start_ns)[0])
-        news.append(air.advance(start_ns))
-        air.hold(pose, alive)
+        within.append(medium.advance_within(start_ns)[0])
+        news.append(medium.advance(start_ns))
+        medium.hold(pose, alive)
         sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
         for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
             if sender is None:
-                within.append(air.advance_within(at_ns)[0])
+                within.append(medium.advance_within(at_ns)[0])
             else:
-                air.send_at(np.full(SIX, at_ns), packets(sender, size=12))
-    within.append(air.advance_within(tick_start_ns(TICKS, RATE_HZ))[0])
-    news.append(air.advance(tick_start_ns(TICKS, RATE_HZ)))
-    last = air.end()
+                medium.send_at(np.full(SIX, at_ns), packets(sender, size=12))
+    within.append(medium.advance_within(tick_start_ns(TICKS, RATE_HZ))[0])
+    news.append(medium.advance(tick_start_ns(TICKS, RATE_HZ)))
+    last = medium.end()
     tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
     assert tallies.fates.sum() == tallies.intended.sum()
     assert sum(map(len, within)) == sum(len(one.received) for one in news)  # each is handed over once
@@ -184,7 +184,7 @@ def played(air: Air, parts: list[float], seed: int, out: int | None) -> tuple[li
     st.none() | st.integers(0, SIX - 1),
 )
 def test_time_may_pass_in_any_parts(radio: Radio, parts: list[float], seed: int, out: int | None):
-    assert played(make_air(radio, SIX), parts, seed, out) == played(make_air(radio, SIX), [], seed, out)
+    assert played(make_medium(radio, SIX), parts, seed, out) == played(make_medium(radio, SIX), [], seed, out)
 
 
 LATE = Delays("lognormal", 0.15, 0.2)
@@ -202,19 +202,19 @@ def kept(radio: Radio) -> Radio:
 def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray:
     """Receiver, sender, sequence and time of all that is received, as it is told, (k, 4).
 
-    `between` are moments, as shares of a tick, at which the air is asked, too.
+    `between` are moments, as shares of a tick, at which the medium is asked, too.
     """
     rng = np.random.default_rng(seed)
-    air = make_air(radio, FIVE, range(ARENAS))
+    medium = make_medium(radio, FIVE, range(ARENAS))
     pose, alive = scattered(ARENAS * FIVE, seed), np.ones(ARENAS * FIVE, np.bool_)
     told = []
     for tick in range(LATE_TICKS + 40):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        told.append(air.advance(at_ns).received)
-        air.hold(pose, alive)
+        told.append(medium.advance(at_ns).received)
+        medium.hold(pose, alive)
         if tick < LATE_TICKS:
-            air.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
-        told += [air.advance(at_ns + int(share * TICK_NS)).received for share in between]
+            medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
+        told += [medium.advance(at_ns + int(share * TICK_NS)).received for share in between]
     return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.received_at_ns], axis=1) for h in told])
 
 
@@ -260,22 +260,22 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
     radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
     times: list[dict[tuple[int, int], int]] = []
     for one in (radio, kept(radio)):
-        air, pose = make_air(one, 12), scattered(12)
+        medium, pose = make_medium(one, 12), scattered(12)
         times.append({})
         for tick in range(14):
             now = Disruption.none(12)
             now.radio_on[0] = tick != 1
-            air.disrupt(now)
+            medium.disrupt(now)
             at_ns = tick_start_ns(tick, RATE_HZ)
-            told = air.advance(at_ns).received
+            told = medium.advance(at_ns).received
             times[-1] |= {
                 (s, q): t
                 for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.received_at_ns, strict=True)
                 if r == 0
             }
-            air.hold(pose, np.ones(12, np.bool_))
+            medium.hold(pose, np.ones(12, np.bool_))
             if tick in (0, 2):
-                air.send(at_ns, tick, packets(range(1, 12)))
+                medium.send(at_ns, tick, packets(range(1, 12)))
     free, ordered = times
     ended = [sender for sender in range(1, 12) if (sender, 0) not in free]
     assert len(ended) > 5
@@ -286,5 +286,5 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
 def test_nobody_waits_where_delays_are_even():
     radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
     pose = scattered(4)
-    free, ordered = (run(make_air(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))
+    free, ordered = (run(make_medium(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))
     np.testing.assert_array_equal(free.received("received_at_ns"), ordered.received("received_at_ns"))

@@ -11,8 +11,8 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.presets import PRESETS, with_preset
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
-from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, at, everybody, make_air, packets, run, scattered
+from swarmwire.comms.radio.medium import RadioMedium
+from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, at, everybody, make_medium, packets, run, scattered
 
 # Two-sided, for each of the losses below; the seed is fixed, so a pass stays a pass.
 FALSE_ALARM_RATE = 1e-4
@@ -20,7 +20,7 @@ FALSE_ALARM_RATE = 1e-4
 
 @pytest.mark.parametrize("loss", [0.05, 0.3, 0.9])
 def test_share_received_lies_in_the_exact_binomial_interval(loss: float):
-    told = run(make_air(Radio(2.0, loss=loss), 20), scattered(20), everybody(20), 30, 2)
+    told = run(make_medium(Radio(2.0, loss=loss), 20), scattered(20), everybody(20), 30, 2)
     received, in_range = len(told.received("receiver")), int(told.tally.in_range[0])
     assert in_range > 2000
     assert binomtest(received, in_range, 1.0 - loss).pvalue > FALSE_ALARM_RATE
@@ -28,7 +28,7 @@ def test_share_received_lies_in_the_exact_binomial_interval(loss: float):
 
 def test_both_directions_and_following_packets_are_lost_independently():
     """Of the pairs that both send, half x half lose both ways; likewise a packet and the next."""
-    told = run(make_air(Radio(99.0, loss=0.5), 20), scattered(20), everybody(20), 10, 2)
+    told = run(make_medium(Radio(99.0, loss=0.5), 20), scattered(20), everybody(20), 10, 2)
     lost = np.zeros((20, 20, 10), bool)
     lost[told.finished("sender"), told.finished("receiver"), told.finished("sequence")] = (
         told.finished("fate") == Fate.LOST
@@ -42,12 +42,12 @@ def test_both_directions_and_following_packets_are_lost_independently():
 
 def test_no_loss_loses_nothing_and_full_loss_everything():
     for loss, fate in ((0.0, "RECEIVED"), (1.0, "LOST")):
-        assert run(make_air(Radio(99.0, loss=loss), 5), scattered(5), everybody(5), 3, 2).fates() == {fate: 60}
+        assert run(make_medium(Radio(99.0, loss=loss), 5), scattered(5), everybody(5), 3, 2).fates() == {fate: 60}
 
 
 def test_another_seed_loses_other_packets():
     radio = Radio(99.0, loss=0.5, send_offset="tick")
-    one, other = (run(make_air(radio, 8, [s]), scattered(8), everybody(8), 2, 1).finished("fate") for s in (1, 2))
+    one, other = (run(make_medium(radio, 8, [s]), scattered(8), everybody(8), 2, 1).finished("fate") for s in (1, 2))
     assert (one != other).any()
 
 
@@ -60,7 +60,7 @@ def sequences(radio: Radio) -> np.ndarray:
     """Which packets of each sender are lost to one listener, (senders, packets), one each tick."""
     pose = at(*((0.01 * i, 0.5) for i in range(SENDERS)), (0.0, 0.0))
     sent = packets(range(SENDERS), SENDERS)
-    told = run(make_air(radio, SENDERS + 1), pose, lambda _: sent, TICKS, 2)
+    told = run(make_medium(radio, SENDERS + 1), pose, lambda _: sent, TICKS, 2)
     lost = np.zeros((SENDERS, TICKS), bool)
     lost[told.finished("sender"), told.finished("sequence")] = told.finished("fate") != Fate.RECEIVED
     return lost
@@ -95,11 +95,11 @@ RADIUS_M = 0.1
 BLOCKING = Radio(9.0, send_offset="tick", bodies_block=True)
 
 
-def air_of(radio: Radio, robots: int, arenas: int = 1) -> Air:
+def medium_of(radio: Radio, robots: int, arenas: int = 1) -> RadioMedium:
     """Without obstacles, every robot with the same radius."""
     keys = np.array([derive_key("bodies", arena) for arena in range(arenas)], np.uint64)
     radius_m = np.full(robots, RADIUS_M)
-    return Air(radio, keys, robots, SIZE_M, obstacle_arrays(((),) * arenas), RATE_HZ, radius_m=radius_m)
+    return RadioMedium(radio, keys, robots, SIZE_M, obstacle_arrays(((),) * arenas), RATE_HZ, radius_m=radius_m)
 
 
 @pytest.mark.parametrize(
@@ -108,27 +108,27 @@ def air_of(radio: Radio, robots: int, arenas: int = 1) -> Air:
 )
 def test_a_disc_on_the_line_between_two_centres_blocks_both_ways(between_y_m: float, fates: dict[str, int]):
     pose = at((-1, 0), (0, between_y_m), (1, 0))
-    told = run(air_of(BLOCKING, 3), pose, everybody(3), 1)
+    told = run(medium_of(BLOCKING, 3), pose, everybody(3), 1)
     assert told.fates() == fates
     assert told.tally.in_range.tolist() == [fates["RECEIVED"]]
 
 
 def test_bodies_do_not_block_unless_asked_to():
-    told = run(air_of(Radio(9.0, send_offset="tick"), 3), at((-1, 0), (0, 0), (1, 0)), everybody(3), 1)
+    told = run(medium_of(Radio(9.0, send_offset="tick"), 3), at((-1, 0), (0, 0), (1, 0)), everybody(3), 1)
     assert told.fates() == {"RECEIVED": 6}
 
 
 def test_the_dead_are_in_the_way_and_the_graph_has_no_edge_through_bodies():
     pose, alive = at((-1, 0), (0, 0), (1, 0)), np.array([True, False, True])
-    air = air_of(BLOCKING, 3)
-    assert air.edges(pose, np.ones(3, bool)).tolist() == [[0, 1], [1, 2]]
-    assert air.edges(pose, alive).tolist() == []
+    medium = medium_of(BLOCKING, 3)
+    assert medium.edges(pose, np.ones(3, bool)).tolist() == [[0, 1], [1, 2]]
+    assert medium.edges(pose, alive).tolist() == []
 
 
 def test_an_arena_among_others_is_blocked_as_it_is_alone():
     pose = scattered(60)
-    together = run(air_of(BLOCKING, 30, 2), pose, everybody(60), 1).tally.fates
-    alone = run(air_of(BLOCKING, 30), pose[:30], everybody(30), 1).tally.fates
+    together = run(medium_of(BLOCKING, 30, 2), pose, everybody(60), 1).tally.fates
+    alone = run(medium_of(BLOCKING, 30), pose[:30], everybody(30), 1).tally.fates
     assert together[0].tolist() == alone[0].tolist()
     assert together[0].tolist() != together[1].tolist()
 

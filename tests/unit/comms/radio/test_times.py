@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.send_times import SendTimes
-from tests.support.comms.radio.runs import TICK_NS, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, at, everybody, make_medium, packets, run, scattered
 
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
@@ -25,7 +25,7 @@ def test_received_no_earlier_than_airtime_and_latency_allow(
 ):
     """And, jitter included, no later; so never in the packet's own tick."""
     radio = Radio(9.0, latency_s=latency_s, jitter_s=jitter_s, bit_rate_bps=bit_rate_bps, send_offset=send_offset)
-    told = run(make_air(radio, 5), scattered(5), everybody(5), 3, 30)
+    told = run(make_medium(radio, 5), scattered(5), everybody(5), 3, 30)
     airtime_ns = -(-80 * 10**9 // bit_rate_bps)
     late_ns = told.finished("final_at_ns") - told.finished("on_air_at_ns") - airtime_ns - to_ns(latency_s)
     assert len(late_ns) == 60
@@ -36,7 +36,7 @@ def test_received_no_earlier_than_airtime_and_latency_allow(
 
 
 def test_what_is_told_at_a_tick_was_received_by_it_and_not_before_the_last():
-    told = run(make_air(Radio(9.0, latency_s=0.15, jitter_s=0.1), 6), scattered(6), everybody(6), 4, 6)
+    told = run(make_medium(Radio(9.0, latency_s=0.15, jitter_s=0.1), 6), scattered(6), everybody(6), 4, 6)
     assert sum(len(one.received) for one in told.news) == 120
     for tick, one in enumerate(told.news):
         assert (one.received.received_at_ns <= tick * TICK_NS).all()
@@ -48,20 +48,20 @@ def test_what_is_told_at_a_tick_was_received_by_it_and_not_before_the_last():
 def test_a_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: int):
     """In float seconds it would slip a tick now and then."""
     latency_s = (TICK_NS - AIRTIME_NS + late_ns) / 1e9
-    told = run(make_air(Radio(9.0, latency_s=latency_s, send_offset="tick"), 2), PAIR, everybody(2), 50, 3)
+    told = run(make_medium(Radio(9.0, latency_s=latency_s, send_offset="tick"), 2), PAIR, everybody(2), 50, 3)
     received = [len(one.received) for one in told.news]
     assert received == [0] * ticks + [2] * 50 + [0] * (4 - ticks)
 
 
 def test_airtime_counts_overhead_and_is_rounded_up():
     told = run(
-        make_air(Radio(9.0, bit_rate_bps=7_000_000, overhead_bytes=5, send_offset="tick"), 2), PAIR, everybody(2), 1
+        make_medium(Radio(9.0, bit_rate_bps=7_000_000, overhead_bytes=5, send_offset="tick"), 2), PAIR, everybody(2), 1
     )
     assert told.received("received_at_ns").tolist() == [17_143, 17_143]
 
 
 def test_phase_spans_the_tick_and_jitter_a_fifth_of_it():
-    told = run(make_air(Radio(99.0), 40), np.zeros((40, 3)), everybody(40), 20, 3)
+    told = run(make_medium(Radio(99.0), 40), np.zeros((40, 3)), everybody(40), 20, 3)
     offset_ns = np.full((40, 20), -1)
     sender, sequence = told.finished("sender"), told.finished("sequence")
     offset_ns[sender, sequence] = told.finished("sent_at_ns") - sequence * TICK_NS
@@ -87,45 +87,45 @@ def test_the_phase_of_a_slow_robot_spans_its_own_period():
 
 @pytest.mark.parametrize(("send_offset", "sent_at_ns"), [("tick", 0), (0.03, 30_000_000), (0.25, 250_000_000)])
 def test_an_explicit_offset_is_that_of_every_robot(send_offset: str | float, sent_at_ns: int):
-    told = run(make_air(Radio(9.0, send_offset=send_offset), 2), PAIR, everybody(2), 1, 4)
+    told = run(make_medium(Radio(9.0, send_offset=send_offset), 2), PAIR, everybody(2), 1, 4)
     assert told.finished("sent_at_ns").tolist() == [sent_at_ns] * 2
 
 
 @pytest.mark.parametrize("send_offset", ["phase", -0.1, float("nan")])
 def test_no_other_offset_is_taken(send_offset: str | float):
     with pytest.raises(ValueError, match="send_offset: expected"):
-        make_air(Radio(9.0, send_offset=send_offset), 2)
+        make_medium(Radio(9.0, send_offset=send_offset), 2)
 
 
 def test_geometry_is_that_of_the_tick_in_which_a_packet_goes_on_air():
     """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
     near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
     for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
-        air = make_air(Radio(2.0, send_offset=send_offset), 2)
-        air.hold(before, np.ones(2, bool))
-        air.send(0, 0, packets([0]))
-        assert len(air.advance(TICK_NS).finished.fate) == 0
-        air.hold(after, np.ones(2, bool))
-        assert len(air.advance(2 * TICK_NS).received) == received
+        medium = make_medium(Radio(2.0, send_offset=send_offset), 2)
+        medium.hold(before, np.ones(2, bool))
+        medium.send(0, 0, packets([0]))
+        assert len(medium.advance(TICK_NS).finished.fate) == 0
+        medium.hold(after, np.ones(2, bool))
+        assert len(medium.advance(2 * TICK_NS).received) == received
 
 
 def test_time_does_not_run_backwards():
-    air = make_air(Radio(2.0), 2)
-    air.advance(TICK_NS)
+    medium = make_medium(Radio(2.0), 2)
+    medium.advance(TICK_NS)
     with pytest.raises(ValueError, match="until_ns"):
-        air.advance(TICK_NS - 1)
+        medium.advance(TICK_NS - 1)
     with pytest.raises(ValueError, match="at_ns"):
-        air.send(0, 0, packets([0]))
+        medium.send(0, 0, packets([0]))
 
 
 def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
-    air = make_air(Radio(9.0, send_offset="tick"), 2)
-    air.advance(TICK_NS)
-    air.send_at(np.zeros(2, np.int64), packets([]))  # long ago: packets would be refused
+    medium = make_medium(Radio(9.0, send_offset="tick"), 2)
+    medium.advance(TICK_NS)
+    medium.send_at(np.zeros(2, np.int64), packets([]))  # long ago: packets would be refused
     with pytest.raises(ValueError):
-        air.send_at(np.zeros(2, np.int64), packets([0]))
+        medium.send_at(np.zeros(2, np.int64), packets([0]))
 
 
 def test_a_disk_without_a_range_is_refused():
     with pytest.raises(ValueError, match="range_m: expected a range, as a disk has one"):
-        make_air(Radio(None), 2)
+        make_medium(Radio(None), 2)

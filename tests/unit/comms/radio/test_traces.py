@@ -11,7 +11,7 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace
 from tests.support.comms.radio.measured import TRIO, numbers_received, trace_of
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, run
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, run
 
 ROBOTS = 3
 ROWS = [(20, 2, 0, 0.3), (0, 0, 1, 1.0), (10, 0, 1, 0.5), (5, 1, 0, 0.0), (30, 0, 1, 0.25)]
@@ -86,8 +86,8 @@ DISK = Radio(4.0, send_offset="tick")
 
 def replayed(traces: LinkTraces, others: str, ticks: int, radio: Radio = DISK, arenas: int = 1) -> Run:
     """Everybody broadcasts in each tick."""
-    air = make_air(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
-    return run(air, np.tile(POSE, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
+    medium = make_medium(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
+    return run(medium, np.tile(POSE, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
 
 
 def test_a_ratio_holds_from_its_time_on_for_its_direction_alone():
@@ -130,7 +130,7 @@ def test_a_delay_comes_on_top_of_the_radio_s_own():
 
 def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
     lossy = replace(DISK, loss=0.4, jitter_s=0.05, range_m=1.2)
-    without = run(make_air(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
+    without = run(make_medium(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
     ones = trace_of("delivery_ratio", [(0, s, (s + d) % 3, 1.0) for s in range(3) for d in (1, 2)])
     told = replayed(LinkTraces(delivery_ratio=ones), "none", 30, lossy)
     for name in ("sender", "receiver", "sequence", "received_at_ns"):
@@ -143,14 +143,14 @@ def test_the_graph_has_the_pairs_whose_worse_direction_suffices_now():
     alive = np.ones(TRIO, np.bool_)
     for others, expected in (("none", []), ("model", [[1, 2]])):
         radio = replace(DISK, trace=Trace("a.csv", others), min_delivery=0.3)
-        air = make_air(radio, TRIO, traces=LinkTraces(delivery_ratio=ratio))
-        assert air.edges(POSE, alive).tolist() == [[0, 1], *expected]
-        air.advance(2 * TICK_NS)
-        assert air.edges(POSE, alive).tolist() == [[0, 1], [0, 2], *expected]
+        medium = make_medium(radio, TRIO, traces=LinkTraces(delivery_ratio=ratio))
+        assert medium.edges(POSE, alive).tolist() == [[0, 1], *expected]
+        medium.advance(2 * TICK_NS)
+        assert medium.edges(POSE, alive).tolist() == [[0, 1], [0, 2], *expected]
 
 
 @pytest.mark.parametrize("radio", [DISK, replace(DISK, trace=Trace("a.csv"))])
 def test_a_trace_and_its_file_go_together(radio: Radio):
     traces = None if radio.trace else LinkTraces()
     with pytest.raises(ValueError, match="traces: expected"):
-        make_air(radio, TRIO, traces=traces)
+        make_medium(radio, TRIO, traces=traces)

@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.phy import Antenna, Antennas, RobotAntenna
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.reception.bursts import BurstStates
-from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
+from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium, packets, scattered
 
 PAIR = at((0, 0), (1, 0))
 LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, measures=Measures(range=RangeMeasure(0.1)))
@@ -19,17 +19,17 @@ LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, measures=Measures(ra
 
 def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8, ticks: int = 20, seeds: range = range(1)) -> Run:
     """Everybody broadcasts in each tick; the radio is another one from some ticks on."""
-    out, rows = Run(make_air(radio, robots, seeds)), robots * len(seeds)
+    out, rows = Run(make_medium(radio, robots, seeds)), robots * len(seeds)
     pose = np.concatenate([scattered(robots)] * len(seeds))
     for tick in range(ticks + 1):
         at_ns = tick_start_ns(tick, RATE_HZ)
         if tick in changes:
-            out.air.tune(changes[tick])
-        out.news.append(out.air.advance(at_ns))
+            out.medium.tune(changes[tick])
+        out.news.append(out.medium.advance(at_ns))
         if tick < ticks:
-            out.air.hold(pose, np.ones(rows, np.bool_))
-            out.air.send(at_ns, tick, everybody(rows)(tick))
-    out.last = out.air.end()
+            out.medium.hold(pose, np.ones(rows, np.bool_))
+            out.medium.send(at_ns, tick, everybody(rows)(tick))
+    out.last = out.medium.end()
     return out
 
 
@@ -88,26 +88,26 @@ def test_a_link_stays_in_its_burst_when_the_loss_within_changes():
 def test_what_was_handed_over_keeps_its_airtime_and_its_place_and_what_comes_has_the_new():
     """Ten bytes take 80 ms at first, 40 ms from 0.1 s on."""
     slow = Radio(2.0, bit_rate_bps=1000, send_offset="tick")
-    air = make_air(slow, 2)
-    told = Run(air)
+    medium = make_medium(slow, 2)
+    told = Run(medium)
     for tick in range(6):
         if tick == 1:
-            air.tune(replace(slow, bit_rate_bps=2000))
-        told.news.append(air.advance(tick_start_ns(tick, RATE_HZ)))
-        air.hold(PAIR, np.ones(2, np.bool_))
+            medium.tune(replace(slow, bit_rate_bps=2000))
+        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
+        medium.hold(PAIR, np.ones(2, np.bool_))
         if tick < 2:
-            air.send(tick_start_ns(tick, RATE_HZ), tick, packets([0, 0, 0]))
+            medium.send(tick_start_ns(tick, RATE_HZ), tick, packets([0, 0, 0]))
     assert (told.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
 
 
 def test_the_radio_graph_is_that_of_the_new_radio_once_it_holds():
-    air, alive = make_air(Radio(2.0), 2), np.ones(2, np.bool_)
-    air.tune(Radio(0.5))
-    assert len(air.edges(PAIR, alive)) == 1
-    air.advance(10)
-    air.hold(PAIR, alive)
-    assert len(air.edges(PAIR, alive)) == 0
-    assert air.radio == Radio(0.5)
+    medium, alive = make_medium(Radio(2.0), 2), np.ones(2, np.bool_)
+    medium.tune(Radio(0.5))
+    assert len(medium.edges(PAIR, alive)) == 1
+    medium.advance(10)
+    medium.hold(PAIR, alive)
+    assert len(medium.edges(PAIR, alive)) == 0
+    assert medium.radio == Radio(0.5)
 
 
 @pytest.mark.parametrize("loss", [0.0, 1.0])

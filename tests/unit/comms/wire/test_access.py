@@ -34,15 +34,15 @@ def keys_put(access: dict[str, Any], name: str, flow: str) -> set[str]:
 
 def test_each_name_may_put_its_own_keys():
     access = access_control(KEYS, ROBOTS, "flock-0")
-    assert keys_put(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.air_sent("flock-1")}
-    assert keys_put(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.air_received("*")}
+    assert keys_put(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.bridge_sent("flock-1")}
+    assert keys_put(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
     assert keys_put(access, "operator", "ingress") == set()
 
 
 @pytest.mark.parametrize("other", ["flock-1", "tracker", "operator"])
 def test_a_peer_puts_its_own_keys_to_all(other: str):
     access = access_control(KEYS, ROBOTS, "flock-0")
-    assert keys_put(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.air_sent("flock-0")}
+    assert keys_put(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.bridge_sent("flock-0")}
 
 
 def test_all_that_is_not_named_is_refused_and_every_rule_is_of_one_name():
@@ -56,7 +56,7 @@ def test_all_that_is_not_named_is_refused_and_every_rule_is_of_one_name():
 
 def test_tracker_and_operator_have_the_names_that_they_are_given():
     access = access_control(KEYS, ROBOTS, "flock-0", tracker="vicon", operator="alice")
-    assert keys_put(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.air_received("*")}
+    assert keys_put(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
     assert not rules_of(access, "tracker", "ingress")
     assert any("query" in rule["messages"] for rule in rules_of(access, "alice", "ingress"))
 

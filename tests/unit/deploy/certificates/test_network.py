@@ -30,7 +30,7 @@ from tests.support.deploy.certificates.peers import (
 )
 
 HERE = ("127.0.0.1",)
-EVERYTHING = (KEYS.any_radio, KEYS.any_pose, KEYS.air_received("flock-0"))
+EVERYTHING = (KEYS.any_radio, KEYS.any_pose, KEYS.bridge_received("flock-0"))
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_robots_hear_one_another_and_nobody_in_anothers_name(folder: Path, opene
     wait_for_listeners(speaker, own[0])
     speaker.put(own[0], b"")
     assert inbox.next() == own[0]
-    for key in (own[0], KEYS.radio("flock-0", 1), KEYS.pose("flock_2"), KEYS.air_received("flock-0"), own[1]):
+    for key in (own[0], KEYS.radio("flock-0", 1), KEYS.pose("flock_2"), KEYS.bridge_received("flock-0"), own[1]):
         wait_for_listeners(forger, key)
         forger.put(key, b"")
     assert inbox.next() == own[1]
@@ -107,10 +107,10 @@ def test_poses_come_from_the_tracker_who_is_no_robot(folder: Path, opened: ExitS
     robot = opened.enter_context(closed_after(ours(folder, "flock-0")))
     inbox = Inbox(robot, *EVERYTHING)
     tracker = opened.enter_context(closed_after(lawless(folder, "tracker", robot)))
-    for key in (KEYS.radio("flock-1", 1), KEYS.pose("flock-0"), KEYS.air_received("flock-0")):
+    for key in (KEYS.radio("flock-1", 1), KEYS.pose("flock-0"), KEYS.bridge_received("flock-0")):
         wait_for_listeners(tracker, key)
         tracker.put(key, b"")
-    assert [inbox.next(), inbox.next()] == [KEYS.pose("flock-0"), KEYS.air_received("flock-0")]
+    assert [inbox.next(), inbox.next()] == [KEYS.pose("flock-0"), KEYS.bridge_received("flock-0")]
     assert inbox.empty()
 
 
@@ -127,10 +127,10 @@ def test_only_the_operator_is_answered(folder: Path, opened: ExitStack, name: st
 
 def test_a_robot_asks_the_world_for_its_own_terms_in_the_air(folder: Path, opened: ExitStack):
     world = opened.enter_context(closed_after(ours(folder, "tracker")))
-    world.declare_queryable(KEYS.any_air_join, lambda query: query.reply(query.key_expr, b"yes"))
+    world.declare_queryable(KEYS.any_bridge_join, lambda query: query.reply(query.key_expr, b"yes"))
     robot = opened.enter_context(closed_after(ours(folder, "flock-0", world)))
-    assert replies_of(robot, KEYS.air_join("flock-0"), wait=True) == ["yes"]
-    assert replies_of(robot, KEYS.air_join("flock-1"), wait=False) == []
+    assert replies_of(robot, KEYS.bridge_join("flock-0"), wait=True) == ["yes"]
+    assert replies_of(robot, KEYS.bridge_join("flock-1"), wait=False) == []
 
 
 def test_a_revoked_name_is_received_by_those_only_who_do_not_know(folder: Path, opened: ExitStack):

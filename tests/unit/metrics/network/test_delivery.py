@@ -16,7 +16,7 @@ from swarmwire.metrics.network import link_counts
 from swarmwire.metrics.network.link_counts import LinkCounts
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.network.robot_counts import RobotCounts
-from tests.support.comms.radio.runs import make_air, packets
+from tests.support.comms.radio.runs import make_medium, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch
@@ -189,7 +189,7 @@ def test_of_robots_that_all_send_each_tick_they_are_what_the_radio_says():
     A packet that goes on air late in a tick counts in the next: of 30 packets of a robot that moves at most one.
     """
     of, size, lost, radio = static(20), 25, 0.3, Radio(range_m=50.0, loss=0.3, bit_rate_bps=20_000, overhead_bytes=5)
-    air, metrics, told = make_air(radio, of.robots, of.seeds, [()]), Metrics(["airtime", "throughput"]), []
+    air, metrics, told = make_medium(radio, of.robots, of.seeds, [()]), Metrics(["airtime", "throughput"]), []
     air.hold(np.zeros((20, 3)), np.ones(20, np.bool_))
     metrics.begin(of)
     for tick in range(31):

@@ -14,7 +14,7 @@ from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
 from swarmwire.metrics.network.pdr import PacketDeliveryRatio
 from swarmwire.metrics.network.windowed import Window
-from tests.support.comms.radio.runs import make_air, packets
+from tests.support.comms.radio.runs import make_medium, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
@@ -101,7 +101,7 @@ OPEN = Radio(range_m=50.0, loss=LOSSES, latency_s=0.15, jitter_s=0.1)
 def test_of_independent_losses_the_ratio_is_what_is_not_lost_and_the_latency_that_of_the_radio():
     """Of 15000 links the ratio deviates by 0.004, the mean of the jitter by 0.0003 s: five times that is let pass."""
     of = static(20, arenas=4)
-    air = make_air(OPEN, of.robots, of.seeds, [()] * of.arenas)
+    air = make_medium(OPEN, of.robots, of.seeds, [()] * of.arenas)
     air.hold(np.zeros((80, 3)), np.ones(80, np.bool_))
     seen = []
     for tick in range(16):

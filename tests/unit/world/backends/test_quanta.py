@@ -1,4 +1,4 @@
-"""A tick in subticks: packets go on the air when they came, and are handed over when they are due.
+"""A tick in subticks: packets go on air when they came, and are handed over when they are due.
 
 Delays are counted.
 """
@@ -30,8 +30,8 @@ def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
 
 
 @dataclass
-class Air:
-    """An air that notes what is asked of it, and lets packets be received at set times."""
+class RadioMedium:
+    """a medium that notes what is asked of it, and lets packets be received at set times."""
 
     due_ns: list[int] = field(default_factory=list[int])
     payload: bytes = b"\0\0"
@@ -74,13 +74,13 @@ def subticks_of(clock: FakeClock, factor: float = 1.0, subtick_s: float = 0.010)
 
 
 def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came() -> None:
-    clock, air = FakeClock(), Air(due_ns=[25 * MS])
+    clock, medium = FakeClock(), RadioMedium(due_ns=[25 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 12 * MS, ORIGIN_NS + 19 * MS])
     pace.begin()
-    subticks.pass_tick(0, air, exchange)
-    assert air.times_ns == [*range(0, 100 * MS, 10 * MS), 100 * MS]
-    assert [put.at_ns for put in air.puts] == [12 * MS, 19 * MS]
+    subticks.pass_tick(0, medium, exchange)
+    assert medium.times_ns == [*range(0, 100 * MS, 10 * MS), 100 * MS]
+    assert [put.at_ns for put in medium.puts] == [12 * MS, 19 * MS]
     assert exchange.handed == [(0, 30 * MS, 25 * MS)]
     delays = pace.delivery.delays()
     assert delays is not None
@@ -89,13 +89,13 @@ def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came()
 
 
 def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulation() -> None:
-    clock, air = FakeClock(), Air(due_ns=[130 * MS])
+    clock, medium = FakeClock(), RadioMedium(due_ns=[130 * MS])
     pace, subticks = subticks_of(clock, factor=2.0)
     exchange = Exchange(clock)
     for tick in range(2):
         pace.begin()
-        subticks.pass_tick(tick, air, exchange)
-    assert air.times_ns[:3] == [0, 20 * MS, 40 * MS]
+        subticks.pass_tick(tick, medium, exchange)
+    assert medium.times_ns[:3] == [0, 20 * MS, 40 * MS]
     assert exchange.handed == [(1, 140 * MS, 130 * MS)]
     delays = pace.delivery.delays()
     assert delays is not None
@@ -103,30 +103,30 @@ def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulat
 
 
 def test_a_loop_that_lags_makes_up_for_no_subtick_and_its_air_never_leaves_the_tick() -> None:
-    clock, air = FakeClock(), Air(due_ns=[1 * MS])
+    clock, medium = FakeClock(), RadioMedium(due_ns=[1 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 250 * MS], work_ns=240 * MS)
     for tick in range(2):
         pace.begin()
-        subticks.pass_tick(tick, air, exchange)
-    assert air.times_ns == [0, 10 * MS, 100 * MS, 200 * MS]
-    assert [put.at_ns for put in air.puts] == [100 * MS]  # it came after the tick that is under way for the air
+        subticks.pass_tick(tick, medium, exchange)
+    assert medium.times_ns == [0, 10 * MS, 100 * MS, 200 * MS]
+    assert [put.at_ns for put in medium.puts] == [100 * MS]  # it came after the tick that is under way for the medium
     assert pace.missed_ticks == 2
 
 
 def test_what_came_while_the_run_was_paused_is_of_the_tick_that_follows() -> None:
-    clock, air = FakeClock(), Air()
+    clock, medium = FakeClock(), RadioMedium()
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock)
     pace.begin()
-    subticks.pass_tick(0, air, exchange)
+    subticks.pass_tick(0, medium, exchange)
     exchange.sends_ns = [clock.time_ns + 500 * MS]
     clock.time_ns += 3000 * MS
     pace.begin_anew(1, 1.0, 3000 * MS)
     pace.begin()
-    subticks.pass_tick(1, air, exchange)
-    assert [put.at_ns for put in air.puts] == [100 * MS]
-    assert air.times_ns[-1] == 200 * MS
+    subticks.pass_tick(1, medium, exchange)
+    assert [put.at_ns for put in medium.puts] == [100 * MS]
+    assert medium.times_ns[-1] == 200 * MS
     assert pace.missed_ticks == 0
 
 
@@ -151,9 +151,9 @@ def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out
     pace, subticks = subticks_of(clock)
     backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, subticks)
     backend.start()
-    air = Air(due_ns=[25 * MS], payload=Word(number=1.0).encode())
-    backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
-    of_step, echo = air.puts
+    medium = RadioMedium(due_ns=[25 * MS], payload=Word(number=1.0).encode())
+    backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES), NO_TX_STATUSES, medium)
+    of_step, echo = medium.puts
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
     assert (echo.at_ns, echo.tick, echo.sent.sender.tolist()) == (30 * MS, None, [1])
     told = backend.report()

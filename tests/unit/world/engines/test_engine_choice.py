@@ -79,10 +79,10 @@ def test_an_engine_that_could_move_nobody_is_refused(engine: str, tmp_path: Path
     drone = tmp_path / "drone.toml"
     drone.write_text('like = "epuck"\nname = "drone"\naltitude_m = 1.0\n')
     table = {"count": 1, "agent": "x"}
-    ghosts, air, floor = ({**table, "body": body} for body in ("point", str(drone), "epuck"))
+    ghosts, medium, floor = ({**table, "body": body} for body in ("point", str(drone), "epuck"))
     told = "expected auto or kinematic: no robot could be moved by"
     with pytest.raises(BadInput, match=rf"physics\.engine: {told} {engine}: a has no contacts, b flies$"):
-        posed([], robots={"a": ghosts, "b": air}, physics={"engine": engine})
+        posed([], robots={"a": ghosts, "b": medium}, physics={"engine": engine})
     posed([], robots={"a": ghosts, "b": floor}, physics={"engine": engine})
 
 

@@ -48,8 +48,8 @@ class Inner:
         self.given.append("closed")
 
 
-class Air:
-    """An air whose robots send one packet in each tick."""
+class RadioMedium:
+    """a medium whose robots send one packet in each tick."""
 
     def __init__(self) -> None:
         self.published: list[Any] = []
@@ -67,9 +67,9 @@ class Air:
 class Around:
     """A backend of two robots of its own and three behind a gateway, rows 2 to 4."""
 
-    def __init__(self, *, air: bool = True, subtick_s: float | None = None) -> None:
+    def __init__(self, *, medium: bool = True, subtick_s: float | None = None) -> None:
         self.clock, self.inner, self.said = FakeClock(), Inner(), []
-        self.air = Air() if air else None
+        self.medium = RadioMedium() if medium else None
         body = load_body("epuck2")
         self.gateway = ScriptedGateway(("b-0", "b-1", "b-2"), body, "", ScriptedOptions(), self.clock)
         group = GatewayGroup(Group("b", body, 2, 5), "scripted", self.gateway)
@@ -77,7 +77,7 @@ class Around:
         self.shown = 0
         subticks = Subticks(self.clock, pace, 10, subtick_s) if subtick_s else None
         self.backend = GatewayBackend(
-            self.inner, [group], self.air, pace, 10, self.show, lambda: {"unseen": 4}, subticks
+            self.inner, [group], self.medium, pace, 10, self.show, lambda: {"unseen": 4}, subticks
         )
 
     def show(self) -> None:
@@ -154,8 +154,8 @@ def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_pack
     _, sensors, received, _ = around.inner.given[-1]
     assert list(sensors) == ["a"]
     assert len(received) == 3  # a host takes what is for its robots
-    assert around.air is not None
-    ((tick, outside, told),) = around.air.published
+    assert around.medium is not None
+    ((tick, outside, told),) = around.medium.published
     assert tick == 0
     assert outside.receiver.tolist() == [2, 4]
     assert told.row.tolist() == [3]
@@ -164,7 +164,7 @@ def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_pack
 
 
 def test_without_a_radio_nothing_but_commands_is_taken() -> None:
-    around = Around(air=False)
+    around = Around(medium=False)
     assert [around.act(0, [2, 3, 4]).sent.payloads.row(0)] == [b"inner"]
 
 
@@ -234,19 +234,19 @@ class QuietAir:
 
 
 def test_in_subticks_robots_behind_gateways_are_told_when_it_is_due_and_what_they_send_goes_out_at_once() -> None:
-    around, air = Around(subtick_s=0.010), QuietAir()
+    around, medium = Around(subtick_s=0.010), QuietAir()
     rows = np.array([2, 3, 4])
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
     sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields)}
     around.gateway.drive = {1: (0.05, -0.7)}
-    actions = around.backend.act_in_time(0, sensors, ReceivedPackets.none(MEASURES), NO_TX_STATUSES, air)
-    assert around.air is not None
-    received = [told.receiver.tolist() for _, told, _ in around.air.published if len(told)]
+    actions = around.backend.act_in_time(0, sensors, ReceivedPackets.none(MEASURES), NO_TX_STATUSES, medium)
+    assert around.medium is not None
+    received = [told.receiver.tolist() for _, told, _ in around.medium.published if len(told)]
     assert received == [[3]]
     assert [given[1].receiver.tolist() for given in around.inner.given if given[0] == "received"] == [[], [0, 3]]
-    assert air.sent[:2] == [(0, b"inner"), (None, b"outer")]
-    assert (None, b"echo") in air.sent
-    assert set(air.sent[2:]) == {(None, b"outer"), (None, b"echo")}
+    assert medium.sent[:2] == [(0, b"inner"), (None, b"outer")]
+    assert (None, b"echo") in medium.sent
+    assert set(medium.sent[2:]) == {(None, b"outer"), (None, b"echo")}
     assert not len(actions.sent)
     assert commands(actions)[3] == (0.05, -0.7)
     assert around.backend.report().subtick_s == 0.010

@@ -1,7 +1,7 @@
 """Runners in real time, without any I/O: frames go out at each tick's start, answers count when they come.
 
     tick      open_tick     a frame for each ready runner of a group that acts, whether or not it has answered the last
-              "actions"     if newer than any before: commands apply at once, its packets go to the air at once;
+              "actions"     if newer than any before: commands apply at once, its packets go to the medium at once;
                             every older frame without an answer was dropped
               take          commands that came since the last take; a robot asked `watchdog_s` ago or longer, with no
                             answer since, stops; any answer lets it go on
@@ -14,7 +14,7 @@ With a subtick packets cross also between these: `packets` frames go out, and "s
 any. Then `puts` gives, many times in a tick, what came to be sent, and when; `take` has none left.
 
     subtick   hand_over     a frame "packets" to each ready runner some of whose robots received something
-              "sent"        its packets go to the air at once
+              "sent"        its packets go to the medium at once
               "actions"     as above, but its packets wait for their robots' turn only
 
 How runners join and are lost stands in `roster`, and so does what becomes of frames that do not fit.

@@ -69,7 +69,7 @@ class PacedBackend:
         return actions
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         """The same, with packets handed over when they are due."""
         assert self._subticks
@@ -78,7 +78,7 @@ class PacedBackend:
         self._backend.receive(received, tx_status)
         actions = self._backend.act(tick, readings, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
-        self._subticks.pass_tick(tick, air, self)
+        self._subticks.pass_tick(tick, medium, self)
         return replace(actions, sent=SentPackets.none())
 
     def take_in(self) -> list[Put]:
@@ -135,16 +135,16 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         return self._roster.take()
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         """The same, with frames also between ticks, as packets come and are due."""
         assert self._subticks
         now_ns = self._pace.begin()
         self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, tx_status)
         self._pace.handed_over(received.received_at_ns)
-        self._subticks.exchange(tick, air, self)  # first what became due since the last tick's end
+        self._subticks.exchange(tick, medium, self)  # first what became due since the last tick's end
         self._send(self._roster.open_tick(tick, now_ns, readings, ReceivedPackets.none(), NO_TX_STATUSES))
-        self._subticks.pass_tick(tick, air, self)
+        self._subticks.pass_tick(tick, medium, self)
         return self._roster.take()
 
     def take_in(self) -> list[Put]:

@@ -104,7 +104,7 @@ class GatewayBackend:
         self,
         inner: ReceivingBackend,
         groups: Sequence[GatewayGroup],
-        air: RobotsRadio | None,
+        medium: RobotsRadio | None,
         pace: Pace,
         rate_hz: int,
         show: Callable[[], None] = lambda: None,
@@ -116,7 +116,7 @@ class GatewayBackend:
         `show_counts` tells what went wrong there, by name. Gateways and air are open already, and are closed by
         whoever opened them.
         """
-        self._inner, self._groups, self._air, self._pace, self._show = inner, groups, air, pace, show
+        self._inner, self._groups, self._medium, self._pace, self._show = inner, groups, medium, pace, show
         self._rate_hz, self._show_counts, self._subticks = rate_hz, show_counts, subticks
         self._puts: list[Put] = []
         self._names = frozenset(group.name for group in groups)
@@ -132,10 +132,10 @@ class GatewayBackend:
         self._pace.hold(tick)
         self._catch_up(tick)
         told = Actions.joined([actions, *(group.take() for group in self._groups)])
-        return replace(told, sent=SentPackets.joined([told.sent, self._air.take()])) if self._air else told
+        return replace(told, sent=SentPackets.joined([told.sent, self._medium.take()])) if self._medium else told
 
     def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, air: SubtickMedium
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         """The same, with packets taken when they come and handed over when they are due."""
         assert self._subticks
@@ -143,7 +143,7 @@ class GatewayBackend:
         self._inner.receive(received, tx_status)
         actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
         self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
-        self._subticks.pass_tick(tick, air, self)
+        self._subticks.pass_tick(tick, medium, self)
         self._catch_up(tick)
         still = replace(actions, sent=SentPackets.none())
         return Actions.joined([still, *(group.take() for group in self._groups)])
@@ -151,7 +151,7 @@ class GatewayBackend:
     def take_in(self) -> list[Put]:
         """What agents here sent since the last call, and what came from foreign ones."""
         puts, self._puts = self._puts, []
-        return [*puts, Put(self._pace.now_ns(), None, self._air.take())] if self._air else puts
+        return [*puts, Put(self._pace.now_ns(), None, self._medium.take())] if self._medium else puts
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Tell robots behind gateways, and let agents here that read between ticks read."""
@@ -162,13 +162,13 @@ class GatewayBackend:
             self._puts.append(Put(self._pace.now_ns(), None, sent))
 
     def counts(self) -> dict[str, int]:
-        """Faults of the inner backend, of gateways by their kind, of what is shown, and of the air between."""
+        """Faults of the inner backend, of gateways by their kind, of what is shown, and of the medium between."""
         found = Counter(self._inner.counts())
         found.update(self._show_counts())
         for group in self._groups:
             found.update({f"{group.kind}_{name}": count for name, count in group.gateway.counts().items()})
-        if self._air:
-            found.update({f"air_{name}": count for name, count in self._air.counts().items() if name not in CARRIED})
+        if self._medium:
+            found.update({f"air_{name}": count for name, count in self._medium.counts().items() if name not in CARRIED})
         return {name: count for name, count in found.items() if count}
 
     def report(self) -> RealTimeReport:
@@ -186,8 +186,8 @@ class GatewayBackend:
         return {name: of for name, of in readings.items() if name not in self._names}
 
     def _publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        if self._air:
-            self._air.publish(
+        if self._medium:
+            self._medium.publish(
                 tick, received.select(self._own(received.receiver)), tx_status.select(self._own(tx_status.row))
             )
 

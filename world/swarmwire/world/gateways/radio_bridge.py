@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, encode_air
+from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, encode_bridged
 from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
@@ -53,13 +53,16 @@ class RadioBridge:
         network: Network,
         keys: SwarmKeys,
         rows: Mapping[str, int],
-        air: BridgedRadio | None,
+        medium: BridgedRadio | None,
         access: Mapping[str, Any] | None = None,
     ) -> None:
-        """`rows` are those of the world's robots that may take part, by name; `air` is None in a run without radio."""
-        self._network, self._keys, self._rows, self._air, self._access = network, keys, dict(rows), air, access
-        self._row_of = {keys.air_sent(name): row for name, row in rows.items()}
-        self._joins = {keys.air_join(name): row for name, row in rows.items()}
+        """`rows` are those of the world's robots that may take part, by name.
+
+        `medium` is None in a run without radio.
+        """
+        self._network, self._keys, self._rows, self._medium, self._access = network, keys, dict(rows), medium, access
+        self._row_of = {keys.bridge_sent(name): row for name, row in rows.items()}
+        self._joins = {keys.bridge_join(name): row for name, row in rows.items()}
         self._inbox = BoundedInbox[tuple[int, bytes]](MAX_WAITING)
         self._session: zenoh.Session | None = None
         self._publishers: dict[int, zenoh.Publisher] = {}  # by row
@@ -79,13 +82,13 @@ class RadioBridge:
         session = self._session = open_swarm(self._network, self._access, small=False)
         self._publishers = {
             row: session.declare_publisher(
-                self._keys.air_received(name), congestion_control=zenoh.CongestionControl.DROP
+                self._keys.bridge_received(name), congestion_control=zenoh.CongestionControl.DROP
             )
             for name, row in self._rows.items()
         }
         self._declared = (
-            session.declare_subscriber(self._keys.any_air_sent, Callback(self._arrive, indirect=False)),
-            session.declare_queryable(self._keys.any_air_join, Callback(self._answer, indirect=False)),
+            session.declare_subscriber(self._keys.any_bridge_sent, Callback(self._arrive, indirect=False)),
+            session.declare_queryable(self._keys.any_bridge_join, Callback(self._answer, indirect=False)),
         )
         return endpoints_of(session, self._network)
 
@@ -96,14 +99,14 @@ class RadioBridge:
             its = received.select(np.flatnonzero(received.receiver == row)).compacted()
             told = tx_status.select(np.flatnonzero(tx_status.row == row))
             try:
-                self._publishers[row].put(encode_air(tick, row, its, told))
+                self._publishers[row].put(encode_bridged(tick, row, its, told))
             except zenoh.ZError:  # the session was closed
                 self._counted["frames_refused"] += 1
             else:
                 self._counted["packets_to_robots"] += len(its)
 
     def take(self) -> SentPackets:
-        """Packets that the robots sent since the last call; those of robots that died are for the air to end."""
+        """Packets that the robots sent since the last call; those of robots that died are for the medium to end."""
         parts = [sent for row, frame in self._inbox.take() if (sent := self._sent(row, frame)) is not None]
         self._counted["packets_from_robots"] += sum(map(len, parts))
         return SentPackets.joined(parts)
@@ -136,13 +139,13 @@ class RadioBridge:
         """Called by the network's threads: what there is to say is known."""
         with query:  # one that is kept alive holds its asker
             row = self._joins.get(key := str(query.key_expr))
-            if self._air is None:
+            if self._medium is None:
                 query.reply_err("expected a world with a radio; this run has none")
             elif row is None:
                 robots = ", ".join(self._rows) or "none"
                 query.reply_err(f"expected a robot that the world lends its air to: {robots}")
             else:
-                query.reply(key, self._air.terms(row).encode())
+                query.reply(key, self._medium.terms(row).encode())
 
     def _sent(self, row: int, data: bytes) -> SentPackets | None:
         try:

@@ -11,7 +11,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Finished
 
 SPOT_M = (2.0, 2.0)
@@ -44,22 +44,22 @@ def contention(
     rate_hz = max(round(1.0 / interval_s), 1)
     rows = nodes * len(seeds)
     keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-    air = Air(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
+    medium = RadioMedium(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
     payloads = Payloads.of([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(warm_up_s * rate_hz), round((warm_up_s + measured_s) * rate_hz)
-    air.hold(np.zeros((rows, 3)), np.ones(rows, np.bool_))
+    medium.hold(np.zeros((rows, 3)), np.ones(rows, np.bool_))
     counted = (last - first) * rows
     received = delay_ns = gave_up = 0
     for tick in range(last + round(LATE_S * rate_hz) + 1):
         at_ns = tick_start_ns(tick, rate_hz)
-        finished = air.advance(at_ns).finished
+        finished = medium.advance(at_ns).finished
         due = (finished.sequence >= first) & (finished.sequence < last)
         reached = due & (finished.fate == Fate.RECEIVED)
         received += int(finished.receivers[reached].sum())
         delay_ns += int((finished.final_at_ns - finished.sent_at_ns)[reached].sum())
         gave_up += _packets(finished, due & (finished.fate == Fate.CHANNEL_BUSY))
-        air.send(at_ns, tick, sent)
+        medium.send(at_ns, tick, sent)
     mean_delay_s = delay_ns / received / NS_PER_S if received else None
     return Contention(counted, received / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
 

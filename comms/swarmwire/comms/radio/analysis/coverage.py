@@ -1,6 +1,6 @@
 """Coverage: how strong a radio is from one place to another, and what of lone packets gets through; no robots needed.
 
-All of it is the air's own propagation and reception. Other robots neither disturb nor stand in between.
+All of it is the medium's own propagation and reception. Other robots neither disturb nor stand in between.
 """
 
 # pyright: basic, reportUnknownMemberType=false

@@ -245,7 +245,7 @@ class Access:
     )
     busy_dbm: float | None = parameter(
         None,
-        help="power from which the air counts as busy; without it 10 dB above the sensitivity (csma-802154) or "
+        help="power from which the medium counts as busy; without it 10 dB above the sensitivity (csma-802154) or "
         "-62 dBm (dcf)",
         unit="dBm",
         at_least=-200,

@@ -189,7 +189,7 @@ class Radio:
         return self.access or Access()
 
 
-# --- Frames: how long packets occupy the air, by the way in which the radio frames them.
+# --- Frames: how long packets occupy the medium, by the way in which the radio frames them.
 
 
 # Octets of an acknowledgement: preamble, delimiter, length and PSDU of IEEE 802.15.4; the PSDU of IEEE 802.11.
@@ -197,7 +197,7 @@ SHORT_ACKNOWLEDGEMENT, LONG_ACKNOWLEDGEMENT = 11, 14
 
 
 def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
-    """How long frames of so many bytes, overhead included, occupy the air, in ns, (k,)."""
+    """How long frames of so many bytes, overhead included, occupy the medium, in ns, (k,)."""
     if radio.frame == "802.11b":
         return ieee80211b_ns(frame_bytes, radio.bit_rate_bps, short_preamble=False)
     if radio.frame == "802.11a":

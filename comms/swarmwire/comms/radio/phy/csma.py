@@ -1,4 +1,4 @@
-"""Unslotted CSMA/CA of IEEE 802.15.4: wait at random, listen, and send if the air is free, else wait longer."""
+"""Unslotted CSMA/CA of IEEE 802.15.4: wait at random, listen, and send if the medium is free, else wait longer."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -32,7 +32,7 @@ def listen(rules, state, queue, r, now_ns):
 
 @borrowing()
 def gives_up(rules, state, queue, r, now_ns):
-    """The radio has listened: it sends, or backs off anew, or gives up (True), if the air was busy too often.
+    """The radio has listened: it sends, or backs off anew, or gives up (True), if the medium was busy too often.
 
     As in ns-3, it is busy if a frame began meanwhile or is on air at the end; one that ended meanwhile does not count.
     """

@@ -1,8 +1,8 @@
-"""DCF of IEEE 802.11: who wants to send waits until the air was free for DIFS, then for its slots of free air.
+"""DCF of IEEE 802.11: who wants to send waits until the medium was free for DIFS, then for its slots of free air.
 
-A robot that finds the air free sends after DIFS, as in ns-3; the standard lets it do so at once. Each frame on air is
-followed by new slots; those that are left when the air becomes busy count on when it is free again. After a frame that
-was not understood the air counts as free only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
+A robot that finds the medium free sends after DIFS, as in ns-3; the standard lets it do so at once. Each frame on air
+is followed by new slots; those that are left when the medium becomes busy count on when it is free again. After a frame
+that was not understood the medium counts as free only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -45,7 +45,7 @@ def sense(rules, state, queue, r, now_ns):
 
 @borrowing()
 def _change(rules, state, queue, r, now_ns):
-    """The air at the robot has become busy, or free."""
+    """The medium at the robot has become busy, or free."""
     me, reception = state.robot[r], state.reception[r]
     reception.is_busy = not reception.is_busy
     if reception.is_busy:

@@ -39,7 +39,7 @@ def timer(rules, state, queue, told, r, now_ns):
 
 @borrowing()
 def listened(rules, state, queue, told, r, now_ns):
-    """CSMA: the radio has listened whether the air is free."""
+    """CSMA: the radio has listened whether the medium is free."""
     if not csma.gives_up(rules, state, queue, r, now_ns):
         return
     me = state.robot[r]

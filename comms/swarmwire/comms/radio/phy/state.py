@@ -41,9 +41,9 @@ ROBOT = _rows(
         ("attempt", _I),  # of this packet, from 0
         ("busy_times", _I),  # CSMA: NB
         ("exponent", _I),  # CSMA: BE; DCF: how often the window was doubled
-        ("slots", _I),  # DCF: left to wait, counted from `free_from_ns` + DIFS while the air is free
+        ("slots", _I),  # DCF: left to wait, counted from `free_from_ns` + DIFS while the medium is free
         ("free_from_ns", _I),  # DCF
-        ("trust_from_ns", _I),  # DCF: after a frame that was not understood the air counts as free only from here
+        ("trust_from_ns", _I),  # DCF: after a frame that was not understood the medium counts as free only from here
         # The frame on air.
         ("on_air", _I),
         ("on_air_ns", _I),
@@ -145,7 +145,7 @@ class State(NamedTuple):
 
 
 def robots_at_rest(rows: int) -> Table:
-    """A table of dtype ROBOT: nobody has a packet, and the air has been free for long."""
+    """A table of dtype ROBOT: nobody has a packet, and the medium has been free for long."""
     robot: Table = np.zeros(rows, ROBOT)
     robot["packet"] = robot["answers_to"] = NOBODY
     robot["free_from_ns"] = LONG_AGO_NS

@@ -74,7 +74,7 @@ class BodiesBlock(Stage):
         return BodiesBlock(context) if context.radio.bodies_block and context.radius_m.any() else None
 
     def __init__(self, context: ChannelContext) -> None:
-        assert context.radio.range_m is not None  # `Air` has refused a unit disk without
+        assert context.radio.range_m is not None  # `RadioMedium` has refused a unit disk without
         self._running, self._robots, self._size_m = context.running, context.robots, context.size_m
         self._radius_m, self._range_m = context.radius_m, context.radio.range_m
 

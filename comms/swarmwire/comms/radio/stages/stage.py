@@ -23,9 +23,9 @@ class ChannelContext:
     obstacles: Obstacles
     size_m: tuple[float, float]  # of each arena
     radius_m: FloatArray  # (rows,) of the robots
-    disruption: Disruption  # kept up to date by the air
+    disruption: Disruption  # kept up to date by the medium
     antennas: Antennas  # of robots
-    running: BoolArray  # (arenas,) kept up to date by the air: in others nobody sends any more
+    running: BoolArray  # (arenas,) kept up to date by the medium: in others nobody sends any more
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
     is_torus: bool = False  # distances are the shortest
 

@@ -91,7 +91,7 @@ class Channel:
     def _reach(self, pose: FloatArray) -> Reach:
         """Who is in range of whom; the poses of a tick serve its radio graph and the packets that go on air in it."""
         if pose is not self._known_pose:
-            assert self._radio.range_m is not None  # `Air` has refused a unit disk without
+            assert self._radio.range_m is not None  # `RadioMedium` has refused a unit disk without
             self._known = self._find_reach(pose, self._running, self._size_m, self._radio.range_m)
             self._known_pose = pose
         return self._known

@@ -1,4 +1,4 @@
-"""Coverage is what the air would do between robots at those places, and surveys show it truly.
+"""Coverage is what the medium would do between robots at those places, and surveys show it truly.
 
 Keys are fixed; shares are held to 4.4 standard errors, a false alarm of 1 in 90 000 each.
 """
@@ -17,7 +17,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import IEEE_802_15_4
-from tests.support.comms.radio.runs import SIZE_M, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import SIZE_M, at, everybody, make_medium, packets, run, scattered
 
 OBSTACLES = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.4), Obstacle("box", -1.0, -1.0, 0.3, size_m=(1.5, 0.4))]
 DISK = Radio(2.5, loss=0.1, bursts=Bursts(1.0, 9.0))
@@ -38,9 +38,9 @@ def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_b
 )
 def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
     pose = scattered(ROBOTS)
-    air = make_air(radio, ROBOTS, obstacles=[OBSTACLES])
-    air.hold(pose, np.ones(ROBOTS, np.bool_))
-    edges = air.edges(pose, np.ones(ROBOTS, np.bool_))
+    medium = make_medium(radio, ROBOTS, obstacles=[OBSTACLES])
+    medium.hold(pose, np.ones(ROBOTS, np.bool_))
+    edges = medium.edges(pose, np.ones(ROBOTS, np.bool_))
     a, b = np.triu_indices(ROBOTS, 1)
     coverage = coverage_of(radio, OBSTACLES, radio.max_payload_bytes)
     joined = coverage.delivery(pose[a, :2], pose[b, :2]) >= radio.min_delivery - 1e-9
@@ -50,13 +50,13 @@ def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
 
 def test_the_mean_strength_is_that_of_packets_received():
     pose = scattered(ROBOTS)
-    told = run(make_air(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
+    told = run(make_medium(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
     received = told.finished("fate") == 0
     sender, receiver = told.finished("sender")[received], told.finished("receiver")[received]
     mean_dbm = coverage_of(SHADED, OBSTACLES).mean_dbm(pose[sender, :2], pose[receiver, :2])
     assert len(sender) > 200
     assert mean_dbm is not None
-    # The air's links have their shadowing in single precision.
+    # The medium's links have their shadowing in single precision.
     off_db = np.abs(told.finished("rssi_dbm")[received] - mean_dbm)
     assert np.median(off_db) < 1e-4
     assert off_db.max() < 0.1
@@ -70,8 +70,8 @@ def test_delivery_is_the_share_of_lone_packets_that_are_received(fading: Fading 
     delivery = coverage_of(radio).delivery(np.broadcast_to(np.array([-2.9, 0.0]), end.shape), end)
     halfway = int(np.argmin(np.abs(delivery - 0.5)))
     expected, pose = float(delivery[halfway]), at((-2.9, 0.0), (x_m[halfway], 0.0))
-    air = make_air(radio, 2, range(1000))
-    told = run(air, np.tile(pose, (1000, 1)), lambda _: packets(range(0, 2000, 2)), 1, 1)
+    medium = make_medium(radio, 2, range(1000))
+    told = run(medium, np.tile(pose, (1000, 1)), lambda _: packets(range(0, 2000, 2)), 1, 1)
     share = len(told.received("receiver")) / 1000
     assert 0.3 < expected < 0.7
     # The coverage's own sample of gains, twice as many, has an error, too.
@@ -79,7 +79,10 @@ def test_delivery_is_the_share_of_lone_packets_that_are_received(fading: Fading 
 
 
 def test_nothing_is_delivered_below_the_cut_off():
-    """Fading lifts some packets above the noise from just below it; the air leaves such links out if it is told to."""
+    """Fading lifts some packets above the noise from just below it.
+
+    The medium leaves such links out if it is told to.
+    """
     near, far = (replace(WEAK, fading=Fading("rayleigh"), cut_off_db=below_db) for below_db in (0.0, 10.0))
     end = np.stack([np.linspace(1.0, 20.0, 500), np.zeros(500)], axis=1)
     mean_dbm = coverage_of(near).mean_dbm(np.zeros_like(end), end)

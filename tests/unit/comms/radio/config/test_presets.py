@@ -17,7 +17,7 @@ from swarmwire.comms.radio.phy.propagation import range_of, receiver_for, sensit
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.reception.receiver import chunk_success
 from tests.support.comms.radio.parameter_modules import MODULES
-from tests.support.comms.radio.runs import at, make_air, packets, run
+from tests.support.comms.radio.runs import at, make_medium, packets, run
 from tests.unit.world.scenario.test_radio_tables import radio_of
 
 NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
@@ -65,7 +65,7 @@ def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
     assert range_m is not None
     for share, received in ((0.5, True), (1.3, False)):
         # One sends: two modems that call at once would not hear each other.
-        told = run(make_air(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
+        told = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
         assert told.fates() == ({"RECEIVED": 1} if received else {"OUT_OF_RANGE": 1})
 
 
@@ -109,7 +109,7 @@ def test_what_is_slow_is_received_later_with_distance(model: str):
     radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
     for speed_mps, later_ns in ((None, [0, 0]), (1500.0, [50_000_000, 100_000_000])):
         slow = replace(radio, propagation_mps=speed_mps)
-        told = run(make_air(slow, 3), place, lambda _: packets([0]), 1, 3)
+        told = run(make_medium(slow, 3), place, lambda _: packets([0]), 1, 3)
         assert (told.received("received_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
 
 
@@ -120,7 +120,7 @@ def test_fading_of_sound_goes_by_its_own_wavelength():
     like = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=3e9, propagation_mps=3e8)
     place = at((0, 0), (10, 0), (0, 14))
     strengths = [
-        run(make_air(radio, 3), place, lambda _: packets([0], size=4), 1, 20).given("rssi_dbm").tolist()
+        run(make_medium(radio, 3), place, lambda _: packets([0], size=4), 1, 20).given("rssi_dbm").tolist()
         for radio in (sound, like)
     ]
     assert len(strengths[0]) == 2

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reports
 from swarmwire.comms.radio.phy.results import Told
 from tests.support.comms.radio.phy.radios import ALL_GIVEN, METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, random_traffic
 
 
@@ -49,9 +49,9 @@ def radios(draw: st.DrawFn) -> Radio:
 def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int) -> Run:
     """Four ticks of random traffic among robots at random places, some near, some far."""
     rng = np.random.default_rng(seed)
-    air = make_air(radio, robots, range(arenas), [OBSTACLES] * arenas)
+    medium = make_medium(radio, robots, range(arenas), [OBSTACLES] * arenas)
     pose = scattered(arenas * robots, seed) * [rng.choice([1.0, 30.0]), 20.0, 1.0]
-    return run(air, pose, lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
+    return run(medium, pose, lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
 
 
 @given(radios(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
@@ -81,19 +81,19 @@ def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int
 @given(radios(), st.integers(2, 8), st.integers(0, 1000))
 def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int, seed: int):
     rng = np.random.default_rng(seed)
-    air = make_air(radio, robots)
+    medium = make_medium(radio, robots)
     pose, tally = scattered(robots, seed) * [10.0, 10.0, 1.0], []
     disruption = [random_disruption(robots, rng) for _ in range(6)]
     for tick in range(6):
-        air.disrupt(disruption[tick])
+        medium.disrupt(disruption[tick])
         if rng.random() < 0.3:
-            air.tune(replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0)))
-        tally.append(air.advance(tick * 10**8).tally)
-        air.hold(pose, disruption[tick].alive)
+            medium.tune(replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0)))
+        tally.append(medium.advance(tick * 10**8).tally)
+        medium.hold(pose, disruption[tick].alive)
         living = np.flatnonzero(disruption[tick].alive)
         if len(living):
-            air.send(tick * 10**8, tick, packets(rng.choice(living, 2 * robots)))
-    tally.append(air.end())
+            medium.send(tick * 10**8, tick, packets(rng.choice(living, 2 * robots)))
+    tally.append(medium.end())
     assert sum(t.fates.sum() for t in tally) == sum(t.intended.sum() for t in tally)
     assert min(t.fates.min() for t in tally) >= 0
 
@@ -127,11 +127,11 @@ def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
 @pytest.mark.parametrize("method", METHODS)
 def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
     """Two frames of each robot, the run over at their first bits."""
-    air = make_air(with_access(method), 3)
-    air.hold(at((0, 0), (1, 0), (2, 0)), np.ones(3, bool))
-    air.send(0, 0, packets([0, 0, 1, 1, 2], [BROADCAST] * 4 + [1]))
-    first = air.advance(1000)
-    last = air.end()
+    medium = make_medium(with_access(method), 3)
+    medium.hold(at((0, 0), (1, 0), (2, 0)), np.ones(3, bool))
+    medium.send(0, 0, packets([0, 0, 1, 1, 2], [BROADCAST] * 4 + [1]))
+    first = medium.advance(1000)
+    last = medium.end()
     assert first.tally.intended.tolist() == [9]
     assert last.fates[0, Fate.IN_FLIGHT] == 9
 
@@ -139,7 +139,7 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
 def test_a_full_queue_counts_whom_it_kept_waiting():
     """Five frames of 90 ms, room for one: three are refused, each with its two receivers in range."""
     radio = replace(with_access("aloha"), bit_rate_bps=2400, queue_limit=1)
-    told = run(make_air(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
+    told = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
     assert told.fates() == {"RECEIVED": 4, "QUEUE_FULL": 6}
     assert told.tally.in_range.tolist() == [10]
 
@@ -148,7 +148,7 @@ def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
     pose = at((-1, -2), (-1, 2), (-2.8, -2))
     for asked, fates in ((True, {"RECEIVED": 4, "BLOCKED": 2}), (False, {"RECEIVED": 6})):
         radio = replace(with_access("none"), line_of_sight=asked)
-        told = run(make_air(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
+        told = run(make_medium(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
         assert told.fates() == fates
 
 
@@ -163,7 +163,7 @@ def test_a_packet_given_up_in_a_later_tick_than_its_last_attempt_still_has_its_p
         send_offset="uniform",
     )
     to = (np.arange(6) + 1) % 6
-    told = run(make_air(radio, 6), scattered(6), lambda _: packets(np.arange(6), to), 60, 1)
+    told = run(make_medium(radio, 6), scattered(6), lambda _: packets(np.arange(6), to), 60, 1)
     assert told.fates()["LOST"] > 100
 
 
@@ -173,7 +173,7 @@ ROBOTS = 12
 def crowded() -> Run:
     """Five packets of each robot in each of three ticks."""
     radio = replace(with_access("aloha"), queue_limit=9)
-    return run(make_air(radio, ROBOTS), scattered(ROBOTS), lambda _: packets(np.repeat(range(ROBOTS), 5)), 3, 2)
+    return run(make_medium(radio, ROBOTS), scattered(ROBOTS), lambda _: packets(np.repeat(range(ROBOTS), 5)), 3, 2)
 
 
 def finished(told: Run) -> list[tuple[int, ...]]:
@@ -200,12 +200,12 @@ def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyP
 def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
     """Robot 2 is dead; of what a full queue refuses, too, and then it would have been in range."""
     radio = replace(with_access("aloha"), queue_limit=queue_limit, send_offset="tick")
-    air, alive = make_air(radio, 4), np.array([True, True, False, True])
-    told = Run(air)
-    air.hold(at((0, 0), (1, 0), (0, 1), (500, 0)), alive)
-    air.send(0, 0, packets([0, 0, 0, 0], [-1, -1, 2, 1]))
-    told.news.append(air.advance(5 * TICK_NS))
-    told.last = air.end()
+    medium, alive = make_medium(radio, 4), np.array([True, True, False, True])
+    told = Run(medium)
+    medium.hold(at((0, 0), (1, 0), (0, 1), (500, 0)), alive)
+    medium.send(0, 0, packets([0, 0, 0, 0], [-1, -1, 2, 1]))
+    told.news.append(medium.advance(5 * TICK_NS))
+    told.last = medium.end()
     refused = {
         0: {"RECEIVED": 1, "OUT_OF_RANGE": 1, "QUEUE_FULL": 4},
         9: {"RECEIVED": 3, "OUT_OF_RANGE": 2, "RECEIVER_DEAD": 1},
@@ -217,13 +217,16 @@ def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
 
 def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
     """Frames of 90 ms: at 100 ms the second is on air, and the third waits."""
-    air, held = make_air(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2), Disruption.none(2)
-    told = Run(air)
-    air.hold(at((0, 0), (1, 0)), np.ones(2, np.bool_))
-    air.send(0, 0, packets([0, 0, 0]))
+    medium, held = (
+        make_medium(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2),
+        Disruption.none(2),
+    )
+    told = Run(medium)
+    medium.hold(at((0, 0), (1, 0)), np.ones(2, np.bool_))
+    medium.send(0, 0, packets([0, 0, 0]))
     held.alive[0] = False
-    air.disrupt(held)
-    told.news += [air.advance(TICK_NS), air.advance(5 * TICK_NS)]
+    medium.disrupt(held)
+    told.news += [medium.advance(TICK_NS), medium.advance(5 * TICK_NS)]
     assert told.fates() == {"RECEIVED": 2, "SENDER_DEAD": 1}
     assert told.tally.in_range.tolist() == [3]
 
@@ -231,12 +234,12 @@ def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
 def test_ranges_are_those_at_which_frames_went_on_air():
     """Two frames that end in the same tick; one went on air in the tick before, when the robots were nearer."""
     radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, measures=Measures(RangeMeasure(0.0)))
-    air, alive = make_air(radio, 2), np.ones(2, np.bool_)
-    told = Run(air)
+    medium, alive = make_medium(radio, 2), np.ones(2, np.bool_)
+    told = Run(medium)
     for tick, (x_m, sender, size) in enumerate([(1.0, 0, 90), (2.0, 1, 10), (4.0, 0, 10)]):
-        told.news.append(air.advance(tick * TICK_NS))
-        air.hold(at((0, 0), (x_m, 0)), alive)
-        air.send(tick * TICK_NS, tick, packets([sender], size=size))
-    told.news.append(air.advance(4 * TICK_NS))
+        told.news.append(medium.advance(tick * TICK_NS))
+        medium.hold(at((0, 0), (x_m, 0)), alive)
+        medium.send(tick * TICK_NS, tick, packets([sender], size=size))
+    told.news.append(medium.advance(4 * TICK_NS))
     assert [len(one.received.receiver) for one in told.news] == [0, 0, 2, 1]
     assert told.given("range_m").tolist() == pytest.approx([2.0, 1.0, 4.0])  # by receiver

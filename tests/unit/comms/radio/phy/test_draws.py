@@ -17,7 +17,7 @@ from swarmwire.comms.radio.phy.losses import passing_share
 from swarmwire.comms.radio.phy.params import rules_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
 from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
-from tests.support.comms.radio.runs import Run, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import Run, at, everybody, make_medium, packets, run, scattered
 
 ROBOTS = 8
 
@@ -47,13 +47,13 @@ def test_time_may_pass_in_any_pieces(method: str):
     pose = scattered(ROBOTS) * [10.0, 10.0, 1.0]
     stories = []
     for pieces in (1, 2, 97):
-        air = make_air(drawing(method), ROBOTS)
-        told = Run(air)
+        medium = make_medium(drawing(method), ROBOTS)
+        told = Run(medium)
         for tick in range(4):
-            air.hold(pose + 0.01 * tick, np.ones(ROBOTS, bool))
-            air.send(tick * 10**8, tick, traffic(1))
+            medium.hold(pose + 0.01 * tick, np.ones(ROBOTS, bool))
+            medium.send(tick * 10**8, tick, traffic(1))
             for piece in range(1, pieces + 1):
-                told.news.append(air.advance(tick * 10**8 + 10**8 * piece // pieces))
+                told.news.append(medium.advance(tick * 10**8 + 10**8 * piece // pieces))
         stories.append(story(told))
     assert len(stories[0]) > 200
     assert stories[0] == stories[1] == stories[2]
@@ -63,10 +63,10 @@ def test_time_may_pass_in_any_pieces(method: str):
 def test_an_arena_alone_gives_the_same_as_beside_others(method: str):
     seeds = (11, 12, 13)
     pose = scattered(3 * ROBOTS) * [20.0, 20.0, 1.0]
-    beside = run(make_air(drawing(method), ROBOTS, seeds), pose, lambda _: traffic(3), 4, 2)
+    beside = run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: traffic(3), 4, 2)
     for arena, seed in enumerate(seeds):
         own = pose[arena * ROBOTS : (arena + 1) * ROBOTS]
-        alone = run(make_air(drawing(method), ROBOTS, [seed]), own, lambda _: traffic(1), 4, 2)
+        alone = run(make_medium(drawing(method), ROBOTS, [seed]), own, lambda _: traffic(1), 4, 2)
         assert story(alone) == story(beside, arena)
 
 
@@ -75,7 +75,7 @@ def test_the_order_among_senders_is_indifferent():
     index = np.arange(len(sent)).reshape(ROBOTS, 3)[::-1].ravel()
     mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
     radio = drawing("csma-802154")
-    runs = [run(make_air(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
+    runs = [run(make_medium(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
     assert story(runs[0]) == story(runs[1])
 
 
@@ -86,7 +86,7 @@ def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
     pose = scattered(ROBOTS)
     pose[-1, :2] = 60.0, 60.0
     with_it, without = (
-        run(make_air(radio, ROBOTS), pose, lambda _, k=k: packets([*range(ROBOTS - 1)] + [ROBOTS - 1] * k), 4, 2)
+        run(make_medium(radio, ROBOTS), pose, lambda _, k=k: packets([*range(ROBOTS - 1)] + [ROBOTS - 1] * k), 4, 2)
         for k in (5, 0)
     )
     assert story(without)
@@ -103,7 +103,7 @@ def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
     received = {
         (senders, cut_off_db): received_from_1_at_0(
             run(
-                make_air(replace(radio, cut_off_db=cut_off_db), 22),
+                make_medium(replace(radio, cut_off_db=cut_off_db), 22),
                 pose,
                 lambda _, n=senders: packets([*range(1, n)]),
                 30,
@@ -140,7 +140,7 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
     """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
     radio = replace(with_access("none"), send_offset="tick")
     pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
-    told = run(make_air(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
+    told = run(make_medium(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
     arena, sender, sequence = (of.ravel() for of in np.meshgrid(range(2), range(2), range(ticks), indexing="ij"))
     rssi_dbm = [on_air(told, "rssi_dbm")[on_air(told, "arena") == of][0] for of in range(2)]
     likely = lone_deliveries(rules_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
@@ -156,7 +156,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     radio = with_access("csma-802154")
     radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
     rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
-    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     rssi_dbm = on_air(told, "rssi_dbm")[:1]
     frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
     keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
@@ -173,7 +173,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
 def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     radio = replace(with_access("none"), send_offset="tick", loss=loss)
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
-    told = run(make_air(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
+    told = run(make_medium(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
     fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.RECEIVED)
     assert on_air(told, "fate").tolist() == fate.tolist()
 
@@ -210,7 +210,7 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     radio = with_access(method)
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
     ticks = 60
-    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
     assert [result for _, _, result in learned(told)] == [result for _, result in expected]
     order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
@@ -222,7 +222,7 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
 def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
     radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
-    fates = run(make_air(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
+    fates = run(make_medium(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
     assert set(fates) == {"RECEIVED", "BURST"}
     assert min(fates.values()) > 50
 
@@ -238,7 +238,7 @@ def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
     radio = with_access("csma-802154")
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
     rules, ticks = rules_of(radio, 2), 60
-    told = run(make_air(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     arena, sequence = on_air(told, "arena"), on_air(told, "sequence")
     lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]
     second = lost[0] & ~lost[1]

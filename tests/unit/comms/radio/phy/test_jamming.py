@@ -12,10 +12,10 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
 from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_air, packets, scattered
+from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium, packets, scattered
 
 NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the path loss is constant
 
@@ -27,18 +27,20 @@ def jammers(*rows: dict[str, Any]) -> Jammers:
     return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
 
 
-def ran(air: Air, pose: FloatArray, sent: SentPackets, now: Jammers, ticks: int = 20, quiet_ticks: int = 3) -> Run:
+def ran(
+    medium: RadioMedium, pose: FloatArray, sent: SentPackets, now: Jammers, ticks: int = 20, quiet_ticks: int = 3
+) -> Run:
     """The same is sent in each tick, while these jammers stand."""
-    told, held = Run(air), Disruption.none(len(pose))
+    told, held = Run(medium), Disruption.none(len(pose))
     held.jammers = now
     for tick in range(ticks + quiet_ticks):
-        air.disrupt(held)
-        told.news.append(air.advance(tick_start_ns(tick, RATE_HZ)))
-        air.hold(pose, held.alive)
+        medium.disrupt(held)
+        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
+        medium.hold(pose, held.alive)
         if tick < ticks:
-            air.send(tick_start_ns(tick, RATE_HZ), tick, sent)
-    told.edges = air.edges(pose, held.alive)
-    told.last = air.end()
+            medium.send(tick_start_ns(tick, RATE_HZ), tick, sent)
+    told.edges = medium.edges(pose, held.alive)
+    told.last = medium.end()
     return told
 
 
@@ -57,19 +59,19 @@ def test_a_jammer_is_noise_of_the_same_power(rise_db: float):
     radio = replace(with_access("aloha"), send_offset="uniform")
     rise = 10 ** (rise_db / 10)
     power_dbm = NOISE_DBM + NEAR_LOSS_DB + 10 * np.log10(rise - 1)
-    jammed = ran(make_air(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": power_dbm}))
-    noisy = ran(make_air(replace(radio, noise=Noise(5e6, rise_db)), 6), CROWD, TO_FIRST, Jammers.none())
+    jammed = ran(make_medium(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": power_dbm}))
+    noisy = ran(make_medium(replace(radio, noise=Noise(5e6, rise_db)), 6), CROWD, TO_FIRST, Jammers.none())
     assert received(jammed) == received(noisy)
-    clear = ran(make_air(radio, 6), CROWD, TO_FIRST, Jammers.none()).fates()
+    clear = ran(make_medium(radio, 6), CROWD, TO_FIRST, Jammers.none()).fates()
     assert jammed.fates()["JAMMED"] > 0
     assert jammed.fates()["RECEIVED"] < clear["RECEIVED"]
 
 
 def test_what_was_not_lost_to_the_jammer_has_the_fate_that_it_has_without():
-    """A jammer changes the fates of those that it drowns alone, as no robot here waits for the air to be free."""
+    """A jammer changes the fates of those that it drowns alone, as no robot here waits for the medium to be free."""
     radio = replace(with_access("aloha"), send_offset="uniform")
-    jammed = ran(make_air(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": NOISE_DBM + NEAR_LOSS_DB}))
-    clear = ran(make_air(radio, 6), CROWD, TO_FIRST, Jammers.none())
+    jammed = ran(make_medium(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": NOISE_DBM + NEAR_LOSS_DB}))
+    clear = ran(make_medium(radio, 6), CROWD, TO_FIRST, Jammers.none())
     assert set(received(jammed)) < set(received(clear))
     drowned = len(received(clear)) - len(received(jammed))
     assert jammed.fates()["JAMMED"] == pytest.approx(drowned, rel=0.1)
@@ -79,8 +81,8 @@ def test_a_jammer_too_weak_to_matter_changes_nothing():
     radio = replace(with_access("csma-802154"), send_offset="uniform", shadowing=Shadowing())
     pose = scattered(12) * [20.0, 20.0, 1.0]
     weak = jammers({"power_dbm": -100.0, "x_m": 500.0, "on_ns": 10**6, "period_ns": 3 * 10**6})
-    assert received(ran(make_air(radio, 12), pose, everybody(12)(0), weak)) == received(
-        ran(make_air(radio, 12), pose, everybody(12)(0), Jammers.none())
+    assert received(ran(make_medium(radio, 12), pose, everybody(12)(0), weak)) == received(
+        ran(make_medium(radio, 12), pose, everybody(12)(0), Jammers.none())
     )
 
 
@@ -88,7 +90,7 @@ def test_frames_are_drowned_just_where_they_overlap_with_a_strong_jammer():
     """A frame of 57 bytes takes 1.8 ms; the jammer is on for 20 ms of 50."""
     radio = replace(with_access("aloha"), send_offset="uniform")
     now = jammers({"on_ns": 20 * 10**6, "period_ns": 50 * 10**6, "phase_ns": 7 * 10**6})
-    told = ran(make_air(radio, 2), CROWD[:2], packets([1], 0, size=40), now, ticks=300)
+    told = ran(make_medium(radio, 2), CROWD[:2], packets([1], 0, size=40), now, ticks=300)
     on_air_ns, fate = told.on_air("on_air_at_ns"), told.on_air("fate")
     end_ns = told.on_air("final_at_ns")
     in_period_ns = (on_air_ns - 7 * 10**6) % (50 * 10**6)
@@ -109,16 +111,16 @@ def test_pieces_of_time_do_not_matter():
     )
     stories: list[Any] = []
     for piece_ns in (10**8, 10**7, 1_300_000):
-        air = make_air(radio, 8)
-        told = Run(air)
+        medium = make_medium(radio, 8)
+        told = Run(medium)
         for tick in range(4):
-            air.disrupt(held)
-            told.news.append(air.advance(tick * 10**8))
-            air.hold(pose, held.alive)
-            air.send(tick * 10**8, tick, packets([0, 1, 2]))
+            medium.disrupt(held)
+            told.news.append(medium.advance(tick * 10**8))
+            medium.hold(pose, held.alive)
+            medium.send(tick * 10**8, tick, packets([0, 1, 2]))
             for at_ns in range(tick * 10**8 + piece_ns, (tick + 1) * 10**8, piece_ns):
-                told.news.append(air.advance(at_ns))
-        told.news.append(air.advance(4 * 10**8))
+                told.news.append(medium.advance(at_ns))
+        told.news.append(medium.advance(4 * 10**8))
         stories.append((sorted(received(told)), np.sort(told.on_air("on_air_at_ns")).tolist()))
     assert len(stories[0][0]) > 5
     assert stories[0] == stories[1] == stories[2]
@@ -126,13 +128,13 @@ def test_pieces_of_time_do_not_matter():
 
 def test_who_listens_first_finds_the_air_busy():
     """CSMA gives up; DCF waits for a gap, and sends in it."""
-    csma = ran(make_air(with_access("csma-802154"), 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}))
+    csma = ran(make_medium(with_access("csma-802154"), 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}))
     assert csma.fates() == {"CHANNEL_BUSY": 40}
     dcf = with_access("dcf")
-    always = ran(make_air(dcf, 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}), ticks=5)
+    always = ran(make_medium(dcf, 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}), ticks=5)
     assert always.fates() == {"IN_FLIGHT": 10}
     gaps = jammers({"on_ns": 60 * 10**6, "period_ns": 10**8})
-    told = ran(make_air(dcf, 2), at((0, 0), (5, 0)), packets([0]), gaps)
+    told = ran(make_medium(dcf, 2), at((0, 0), (5, 0)), packets([0]), gaps)
     assert told.fates() == {"RECEIVED": 20}
     assert (told.on_air("on_air_at_ns") % 10**8 >= 60 * 10**6).all()
 
@@ -141,8 +143,8 @@ def test_one_that_is_carried_goes_along_spares_its_carrier_and_drowns_those_near
     radio = replace(with_access("aloha"), send_offset="uniform")
     pose = at((0, 0), (3, 0), (2000, 0), (2003, 0))
     for carrier, spared in ((0, {0, 2, 3}), (2, {0, 1, 2})):
-        told = ran(make_air(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
-        alone = ran(make_air(radio, 4), pose, packets([0, 1, 2, 3]), Jammers.none())
+        told = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
+        alone = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), Jammers.none())
         assert {receiver for receiver, _, _ in received(told)} <= spared
         assert told.fates()["JAMMED"] > 0
         assert {one for one in received(told) if one[0] == carrier} == {
@@ -155,8 +157,8 @@ def test_what_keeps_signals_off_keeps_jammers_off(change: dict[str, Any]):
     radio, pose = with_access("aloha"), at((0, 0), (1, 0))
     wall = [Obstacle("box", 1.5, 0.0, size_m=(0.2, 4.0))]
     beyond = jammers({"x_m": 2.0})
-    assert "RECEIVED" not in ran(make_air(radio, 2, obstacles=[wall]), pose, packets([0]), beyond).fates()
-    assert ran(make_air(replace(radio, **change), 2, obstacles=[wall]), pose, packets([0]), beyond).fates() == {
+    assert "RECEIVED" not in ran(make_medium(radio, 2, obstacles=[wall]), pose, packets([0]), beyond).fates()
+    assert ran(make_medium(replace(radio, **change), 2, obstacles=[wall]), pose, packets([0]), beyond).fates() == {
         "RECEIVED": 20
     }
 
@@ -165,7 +167,7 @@ def test_what_keeps_signals_off_keeps_jammers_off(change: dict[str, Any]):
 def test_the_radio_graph_asks_how_often_a_packet_gets_through(on_ms: int, joined: bool):
     """`min_delivery` is a tenth: of a packet's tries one in ten must meet no jammer."""
     now = jammers({"on_ns": on_ms * 10**6, "period_ns": 10**8})
-    told = ran(make_air(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
+    told = ran(make_medium(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
     assert told.edges.tolist() == ([[0, 1]] if joined else [])
 
 
@@ -180,8 +182,8 @@ def test_an_arena_with_jammers_is_the_same_alone_and_among_others(method: str):
             {"arena": at_row, "carrier": 8 * at_row + 3, "power_dbm": -35.0},
         ]
         others = [{"arena": other, "x_m": 5.0} for other in range(len(seeds)) if other != at_row]
-        air, rows = make_air(radio, 8, seeds), 8 * len(seeds)
-        told = ran(air, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *own), ticks=6)
+        medium, rows = make_medium(radio, 8, seeds), 8 * len(seeds)
+        told = ran(medium, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *own), ticks=6)
         return [(r % 8, s, n) for r, s, n in received(told) if r // 8 == at_row]
 
     alone = arena(0, [5])

@@ -14,7 +14,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
 from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
-from tests.support.comms.radio.runs import Run, at, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import Run, at, make_medium, packets, run, scattered
 
 ROBOTS = 8
 ACKNOWLEDGING = ("csma-802154", "dcf")
@@ -50,7 +50,7 @@ def listed(tx_status: TxStatuses) -> list[tuple[int, int, str]]:
 
 def results(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
     ask = Asking(len(pose))
-    of = run(make_air(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
+    of = run(make_medium(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
     return [result for one in told(of) for _, _, result in listed(one)]
 
 
@@ -84,15 +84,15 @@ def test_each_addressed_packet_has_one_tx_status_unless_it_is_in_flight(
     radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int
 ):
     rng, rows = np.random.default_rng(seed), arenas * robots
-    air, ask = make_air(radio, robots, range(arenas)), Asking(rows)
+    medium, ask = make_medium(radio, robots, range(arenas)), Asking(rows)
     pose = scattered(rows, seed) * [rng.choice([1.0, 30.0]), 20.0, 1.0]
-    of = run(air, pose, lambda _: ask(mixed(rng, rows, robots)), 4, quiet_ticks)
+    of = run(medium, pose, lambda _: ask(mixed(rng, rows, robots)), 4, quiet_ticks)
     learned = [(row, id_) for one in told(of) for row, id_, _ in listed(one)]
     assert len(set(learned)) == len(learned)
     assert set(learned) <= set(ask.asked)
     if quiet_ticks == 40 and radio.bit_rate_bps != 900:
         assert sorted(learned) == sorted(ask.asked)
-    # As the ids count all packets, they are the air's sequence numbers too.
+    # As the ids count all packets, they are the medium's sequence numbers too.
     arena_of = {(row % robots, row // robots): row for row in range(rows)}
     fate: dict[tuple[int, int], set[int]] = {}
     for one in of.news:
@@ -138,7 +138,7 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
     radio = replace(with_access("csma-802154"), send_offset="tick", max_payload_bytes=5000, loss=1.0)
     pose, both = at((0, 0), (1, 0), (0.5, 1)), packets([0, 2], [1, BROADCAST], [10, 5000])
     ask = Asking(3)
-    of = run(make_air(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else SentPackets.none(), 120, 3)
+    of = run(make_medium(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else SentPackets.none(), 120, 3)
     busy = {id_ for one in told(of) for _, id_, result in listed(one) if result == "CHANNEL_BUSY"}
     own = of.finished("sender") == 0
     fates = dict(zip(of.finished("sequence")[own].tolist(), of.finished("fate")[own].tolist(), strict=True))
@@ -151,7 +151,7 @@ def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_ac
     radio = with_access(method)
     radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, most_retries=0))
     ask = Asking(2)
-    of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
+    of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
     received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
     assert sum(len(one) for one in told(of)) == 300
     # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
@@ -162,7 +162,7 @@ def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_ac
 def test_the_tx_status_comes_in_the_tick_after_it_happened():
     for method in ACKNOWLEDGING:
         ask = Asking(2)
-        of = run(make_air(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
+        of = run(make_medium(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
         assert [listed(one) for one in told(of)] == [
             [],
             *([(0, tick, "ACKNOWLEDGED")] for tick in range(3)),
@@ -173,7 +173,9 @@ def test_the_tx_status_comes_in_the_tick_after_it_happened():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told(method: str):
-    assert all(len(one) == 0 for one in told(run(make_air(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3)))
+    assert all(
+        len(one) == 0 for one in told(run(make_medium(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3))
+    )
     assert results(with_access(method), NEAR, packets([0, 1])) == []
     if method not in ACKNOWLEDGING:
         assert results(with_access(method), NEAR, packets([0, 1], [1, 0])) == []
@@ -187,7 +189,7 @@ def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told
 def test_a_packet_to_nobody_takes_a_number_and_is_not_acknowledged(method: str):
     radio = Radio(range_m=2.0) if method == "unit-disk" else with_access(method)
     ask = Asking(2)
-    of = run(make_air(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
+    of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
     assert of.received("sequence").tolist() == [1, 4]
     assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([2], [2])
     lost = [(0, id_, "NO_ACKNOWLEDGEMENT") for id_ in (0, 2, 3, 5)]
@@ -207,13 +209,13 @@ def test_the_dead_learn_nothing_and_a_radio_that_is_off_is_not_answered():
         ([False, True], [True, True], []),
         ([True, True], [False, True], ["NO_ACKNOWLEDGEMENT"] * 3),
     ):
-        ask, of = Asking(2), Run(make_air(radio, 2))
+        ask, of = Asking(2), Run(make_medium(radio, 2))
         for tick in range(30):
             if tick == 1:
-                of.air.disrupt(disrupted(np.array(alive), np.array(radio_on)))
-            of.news.append(of.air.advance(tick * 10**8))
-            of.air.hold(NEAR, np.array(alive) if tick else np.ones(2, bool))
-            of.air.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
+                of.medium.disrupt(disrupted(np.array(alive), np.array(radio_on)))
+            of.news.append(of.medium.advance(tick * 10**8))
+            of.medium.hold(NEAR, np.array(alive) if tick else np.ones(2, bool))
+            of.medium.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
         assert [result for one in told(of) for _, _, result in listed(one)] == expected
 
 
@@ -232,7 +234,8 @@ def test_tx_status_are_the_same_in_any_order_of_senders_and_beside_other_arenas(
         numbered = replace(sent, tx_status_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
         pose = np.tile(scattered(ROBOTS) * [20.0, 20.0, 1.0], (len(seeds), 1))
         return [
-            listed(one) for one in told(run(make_air(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9))
+            listed(one)
+            for one in told(run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9))
         ]
 
     plain = of([7], slice(None))

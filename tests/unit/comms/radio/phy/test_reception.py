@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.phy import Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import at, everybody, make_medium, packets, run, scattered
 
 
 @pytest.mark.parametrize("distance_m", [60.0, 95.0, 105.0, 115.0, 120.0])
@@ -20,7 +20,7 @@ def test_delivery_of_802154_over_distance_is_that_of_its_formula(distance_m: flo
     """2,000 packets each: within 0.02, and four standard errors where that is more (false alarm below 1e-4)."""
     pose = at((-distance_m / 2, 0), (distance_m / 2, 0))
     sent = packets([0] * 20, size=20)
-    told = run(make_air(with_access(method), 2), pose, lambda _: sent, 100, 2)
+    told = run(make_medium(with_access(method), 2), pose, lambda _: sent, 100, 2)
     snr = 10 ** ((-46.6777 - 30 * np.log10(distance_m) + 106.987) / 10)
     expected = (1 - oqpsk_bit_errors(snr)) ** (8 * 37)
     tolerance = max(0.02, 4 * (expected * (1 - expected) / 2000) ** 0.5)
@@ -30,7 +30,7 @@ def test_delivery_of_802154_over_distance_is_that_of_its_formula(distance_m: flo
 def test_more_distance_never_helps_on_average():
     """The same draws decide at each distance, so not even by chance."""
     received = [
-        run(make_air(with_access("none"), 2), at((0, 0), (d, 0)), lambda _: packets([0] * 20, size=20), 10, 2)
+        run(make_medium(with_access("none"), 2), at((0, 0), (d, 0)), lambda _: packets([0] * 20, size=20), 10, 2)
         .fates()
         .get("RECEIVED", 0)
         for d in np.linspace(80, 140, 13)
@@ -41,7 +41,7 @@ def test_more_distance_never_helps_on_average():
 
 def test_strength_is_equal_both_ways_to_the_last_bit():
     radio = replace(with_access("none"), shadowing=Shadowing(), fading=Fading())
-    told = run(make_air(radio, 12), scattered(12) * [20, 20, 1], everybody(12), 1, 1)
+    told = run(make_medium(radio, 12), scattered(12) * [20, 20, 1], everybody(12), 1, 1)
     links = {
         (int(s), int(r)): rssi
         for one in told.news
@@ -57,7 +57,7 @@ def test_strength_is_equal_both_ways_to_the_last_bit():
 def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bool):
     """ns-3's lr-wpan-collision-test: senders 1 m and 30 m away, one frame received, whoever has the lower row."""
     senders = ((30, 0), (-1, 0)) if far_first else ((-1, 0), (30, 0))
-    told = run(make_air(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
+    told = run(make_medium(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert told.fates() == {"RECEIVED": 1, "COLLIDED": 1}
     assert told.received("sender").tolist() == [int(far_first)]
 
@@ -65,14 +65,14 @@ def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bo
 def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():
     """One of IEEE 802.15.4 has as much, by its spreading: at 0 dB it hears 95 of 100 frames."""
     radio = replace(with_access("aloha"), reception=Reception("threshold", least_sinr_db=3.0))
-    told = run(make_air(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
+    told = run(make_medium(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
 
 
 def test_who_sends_hears_nothing():
-    told = run(make_air(with_access("aloha"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1)
+    told = run(make_medium(with_access("aloha"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
-    assert run(make_air(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"RECEIVED": 2}
+    assert run(make_medium(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"RECEIVED": 2}
 
 
 def test_carrier_sense_lets_one_after_the_other_send():
@@ -80,7 +80,7 @@ def test_carrier_sense_lets_one_after_the_other_send():
     received = {}
     for method in METHODS[1:]:
         pose, sent = at((0, 0), (1, 0), (0.5, 1)), packets([0, 1, 2] * 2)
-        told = run(make_air(with_access(method), 3), pose, lambda _, sent=sent: sent, 20, 1)
+        told = run(make_medium(with_access(method), 3), pose, lambda _, sent=sent: sent, 20, 1)
         received[method] = told.fates().get("RECEIVED", 0) / 240
     assert received["aloha"] == 0.0
     assert received["csma-802154"] > 0.5
@@ -104,7 +104,7 @@ def test_throughput_of_aloha_is_that_of_abramson(load: float):
     )
     angle = np.linspace(0, 2 * np.pi, senders, endpoint=False)
     pose = np.vstack([np.column_stack([10 * np.cos(angle), 10 * np.sin(angle), angle]), [[0.0, 0.0, 0.0]]])
-    told = run(make_air(radio, senders + 1), pose, lambda _: packets(range(senders), senders), ticks, 1)
+    told = run(make_medium(radio, senders + 1), pose, lambda _: packets(range(senders), senders), ticks, 1)
     received = told.fates().get("RECEIVED", 0) / (senders * ticks)
     assert received == pytest.approx(np.exp(-2 * load), abs=0.03)
 
@@ -116,34 +116,34 @@ def test_acknowledged_packets_are_sent_again(method: str):
     for acknowledged, least, most in ((True, 0.9, 1.0), (False, 0.4, 0.6)):
         radio = with_access(method)
         radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, acknowledged=acknowledged))
-        told = run(make_air(radio, 2), pose, lambda _: sent, 60, 3)
+        told = run(make_medium(radio, 2), pose, lambda _: sent, 60, 3)
         assert least <= told.fates()["RECEIVED"] / 300 <= most
         assert told.fates()["RECEIVED"] + told.fates().get("LOST", 0) == 300
 
 
 def test_a_lone_broadcast_of_802154_goes_on_air_after_whole_backoffs():
     """320 us k + 128 + 192, k from 0 to 7 (IEEE 802.15.4-2006), all of them drawn."""
-    told = run(make_air(with_access("csma-802154"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 200, 1)
+    told = run(make_medium(with_access("csma-802154"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 200, 1)
     wait_ns = told.on_air("on_air_at_ns") - told.on_air("sent_at_ns")
     assert sorted(set(((wait_ns - 320_000) / 320_000).tolist())) == list(range(8))
 
 
 def test_a_lone_frame_of_80211_goes_on_air_after_difs():
     """50 us at 802.11b."""
-    told = run(make_air(with_access("dcf"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 20, 1)
+    told = run(make_medium(with_access("dcf"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 20, 1)
     assert set((told.on_air("on_air_at_ns") - told.on_air("sent_at_ns")).tolist()) == {50_000}
 
 
 def test_the_radio_graph_joins_those_whom_a_lone_packet_reaches():
-    air = make_air(with_access("none"), 3)
+    medium = make_medium(with_access("none"), 3)
     pose = at((0, 0), (90, 0), (230, 0))
-    assert air.edges(pose, np.ones(3, bool)).tolist() == [[0, 1]]
-    assert air.edges(pose, np.array([True, False, True])).tolist() == []
+    assert medium.edges(pose, np.ones(3, bool)).tolist() == [[0, 1]]
+    assert medium.edges(pose, np.array([True, False, True])).tolist() == []
 
 
 def test_bursts_take_packets_of_disks_and_signals_alike():
     """Bursts last as long whatever carries them: within 0.05 of the share of bad time."""
     for radio in (Radio(9.0, send_offset="tick"), with_access("none")):
         bursty = replace(radio, bursts=Bursts(0.1, 0.3))
-        told = run(make_air(bursty, 20), scattered(20), everybody(20), 20, 1)
+        told = run(make_medium(bursty, 20), scattered(20), everybody(20), 20, 1)
         assert told.tally.fates[0, Fate.BURST] / told.tally.in_range[0] == pytest.approx(0.25, abs=0.05)

@@ -10,7 +10,7 @@ from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, Disruption
 from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, make_air, packets
+from tests.support.comms.radio.runs import TICK_NS, Run, at, make_medium, packets
 
 # A frame of 117 bytes lasts 78 ms: attempts and ticks overlap.
 SLOW = replace(with_access("csma-802154"), bit_rate_bps=12_000, send_offset="tick")
@@ -19,19 +19,19 @@ Plan = Callable[[int], dict[str, list[float]]]
 
 def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks: int = 12) -> Run:
     """Robot 0 sends to robot 1 in the first ticks, while disruptions go by plan(tick)."""
-    air = make_air(radio, 2)
-    out = Run(air)
+    medium = make_medium(radio, 2)
+    out = Run(medium)
     for tick in range(ticks):
         now = Disruption.none(2)
         for name, value in plan(tick).items():
             setattr(now, name, np.array(value, getattr(now, name).dtype))
-        air.disrupt(now)
-        out.news.append(air.advance(tick * TICK_NS))
-        air.hold(at((0, 0), (metres, 0)), now.alive)
+        medium.disrupt(now)
+        out.news.append(medium.advance(tick * TICK_NS))
+        medium.hold(at((0, 0), (metres, 0)), now.alive)
         if tick < sends:
             one = packets([0], 1, 100)
-            air.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
-    out.last = air.end()
+            medium.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
+    out.last = medium.end()
     return out
 
 
@@ -87,8 +87,8 @@ def test_newest_only_keeps_one_packet_also_if_an_attempt_fails_meanwhile():
 
 
 def test_a_broadcast_that_nobody_could_hear_departs_all_the_same():
-    air = make_air(with_access("csma-802154"), 1)
-    air.hold(at((0, 0)), np.ones(1, np.bool_))
-    air.send(0, 0, packets([0], -1, 10))
-    news = air.advance(TICK_NS)
+    medium = make_medium(with_access("csma-802154"), 1)
+    medium.hold(at((0, 0)), np.ones(1, np.bool_))
+    medium.send(0, 0, packets([0], -1, 10))
+    news = medium.advance(TICK_NS)
     assert news.departed.sequence.tolist() == [0]

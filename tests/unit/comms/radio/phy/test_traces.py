@@ -17,7 +17,7 @@ from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.measured import TRIO, numbers_received, trace_of
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import random_traffic
 
 NEAR, FAR = at((0, 0), (1, 0), (0, 1)), at((0, 0), (9000, 0), (0, 9000))
@@ -29,8 +29,8 @@ def replayed(
     traces: LinkTraces, others: str, ticks: int, radio: Radio = ALONE, pose: FloatArray = NEAR, arenas: int = 1
 ) -> Run:
     """Everybody broadcasts in each tick."""
-    air = make_air(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
-    return run(air, np.tile(pose, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
+    medium = make_medium(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
+    return run(medium, np.tile(pose, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
 
 
 def strengths(told: Run, sender: int, receiver: int) -> list[float]:
@@ -69,13 +69,13 @@ def test_a_strength_is_too_weak_where_the_receiver_says_so():
 def test_what_was_measured_holds_shadows_and_obstacles_and_fades_on_top():
     traces = LinkTraces(rssi_dbm=trace_of("rssi_dbm", BOTH))
     between = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.1)]
-    blocked = make_air(replace(ALONE, line_of_sight=True, trace=Trace("a.csv")), TRIO, [0], [between], traces)
+    blocked = make_medium(replace(ALONE, line_of_sight=True, trace=Trace("a.csv")), TRIO, [0], [between], traces)
     assert run(blocked, NEAR, everybody(TRIO), 1, 1).fates() == {"RECEIVED": 6}
     shaded = replayed(traces, "none", 1, replace(ALONE, shadowing=Shadowing(8.0, 1.0)))
     assert set(np.round(shaded.finished("rssi_dbm"), 6)) == {-60.0}
     fading = replace(ALONE, fading=Fading())
     measured = replayed(traces, "none", 1, fading)
-    modelled, unfaded = (run(make_air(radio, TRIO, [0]), NEAR, everybody(TRIO), 1, 8) for radio in (fading, ALONE))
+    modelled, unfaded = (run(make_medium(radio, TRIO, [0]), NEAR, everybody(TRIO), 1, 8) for radio in (fading, ALONE))
     gain_db = [strengths(modelled, *link)[0] - strengths(unfaded, *link)[0] for link in ((0, 1), (2, 0))]
     assert [strengths(measured, *link)[0] + 60.0 for link in ((0, 1), (2, 0))] == pytest.approx(gain_db, abs=1e-4)
 
@@ -88,8 +88,8 @@ def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_mod
     )
     passing = set[tuple[int, int]]()
     for sender in range(TRIO):
-        air = make_air(replace(ALONE, trace=Trace("a.csv", "model")), TRIO, traces=traces)
-        told = run(air, NEAR, lambda _, sender=sender: packets([sender]), 3, 1)
+        medium = make_medium(replace(ALONE, trace=Trace("a.csv", "model")), TRIO, traces=traces)
+        told = run(medium, NEAR, lambda _, sender=sender: packets([sender]), 3, 1)
         passing |= {(sender, r) for r in told.received("receiver").tolist()}
     assert passing == {(0, 2), (1, 0), (2, 0)}
 
@@ -98,8 +98,8 @@ def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_mod
 def test_a_ratio_is_the_share_that_is_received_whatever_the_access(method: str):
     """Of lone packets, so that nothing else takes any."""
     ratio = LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 0, 1, 0.6), (0, 0, 2, 1.0)]))
-    air = make_air(replace(with_access(method), trace=Trace("a.csv")), TRIO, range(4), traces=ratio)
-    told = run(air, np.tile(NEAR, (4, 1)), lambda _: packets(range(0, 12, 3)), 300, 2)
+    medium = make_medium(replace(with_access(method), trace=Trace("a.csv")), TRIO, range(4), traces=ratio)
+    told = run(medium, np.tile(NEAR, (4, 1)), lambda _: packets(range(0, 12, 3)), 300, 2)
     shares = [len(numbers_received(told, 0, r)) / 300 for r in range(12)]
     assert shares[2::3] == [1.0] * 4
     assert abs(np.mean(shares[1::3]) - 0.6) < 4.4 * np.sqrt(0.6 * 0.4 / 1200)
@@ -110,15 +110,15 @@ def test_a_ratio_is_the_share_that_is_received_whatever_the_access(method: str):
 def test_what_a_ratio_takes_is_sent_again_and_so_is_what_takes_acknowledgements(method: str):
     lossy = [(0, 0, 1, 0.5), (0, 1, 0, 0.5)]
     radio = replace(with_access(method), trace=Trace("a.csv"))
-    air = make_air(radio, TRIO, range(3), traces=LinkTraces(delivery_ratio=trace_of("delivery_ratio", lossy)))
-    told = run(air, np.tile(NEAR, (3, 1)), lambda _: packets([0, 3, 6], to=1), 100, 2)
+    medium = make_medium(radio, TRIO, range(3), traces=LinkTraces(delivery_ratio=trace_of("delivery_ratio", lossy)))
+    told = run(medium, np.tile(NEAR, (3, 1)), lambda _: packets([0, 3, 6], to=1), 100, 2)
     assert 0.9 < len(told.received("sequence")) / 300 <= 1.0
     late_ns = told.received("received_at_ns") - told.received("sequence") * TICK_NS
     assert (late_ns > 2 * late_ns.min()).sum() > 50
 
 
 def test_a_delay_comes_after_reception():
-    without = run(make_air(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
+    without = run(make_medium(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
     told = replayed(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1)
     first = (without.received("sender") == 0) & (without.received("receiver") == 1)
     assert (
@@ -133,11 +133,11 @@ def test_the_graph_has_the_pairs_that_strength_and_ratio_join_both_ways():
     for others, expected in (("none", []), ("model", [[1, 2]])):
         for ratio, at_first in ((None, [[0, 1]]), (rare, [])):
             radio = replace(ALONE, trace=Trace("a.csv", others))
-            air = make_air(radio, TRIO, traces=LinkTraces(ratio, strong))
+            medium = make_medium(radio, TRIO, traces=LinkTraces(ratio, strong))
             for now_ns, edges in ((0, at_first), (2 * TICK_NS, [[0, 1], [0, 2]])):
-                air.advance(now_ns)
-                air.hold(NEAR, alive)
-                assert air.edges(NEAR, alive).tolist() == [*edges, *expected]
+                medium.advance(now_ns)
+                medium.hold(NEAR, alive)
+                assert medium.edges(NEAR, alive).tolist() == [*edges, *expected]
 
 
 @given(st.sampled_from(METHODS), st.integers(0, 1000), st.sampled_from(["none", "model"]), st.integers(1, 2))
@@ -160,9 +160,9 @@ def test_fates_add_up_and_arenas_do_not_meet(method: str, seed: int, others: str
         sizes = np.tile(one.payloads.sizes, 2)
         return packets(sender, np.tile(one.to, 2), sizes)
 
-    air = make_air(radio, robots, range(arenas), traces=LinkTraces(ratio, rssi))
-    told = run(air, pose, in_all, 4, 2)
+    medium = make_medium(radio, robots, range(arenas), traces=LinkTraces(ratio, rssi))
+    told = run(medium, pose, in_all, 4, 2)
     np.testing.assert_array_equal(told.tally.fates.sum(axis=1), told.tally.intended)
     assert (told.tally.fates >= 0).all()
-    alone = run(make_air(radio, robots, [0], traces=LinkTraces(ratio, rssi)), pose[:robots], lambda t: sent[t], 4, 2)
+    alone = run(make_medium(radio, robots, [0], traces=LinkTraces(ratio, rssi)), pose[:robots], lambda t: sent[t], 4, 2)
     np.testing.assert_array_equal(told.tally.fates[0], alone.tally.fates[0])

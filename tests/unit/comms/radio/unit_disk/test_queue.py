@@ -13,7 +13,7 @@ from swarmwire.comms.radio.transmissions import Intake
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, make_air, packets, run
+from tests.support.comms.radio.runs import TICK_NS, Run, at, make_medium, packets, run
 from tests.support.comms.radio.traffic import run_disrupted
 
 TRIO = at((0, 0), (1, 0), (9, 0))
@@ -22,7 +22,7 @@ SLOW = Radio(2.0, bit_rate_bps=4000, send_offset="tick")  # 10 bytes take 20 ms
 
 def test_packets_of_one_sender_follow_each_other_without_gap():
     """First in, first out; another sender does not wait for them."""
-    told = run(make_air(SLOW, 3), TRIO, lambda _: packets([0, 0, 1, 0], size=[10, 5, 10, 10]), 1)
+    told = run(make_medium(SLOW, 3), TRIO, lambda _: packets([0, 0, 1, 0], size=[10, 5, 10, 10]), 1)
     times = {
         (int(s), int(n)): int(t)
         for s, n, t in zip(told.on_air("sender"), told.on_air("sequence"), told.on_air("on_air_at_ns"), strict=True)
@@ -35,7 +35,7 @@ def test_packets_of_one_sender_follow_each_other_without_gap():
 def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
     """One packet is on air and `limit` wait; the refused count as in range where they would have been received."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=limit)
-    told = run(make_air(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
+    told = run(make_medium(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
     assert told.on_air("sequence").tolist() == list(range(limit + 1))
     assert told.fates() == {"RECEIVED": limit + 1, "OUT_OF_RANGE": limit + 1, "QUEUE_FULL": 2 * (4 - limit)}
     assert told.tally.in_range.tolist() == [5]
@@ -43,8 +43,8 @@ def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
 
 def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
     radio = Radio(2.0, line_of_sight=True, bit_rate_bps=4000, send_offset="tick", queue_limit=0)
-    air = make_air(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
-    told = run(air, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
+    medium = make_medium(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
+    told = run(medium, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
     assert told.fates() == {"RECEIVED": 1, "BLOCKED": 1, "QUEUE_FULL": 2}
     assert told.tally.in_range.tolist() == [2]
 
@@ -52,7 +52,7 @@ def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
 def test_the_queue_empties_as_time_passes():
     """Packets of 60 ms, two per tick of 100 ms, and room for one: with every other tick one more is refused."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=1)
-    told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
+    told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
     on_air_ms = (told.on_air("on_air_at_ns") // 10**6).tolist()
     assert on_air_ms == [0, 60, 120, 200, 260, 320, 400, 460, 520]
     assert told.fates() == {"RECEIVED": 9, "QUEUE_FULL": 3}
@@ -62,14 +62,14 @@ def test_the_queue_empties_as_time_passes():
 def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
     """Packets of 60 ms and room for three: 120 and 180 ms still wait at 100 ms, 240 ms at 200 ms."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=3)
-    told = run(make_air(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
+    told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
     assert told.on_air("sequence").tolist() == [0, 1, 2, 3, 5, 10, 11]
     assert told.on_air("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
 
 
 def test_refused_packets_are_numbered_too():
     """And a packet too large takes no time on air: the next goes out at once."""
-    told = run(make_air(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
+    told = run(make_medium(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
     assert told.received("sequence").tolist() == [1]
     assert told.on_air("on_air_at_ns").tolist() == [0]
 
@@ -77,7 +77,7 @@ def test_refused_packets_are_numbered_too():
 def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
     """Overhead does not count, and nobody was in range of it."""
     radio = Radio(2.0, max_payload_bytes=10, overhead_bytes=50, send_offset="tick")
-    told = run(make_air(radio, 3), TRIO, lambda _: packets([0, 0, 1], [-1, -1, 2], [11, 10, 11]), 1)
+    told = run(make_medium(radio, 3), TRIO, lambda _: packets([0, 0, 1], [-1, -1, 2], [11, 10, 11]), 1)
     assert told.fates() == {"TOO_LARGE": 3, "RECEIVED": 1, "OUT_OF_RANGE": 1}
     assert told.tally.in_range.tolist() == [1]
 
@@ -85,12 +85,12 @@ def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
 def test_a_refusal_is_final_when_it_was_sent():
     """Offset 150 ms: in the second tick, whose poses tell who would have been in range."""
     radio = Radio(2.0, bit_rate_bps=1000, send_offset=0.15, queue_limit=0)  # on air for 80 ms
-    air = make_air(radio, 2)
-    air.hold(at((0, 0), (3, 0)), np.ones(2, bool))
-    air.send(0, 0, packets([0, 0]))
-    assert air.advance(TICK_NS).tally.fates.sum() == 0
-    air.hold(at((0, 0), (1, 0)), np.ones(2, bool))
-    tally = air.advance(2 * TICK_NS).tally
+    medium = make_medium(radio, 2)
+    medium.hold(at((0, 0), (3, 0)), np.ones(2, bool))
+    medium.send(0, 0, packets([0, 0]))
+    assert medium.advance(TICK_NS).tally.fates.sum() == 0
+    medium.hold(at((0, 0), (1, 0)), np.ones(2, bool))
+    tally = medium.advance(2 * TICK_NS).tally
     assert tally.fates[0].sum() == tally.fates[0, Fate.QUEUE_FULL] == 1
     assert tally.in_range.tolist() == [1]
 
@@ -113,7 +113,7 @@ def one_each(first: int, stop: int, count: int = 1) -> dict[int, SentPackets]:
 
 def blacked_out(backlog: int, sent: dict[int, SentPackets], radio: Radio = SLOWEST, ticks: int = 15) -> Run:
     """The sender's radio is off from 0.2 to 0.8 s."""
-    return run_disrupted(make_air(radio, 2), PAIR, sent, {2: off(backlog, 0), 8: Disruption.none(2)}, ticks)
+    return run_disrupted(make_medium(radio, 2), PAIR, sent, {2: off(backlog, 0), 8: Disruption.none(2)}, ticks)
 
 
 def on_air_ms(told: Run) -> list[int]:
@@ -158,7 +158,7 @@ def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
     long_ = replace(SLOWEST, max_payload_bytes=200)
     sent = {1: packets([0, 0], size=[100, 10])}
     now = {2: off(ALL, 0), 3: Disruption.none(2)}
-    told = run_disrupted(make_air(long_, 2), PAIR, sent, now, 15)
+    told = run_disrupted(make_medium(long_, 2), PAIR, sent, now, 15)
     assert on_air_ms(told) == [100, 900]
 
 
@@ -172,23 +172,25 @@ def test_the_backlog_of_a_robot_that_dies_dies_with_it_and_the_next_starts_afres
     dead = off(ALL, 0)
     dead.alive[0] = False
     now = {2: off(ALL, 0), 4: dead, 6: off(ALL, 0), 8: Disruption.none(2)}
-    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {2: packets([0] * 3), 7: packets([0])}, now, 12)
+    told = run_disrupted(make_medium(SLOWEST, 2), PAIR, {2: packets([0] * 3), 7: packets([0])}, now, 12)
     assert told.fates() == {"RECEIVED": 1, "SENDER_DEAD": 3}
     assert on_air_ms(told) == [800]
 
 
 def test_what_still_waits_at_the_end_is_in_flight():
-    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {3: packets([0] * 3)}, {2: off(ALL, 0)}, 6)
+    told = run_disrupted(make_medium(SLOWEST, 2), PAIR, {3: packets([0] * 3)}, {2: off(ALL, 0)}, 6)
     assert told.fates() == {"IN_FLIGHT": 3}
 
 
 def test_a_backlog_that_gets_stricter_is_cut_at_once():
     sent = {3: packets([0] * 3)}
     told = run_disrupted(
-        make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(NEWEST, 0), 8: Disruption.none(2)}, 12
+        make_medium(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(NEWEST, 0), 8: Disruption.none(2)}, 12
     )
     assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2}
-    told = run_disrupted(make_air(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(DROP, 0), 8: Disruption.none(2)}, 12)
+    told = run_disrupted(
+        make_medium(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(DROP, 0), 8: Disruption.none(2)}, 12
+    )
     assert told.fates() == {"BLACKOUT": 3}
 
 
@@ -206,7 +208,7 @@ def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
     """Handed over at 0.35 s: the radio of robot 1 is off by then, and of its two packets the first is too large."""
     later = replace(SLOWEST, send_offset=0.25)
     sent, now = {1: packets([0, 0, 1, 1], size=[10, 10, 101, 10])}, {2: off(ALL, 1), 8: Disruption.none(2)}
-    told = run_disrupted(make_air(later, 2), PAIR, sent, now, 12)
+    told = run_disrupted(make_medium(later, 2), PAIR, sent, now, 12)
     assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2, "TOO_LARGE": 1}
     assert on_air_ms(told) == [350, 430, 800]
     assert [one.tally.fates[0, Fate.TOO_LARGE] for one in told.news].index(1) == 4
@@ -214,14 +216,16 @@ def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
 
 def test_the_first_that_waited_goes_on_air_when_the_one_before_it_has_ended():
     """As above, but the radio is on again at 300 ms: the second frame has ended at 260."""
-    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {1: packets([0] * 4)}, {2: off(ALL, 0), 3: Disruption.none(2)}, 15)
+    told = run_disrupted(
+        make_medium(SLOWEST, 2), PAIR, {1: packets([0] * 4)}, {2: off(ALL, 0), 3: Disruption.none(2)}, 15
+    )
     assert on_air_ms(told) == [100, 180, 300, 380]
 
 
 def test_each_radio_lets_go_its_own_packets():
     """Both are off from 0.2 s on, that of robot 1 until 0.5 s, that of robot 0 until 0.8 s."""
     now = {2: off(ALL, 0, 1), 5: off(ALL, 0), 8: Disruption.none(2)}
-    told = run_disrupted(make_air(SLOWEST, 2), PAIR, {3: packets([0, 0, 1, 1])}, now, 15)
+    told = run_disrupted(make_medium(SLOWEST, 2), PAIR, {3: packets([0, 0, 1, 1])}, now, 15)
     sender, on_air = told.on_air("sender"), np.array(on_air_ms(told))
     assert on_air[sender == 1].tolist() == [500, 580]
     assert on_air[sender == 0].tolist() == [800, 880]
@@ -229,7 +233,7 @@ def test_each_radio_lets_go_its_own_packets():
 
 def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
     radio = Radio(2.0, bit_rate_bps=1000, overhead_bytes=6, max_payload_bytes=10, send_offset="tick")
-    told = run(make_air(radio, 2), PAIR, lambda _: packets([0, 0, 0], size=[10, 11, 10]), 1, 4)
+    told = run(make_medium(radio, 2), PAIR, lambda _: packets([0, 0, 0], size=[10, 11, 10]), 1, 4)
     assert (told.received("received_at_ns") // 10**6).tolist() == [128, 256]
     departed = [one.departed for one in told.news]
     lasts_ns = np.concatenate([of.off_air_at_ns - of.on_air_at_ns for of in departed])
@@ -300,7 +304,7 @@ def test_a_radio_with_signals_has_the_disks_queue():
     for radio in (signals, disk):
         draws = np.random.default_rng(3)
         told = run(
-            make_air(radio, 3),
+            make_medium(radio, 3),
             at((0, 0), (1, 0), (0, 1)),
             lambda _, draws=draws: packets(draws.integers(0, 3, 20), size=draws.integers(1, 100, 20)),
             20,

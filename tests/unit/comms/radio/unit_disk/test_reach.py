@@ -11,9 +11,9 @@ from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, t
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.runs import RATE_HZ, at, everybody, make_air, packets, run, scattered
+from tests.support.comms.radio.runs import RATE_HZ, at, everybody, make_medium, packets, run, scattered
 
 MEASURES = Measures(RangeMeasure(), BearingMeasure())
 BETWEEN = {
@@ -26,7 +26,7 @@ BETWEEN = {
 @given(st.integers(0, 1000), st.floats(0.05, 9.0), st.integers(1, 40))
 def test_received_by_exactly_those_within_range(seed: int, range_m: float, robots: int):
     pose = scattered(robots, seed) * [1.3, 1.3, 1.0]  # some outside the arena
-    told = run(make_air(Radio(range_m, send_offset="tick"), robots), pose, everybody(robots), 1)
+    told = run(make_medium(Radio(range_m, send_offset="tick"), robots), pose, everybody(robots), 1)
     apart_m = np.hypot(*(pose[:, None, :2] - pose[None, :, :2]).transpose(2, 0, 1))
     near = np.argwhere((apart_m <= range_m) & ~np.eye(robots, dtype=bool))
     pairs = np.column_stack([told.finished("sender"), told.finished("receiver")])
@@ -35,19 +35,19 @@ def test_received_by_exactly_those_within_range(seed: int, range_m: float, robot
 
 
 def test_range_is_inclusive():
-    told = run(make_air(Radio(2.0, send_offset="tick"), 3), at((-1, 0), (1, 0), (1, 2.0000001)), everybody(3), 1)
+    told = run(make_medium(Radio(2.0, send_offset="tick"), 3), at((-1, 0), (1, 0), (1, 2.0000001)), everybody(3), 1)
     assert told.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 4}
 
 
 def test_robots_of_other_arenas_hear_nothing():
     """Even if they stand at the same place."""
-    told = run(make_air(Radio(99.0, send_offset="tick"), 2, [1, 2]), np.zeros((4, 3)), lambda _: packets([0]), 1)
+    told = run(make_medium(Radio(99.0, send_offset="tick"), 2, [1, 2]), np.zeros((4, 3)), lambda _: packets([0]), 1)
     assert told.received("receiver").tolist() == [1]
 
 
 def test_an_addressed_packet_reaches_only_its_receiver():
     pose = at((0, 0), (1, 0), (0, 1), (3, 0))
-    told = run(make_air(Radio(2.0, send_offset="tick"), 4), pose, lambda _: packets([0, 0], [2, 3]), 1)
+    told = run(make_medium(Radio(2.0, send_offset="tick"), 4), pose, lambda _: packets([0, 0], [2, 3]), 1)
     assert told.received("receiver").tolist() == [2]
     assert told.fates() == {"RECEIVED": 1, "OUT_OF_RANGE": 1}
     assert told.tally.intended.tolist() == [2]
@@ -55,12 +55,12 @@ def test_an_addressed_packet_reaches_only_its_receiver():
 
 @pytest.mark.parametrize("to", [-3, 0, 3])
 def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(to: int):
-    air = make_air(Radio(2.0, send_offset="tick"), 3)
-    air.hold(at((0, 0), (1, 0), (0, 1)), np.ones(3, bool))
+    medium = make_medium(Radio(2.0, send_offset="tick"), 3)
+    medium.hold(at((0, 0), (1, 0), (0, 1)), np.ones(3, bool))
     with pytest.raises(ValueError, match="to: expected another robot"):
-        air.send(0, 0, packets([0, 0], [1, to]))
-    air.send(0, 0, packets([0], 1))
-    news = air.advance(10**8)
+        medium.send(0, 0, packets([0, 0], [1, to]))
+    medium.send(0, 0, packets([0], 1))
+    news = medium.advance(10**8)
     assert news.received.sequence.tolist() == [0]
     assert news.tally.sent.tolist() == [1]
 
@@ -71,7 +71,7 @@ def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
     pose = at((-1, 0), (1, 0), (-1, 1))
     for line_of_sight, fates, in_range in ((True, {"RECEIVED": 4, "BLOCKED": 2}, 4), (False, {"RECEIVED": 6}, 6)):
         radio = Radio(9.0, line_of_sight=line_of_sight, send_offset="tick")
-        told = run(make_air(radio, 3, [1], [[BETWEEN[shape]]]), pose, everybody(3), 1)
+        told = run(make_medium(radio, 3, [1], [[BETWEEN[shape]]]), pose, everybody(3), 1)
         assert told.fates() == fates
         assert told.tally.in_range.tolist() == [in_range]
 
@@ -79,7 +79,7 @@ def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
 def test_range_and_bearing_are_exact_without_noise():
     """Robot 1 looks along +y: robot 0, at its west, is at its left; robot 2, at its south, behind it."""
     radio = Radio(9.0, send_offset="tick", measures=MEASURES)
-    told = run(make_air(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
+    told = run(make_medium(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
     seen = {
         (int(r), int(s)): (range_m, bearing_rad)
         for r, s, range_m, bearing_rad in zip(
@@ -98,7 +98,7 @@ def test_range_and_bearing_are_exact_without_noise():
 
 def test_only_what_the_radio_gives_comes_with_a_packet():
     for measures in (Measures(), Measures(range=RangeMeasure()), Measures(bearing=BearingMeasure()), MEASURES):
-        told = run(make_air(Radio(9.0, measures=measures), 3), scattered(3), everybody(3), 2, 2)
+        told = run(make_medium(Radio(9.0, measures=measures), 3), scattered(3), everybody(3), 2, 2)
         assert all(tuple(one.received.given) == measures.columns for one in told.news)
 
 
@@ -106,7 +106,7 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
     """10,920 draws each: the mean and the deviation lie within five standard errors (false alarm 1e-6 each)."""
     radio = Radio(99.0, measures=Measures(RangeMeasure(0.1), BearingMeasure(0.3)))
     pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
-    told = run(make_air(radio, 40), pose, everybody(40), 7, 2)
+    told = run(make_medium(radio, 40), pose, everybody(40), 7, 2)
     way = pose[told.received("sender"), :2] - pose[told.received("receiver"), :2]
     bearing_rad = np.arctan2(way[:, 1], way[:, 0]) - pose[told.received("receiver"), 2]
     wrong_rad = np.angle(np.exp(1j * (told.given("bearing_rad") - bearing_rad)))
@@ -123,10 +123,10 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
 @given(st.integers(0, 1000), st.floats(0.3, 4.0))
 def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: float):
     obstacles = [*BETWEEN.values(), Obstacle("cylinder", 1.5, 1.0, radius_m=0.5)]
-    air = make_air(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
+    medium = make_medium(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
     pose = scattered(24, seed)
-    edges = air.edges(pose, np.ones(24, bool))
-    told = run(air, pose, everybody(24), 1)
+    edges = medium.edges(pose, np.ones(24, bool))
+    told = run(medium, pose, everybody(24), 1)
     sender = told.received("receiver") // 12 * 12 + told.received("sender")
     links = np.column_stack([sender, told.received("receiver")])
     both = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).reshape(-1, 2)
@@ -138,12 +138,12 @@ def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: flo
 def test_edges_join_robots_alive_where_packets_get_through_often_enough():
     pose, alive = at((0, 0), (1, 0), (2, 0)), np.array([True, True, False])
     for loss, joined in ((0.0, 1), (0.9, 1), (0.91, 0)):
-        assert len(make_air(Radio(1.5, loss=loss), 3).edges(pose, alive)) == joined
-    assert make_air(Radio(1.5), 3).edges(pose, np.zeros(3, bool)).shape == (0, 2)
+        assert len(make_medium(Radio(1.5, loss=loss), 3).edges(pose, alive)) == joined
+    assert make_medium(Radio(1.5), 3).edges(pose, np.zeros(3, bool)).shape == (0, 2)
 
 
 def test_fate_of_a_link_is_listed_once():
-    told = run(make_air(Radio(9.0, loss=0.5, latency_s=0.2), 6), scattered(6), everybody(6), 4, 6)
+    told = run(make_medium(Radio(9.0, loss=0.5, latency_s=0.2), 6), scattered(6), everybody(6), 4, 6)
     links = np.column_stack([told.finished(name) for name in ("sender", "receiver", "sequence")])
     assert len(np.unique(links, axis=0)) == len(links) == 6 * 5 * 4
     assert set(told.finished("fate")) == {Fate.RECEIVED, Fate.LOST}
@@ -153,9 +153,9 @@ SIZE_M = (6.0, 4.0)
 EXACT = Measures(RangeMeasure(0.0), BearingMeasure(0.0))
 
 
-def torus(radio: Radio, robots: int, arenas: int = 1, obstacles: tuple[Obstacle, ...] = ()) -> Air:
+def torus(radio: Radio, robots: int, arenas: int = 1, obstacles: tuple[Obstacle, ...] = ()) -> RadioMedium:
     keys = np.array([derive_key(seed, "air") for seed in range(arenas)], np.uint64)
-    return Air(radio, keys, robots, SIZE_M, obstacle_arrays((obstacles,) * arenas), RATE_HZ, boundary="torus")
+    return RadioMedium(radio, keys, robots, SIZE_M, obstacle_arrays((obstacles,) * arenas), RATE_HZ, boundary="torus")
 
 
 def scattered_torus(rows: int) -> FloatArray:

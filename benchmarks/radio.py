@@ -1,7 +1,7 @@
-"""The air alone, in times real time: everybody broadcasts in each tick of 0.1 s, moves a little, and hears.
+"""The medium alone, in times real time: everybody broadcasts in each tick of 0.1 s, moves a little, and hears.
 
-What is timed is all that a run asks of the air in a tick: time passes, poses are held, packets are sent, and the radio
-graph is drawn. One thread.
+What is timed is all that a run asks of the medium in a tick: time passes, poses are held, packets are sent, and the
+radio graph is drawn. One thread.
 """
 
 import statistics
@@ -17,7 +17,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.deploy.radio.probe import radio_of
 
@@ -73,7 +73,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
     assert reach_m is not None
     side_m = float(np.sqrt(robots * np.pi * reach_m**2 / case.in_range))
     keys = np.array([derive_key("arena", 1)], np.uint64)
-    air = Air(radio, keys, robots, (side_m, side_m), obstacle_arrays(((),)), RATE_HZ)
+    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacle_arrays(((),)), RATE_HZ)
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
@@ -117,7 +117,7 @@ def scaling() -> tuple[float, dict[str, Any]]:
 
 
 def air_cost(name: str, repeats: int) -> None:
-    """Real-time factor of the air alone, without robots to act."""
+    """Real-time factor of the medium alone, without robots to act."""
     costs = [cost(CASES[name]) for _ in range(repeats)]
     factors = [each.realtime_factor for each in costs]
     print_line(name, statistics.median(factors), "x real time", {**costs[0].told, **spread(factors)})

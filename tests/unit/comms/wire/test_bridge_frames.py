@@ -1,4 +1,4 @@
-"""What the air tells robots, between ticks too, and poses: over whole, or refused."""
+"""What the medium tells robots, between ticks too, and poses: over whole, or refused."""
 
 import math
 from dataclasses import replace
@@ -18,9 +18,9 @@ from swarmwire.comms.wire.radio_bridge import (
     POSE_BYTES,
     BridgeInfo,
     Pose,
-    decode_air,
+    decode_bridged,
     decode_pose,
-    encode_air,
+    encode_bridged,
     encode_pose,
 )
 from swarmwire.comms.wire.tick_frames import decode_packets, decode_sent, encode_packets, encode_sent
@@ -43,7 +43,7 @@ OUTCOMES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 def changed(**arrays: Any) -> bytes:
     """A sound frame but for these arrays, "_" for "/"."""
-    whole = frames.decode(encode_air(3, ROW, RECEIVED, OUTCOMES))
+    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, OUTCOMES))
     wrong = {name.replace("_", "/"): array for name, array in arrays.items()}
     return frames.encode(whole.kind, whole.tick, {**whole.arrays, **wrong})
 
@@ -55,7 +55,7 @@ def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
 
 
 def test_what_was_received_and_learned_comes_over_whole() -> None:
-    tick, received, tx_status = decode_air(encode_air(3, ROW, RECEIVED, OUTCOMES), TERMS)
+    tick, received, tx_status = decode_bridged(encode_bridged(3, ROW, RECEIVED, OUTCOMES), TERMS)
     assert tick == 3
     for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
         assert getattr(received, name).tolist() == getattr(RECEIVED, name).tolist()
@@ -68,8 +68,8 @@ def test_what_was_received_and_learned_comes_over_whole() -> None:
 
 
 def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
-    tick, received, tx_status = decode_air(
-        encode_air(0, ROW, ReceivedPackets.none(TERMS.measures), NO_TX_STATUSES), TERMS
+    tick, received, tx_status = decode_bridged(
+        encode_bridged(0, ROW, ReceivedPackets.none(TERMS.measures), NO_TX_STATUSES), TERMS
     )
     assert (tick, len(received), len(tx_status)) == (0, 0, 0)
     assert set(received.given) == set(TERMS.measures)
@@ -100,37 +100,39 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
 )
 def test_tables_that_contradict_one_another_are_refused(arrays: dict[str, Any], told: str) -> None:
     with pytest.raises(BadFrame, match=told) as caught:
-        decode_air(changed(**arrays), TERMS)
+        decode_bridged(changed(**arrays), TERMS)
     assert caught.value.fault == "malformed"
 
 
 def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
-    whole = frames.decode(encode_air(3, ROW, RECEIVED, OUTCOMES))
+    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, OUTCOMES))
     for kind, tick in (("packets", 3), ("tick", -1)):
         with pytest.raises(BadFrame, match="expected a tick"):
-            decode_air(frames.encode(kind, tick, whole.arrays), TERMS)
+            decode_bridged(frames.encode(kind, tick, whole.arrays), TERMS)
 
 
 def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     sizes = [
-        len(encode_air(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)) for n in (0, 2**17)
+        len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES))
+        for n in (0, 2**17)
     ]
     most = MAX_RADIO_FRAME_BYTES - sizes[1] + 2**17
     assert sizes[0] < 2**10
     assert MAX_RADIO_FRAME_BYTES == 2**20
     fits, exceeds = (
-        encode_air(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES) for n in (most, most + 1)
+        encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)
+        for n in (most, most + 1)
     )
     assert len(fits) == MAX_RADIO_FRAME_BYTES
-    assert decode_air(fits, TERMS)[0] == 3
+    assert decode_bridged(fits, TERMS)[0] == 3
     with pytest.raises(BadFrame, match="oversized"):
-        decode_air(exceeds, TERMS)
+        decode_bridged(exceeds, TERMS)
 
 
 @pytest.mark.parametrize("tick", [2**62 // 10**8 + 1, 2**63, 2**64 - 1])
 def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
     with pytest.raises(BadFrame):
-        decode_air(encode_air(tick, ROW, RECEIVED, OUTCOMES), TERMS)
+        decode_bridged(encode_bridged(tick, ROW, RECEIVED, OUTCOMES), TERMS)
 
 
 TOLD_TERMS = BridgeInfo(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.tx_status"))

@@ -1,20 +1,20 @@
-"""The air of a run, made from what its scenario and its world say."""
+"""The medium of a run, made from what its scenario and its world say."""
 
 import numpy as np
 
 from swarmwire.comms.radio.config.phy import Antennas
-from swarmwire.comms.radio.medium import Air
+from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 
 
-def new_air(scenario: Scenario, world: World, traces: LinkTraces | None) -> Air | None:
+def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None) -> RadioMedium | None:
     """A new air of the scenario's radio, if it has one; `traces` are those of its file."""
     static, radio = world.static, scenario.radio
     if radio is None:
         return None
-    return Air(
+    return RadioMedium(
         radio,
         world.keys,
         static.robots,

@@ -20,7 +20,7 @@ from swarmwire.comms.packets import (
 )
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import encode_air
+from swarmwire.comms.wire.radio_bridge import encode_bridged
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
@@ -41,9 +41,9 @@ class DatedClock(FakeClock):
 
 
 @contextmanager
-def bridged(air=AIR):
+def bridged(medium=AIR):
     """A bridge, and a function that makes sessions that can call it."""
-    bridge, sessions = RadioBridge(Network(listen=ANY_PORT), KEYS, ROWS, air), []
+    bridge, sessions = RadioBridge(Network(listen=ANY_PORT), KEYS, ROWS, medium), []
     endpoints = bridge.open()
 
     def session():
@@ -208,8 +208,8 @@ def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
         ("flock-1", ROBOTS[::-1], AIR, "expected the robots of the world, in its order: flock-0, flock-1, flock-2"),
     ],
 )
-def test_a_robot_that_does_not_fit_the_world_is_refused_in_one_line(own, robots, air, said):
-    with bridged(air) as (_, session), pytest.raises(BadInput, match=said) as caught:
+def test_a_robot_that_does_not_fit_the_world_is_refused_in_one_line(own, robots, medium, said):
+    with bridged(medium) as (_, session), pytest.raises(BadInput, match=said) as caught:
         WorldRadio(session(), KEYS, robots, own, WallClock()).open()
     assert "\n" not in str(caught.value)
 
@@ -229,13 +229,13 @@ def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
     with bridged() as (bridge, session):
         peer = session()
         radio = joined(peer)
-        key = KEYS.air_sent("flock-1")
+        key = KEYS.bridge_sent("flock-1")
         other = frames.encode("actions", 1, {"rows": np.array([2]), "command": np.zeros((4, 1))})
         for data in (b"", b"garbage", frames.encode("tick", 1, {}), other):
             peer.put(key, data)
         peer.put(key, bytes(2**20 + 1))
-        peer.put(KEYS.air_sent("flock-0"), b"")
-        peer.put(KEYS.air_sent("*"), b"")
+        peer.put(KEYS.bridge_sent("flock-0"), b"")
+        peer.put(KEYS.bridge_sent("*"), b"")
         radio.send(words(3.0, row=1))
         assert taken(bridge, 1).sender.tolist() == [1]
         counts = bridge.counts()
@@ -245,7 +245,7 @@ def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
 
 def bad_frames() -> list[bytes]:
     """Frames that no robot can use, most of them almost right."""
-    good = frames.decode(encode_air(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_TX_STATUSES))
+    good = frames.decode(encode_bridged(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_TX_STATUSES))
 
     def changed(name, value) -> bytes:
         return frames.encode("tick", 3, {**good.arrays, name: value})
@@ -256,8 +256,8 @@ def bad_frames() -> list[bytes]:
         frames.encode("end", 3, {}),
         frames.encode("tick", -1, good.arrays),
         frames.encode("tick", 3, {}),
-        encode_air(3, 1, received((2, 0, 1, 1)), NO_TX_STATUSES),
-        encode_air(3, 1, ReceivedPackets.none(MEASURES), TxStatuses(np.array([2]), np.array([1]), np.array([0]))),
+        encode_bridged(3, 1, received((2, 0, 1, 1)), NO_TX_STATUSES),
+        encode_bridged(3, 1, ReceivedPackets.none(MEASURES), TxStatuses(np.array([2]), np.array([1]), np.array([0]))),
         changed("received/numbers", numbers[:4]),
         changed("received/numbers", numbers[0]),
         changed("received/numbers", numbers.astype(np.float64)),
@@ -279,8 +279,8 @@ def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it(
         exchange(bridge, radio)
         bad = bad_frames()
         for data in bad:
-            bridge.session.put(KEYS.air_received("flock-1"), data)
-        bridge.session.put(KEYS.air_received("flock-1"), bytes(2**20 + 1))
+            bridge.session.put(KEYS.bridge_received("flock-1"), data)
+        bridge.session.put(KEYS.bridge_received("flock-1"), bytes(2**20 + 1))
         bridge.publish(4, received((1, 0, 5, 1)), NO_TX_STATUSES)
         assert received_by(radio, 1) == [(0, 5, 5.0)]
         counts = radio.counts()
