@@ -10,14 +10,14 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.agent_overhead import agent_overhead
-from benchmarks.radio import CASES as AIRS
-from benchmarks.radio import air_cost, air_scaling
 from benchmarks.campaign import campaign
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import BOID, FLOCKING, plain_processes, processes
 from benchmarks.push_fleet import push_fleet
+from benchmarks.radio import CASES as AIRS
+from benchmarks.radio import air_cost, air_scaling
 from benchmarks.realtime import realtime
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost

@@ -44,7 +44,7 @@ class Observer(Protocol):
         ...
 
 
-class Judge(Protocol):
+class StopConditions(Protocol):
     """Says when an arena has come to its end before the run has. It judges by what observers saw, as one of them."""
 
     def over(self) -> BoolArray | None:

@@ -21,7 +21,6 @@ from swarmwire.deploy.commands.help_text import let_help_flow
 from swarmwire.deploy.commands.join import join_command
 from swarmwire.deploy.commands.list_kinds import list_command
 from swarmwire.deploy.commands.new import new_command
-from swarmwire.deploy.commands.parity import parity_command
 from swarmwire.deploy.commands.radio.group import radio_app
 from swarmwire.deploy.commands.repeat import repeat_command
 from swarmwire.deploy.commands.report import report_command
@@ -30,6 +29,7 @@ from swarmwire.deploy.commands.router import router_command
 from swarmwire.deploy.commands.run import run_command
 from swarmwire.deploy.commands.schema import schema_command
 from swarmwire.deploy.commands.screenshot import screenshot_command
+from swarmwire.deploy.commands.sim_to_real import sim_to_real_command
 from swarmwire.deploy.commands.sweep import sweep_command
 from swarmwire.deploy.commands.tune import tune_command
 from swarmwire.deploy.commands.ui import ui_command
@@ -83,7 +83,7 @@ app.command("new")(new_command)
 app.command("verify")(verify_command)
 app.command("compare")(compare_command)
 app.command("report")(report_command)
-app.command("parity")(parity_command)
+app.command("sim-to-real")(sim_to_real_command)
 app.command("router")(router_command)
 app.add_typer(radio_app, name="radio")
 app.add_typer(ctl_app, name="ctl")

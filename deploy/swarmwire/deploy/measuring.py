@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from swarmwire.comms.plugins import resolve
-from swarmwire.metrics.judge import Condition
 from swarmwire.metrics.listed import Item, Listed, listed
+from swarmwire.metrics.stop import Condition
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.tables import MetricTable
 

@@ -8,7 +8,7 @@ from typing import Any, Self, cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_s
 from swarmwire.comms.errors import BadInput, Interrupted, RecordFailed
-from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
+from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.arguments import (
@@ -49,9 +49,9 @@ from swarmwire.deploy.result import Result
 from swarmwire.deploy.system_limits import need_open_files, need_threads
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
-from swarmwire.metrics.judge import Judge as StopJudge
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.stop import StopConditions as MetricStopConditions
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
 from swarmwire.world.backends.registry import Change, Loss, RunnerHealth
@@ -123,8 +123,8 @@ class Simulation:
         measures = measuring(self.scenario)
         self.metrics = Metrics(measures.metrics)
         stops = conditions(self.scenario)
-        self._stop = StopJudge(self.metrics, stops) if stops else None
-        self.judge: Judge | None = self._stop
+        self._stop = MetricStopConditions(self.metrics, stops) if stops else None
+        self.stop_conditions: StopConditions | None = self._stop
         self.code = tuple(dict.fromkeys([*self.agents.values(), *custom_code(self.world.static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
@@ -323,7 +323,7 @@ class Simulation:
             acting,
             self._watching,
             self.scenario.events,
-            self.judge,
+            self.stop_conditions,
             self.interventions,
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
         )

@@ -137,7 +137,7 @@ class Stops:
 
 def judged(simulation: Simulation, over: Mapping[int, int] = OVER) -> Result:
     """The result of a simulation some of whose arenas are over early."""
-    simulation.judge = Stops(simulation.static.seeds, over)
+    simulation.stop_conditions = Stops(simulation.static.seeds, over)
     with simulation:
         simulation.run()
     return simulation.result
@@ -294,7 +294,7 @@ def test_a_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -
     result = packed(scenario(tmp_path, "unit-disk"), (5, 1), out=tmp_path / "together")
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")
-    rerun.simulation.judge = Stops((5, 1), OVER)
+    rerun.simulation.stop_conditions = Stops((5, 1), OVER)
     repeated = rerun.run()
     assert (repeated.same, repeated.compared) == (True, TICKS)
     assert repeated.result.arenas == result.arenas

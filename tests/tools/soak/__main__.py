@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from tests.tools.soak.hour import Hour
-from tests.tools.soak.judged import main as judge
+from tests.tools.soak.judged import main as stop_conditions
 from tests.tools.soak.schedules.playing import play_all
 
 SCHEDULES_AT_ONCE = 2
@@ -31,7 +31,7 @@ def main() -> int:
     hour = Hour(given.out, given.minutes, given.processes, given.seed)
     Path(os.environ["TMPDIR"]).mkdir()
     hour.run()
-    return judge(given.out) or held
+    return stop_conditions(given.out) or held
 
 
 if __name__ == "__main__":

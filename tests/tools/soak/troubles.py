@@ -135,7 +135,7 @@ class Troubles:
     def pushed(self) -> Steps:
         """Robots are pushed."""
         direction = round(float(self._rng.uniform(-3.0, 3.0)), 2)
-        self._order({"do": "push", "robots": {"count": 5}, "speed_mps": 0.3, "direction_rad": direction})
+        self._order({"do": "impulse", "robots": {"count": 5}, "speed_mps": 0.3, "direction_rad": direction})
         yield 0.0
 
     def refused(self) -> Steps:

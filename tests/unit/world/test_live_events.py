@@ -53,7 +53,7 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
         ({**KILL, "at_s": 3.0}, "at_s: expected no time"),
         ({**SET, "to": 2.0}, "to: expected at most 1"),
         ({"do": "jammer", "at": [0, 0], "power_dbm": 20.0}, "do: expected a radio with a PHY"),
-        ({"do": "push", "robots": {"group": "flock"}, "speed_mps": 9.0}, "speed_mps: expected at most 1.75 m/s"),
+        ({"do": "impulse", "robots": {"group": "flock"}, "speed_mps": 9.0}, "speed_mps: expected at most 1.75 m/s"),
         ({"do": "kill", "robots": {"share": float("nan")}}, "expected texts, finite numbers, lists and tables alone"),
         ({"do": "kill", "robots": {"group": b"flock"}}, "expected texts, finite numbers, lists and tables alone"),
     ],

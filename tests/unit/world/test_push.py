@@ -21,7 +21,7 @@ def pushed(
 ) -> Watch:
     """Robots at rest, whose first one is pushed in tick 2, as a scenario's event or a given one would."""
     robots = keys.pop("robots", {"names": ["a-0"]})
-    event = {"do": "push", "at_s": 0.2, "robots": robots, "speed_mps": speed_mps, **keys}
+    event = {"do": "impulse", "at_s": 0.2, "robots": robots, "speed_mps": speed_mps, **keys}
     scenario = posed(poses, body, events=[event], physics={"engine": engine})
     watch = Watch()
     Loop(World(scenario, [1], {}), None, Ahead(0.0), [watch], scenario.events).run(ticks)
@@ -43,7 +43,7 @@ def test_a_push_is_a_velocity_that_motors_take_back(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pushes_of_one_tick_add_up(engine):
     events = [
-        {"do": "push", "at_s": 0.0, "robots": {"group": "a"}, "speed_mps": speed, "direction_rad": direction}
+        {"do": "impulse", "at_s": 0.0, "robots": {"group": "a"}, "speed_mps": speed, "direction_rad": direction}
         for speed, direction in ((0.3, 0.0), (0.1, np.pi))
     ]
     scenario = posed([[0.0, 0.0, 0.0]], "footbot", events=events, physics={"engine": engine})
@@ -70,7 +70,7 @@ def test_the_dead_are_pushed_too_and_drawn_robots_are_alive(engine):
 
 
 def test_an_arena_with_a_push_is_the_same_alone_and_among_others():
-    event = {"do": "push", "at_s": 0.2, "robots": {"count": 1}, "speed_mps": 0.4}
+    event = {"do": "impulse", "at_s": 0.2, "robots": {"count": 1}, "speed_mps": 0.4}
     scenario = posed([[0.0, 0.0, 0.3], [0.3, 0.0, 0.0]], "footbot", events=[event])
     digests = []
     for seeds in ([5], [1, 5, 9]):
@@ -81,7 +81,7 @@ def test_an_arena_with_a_push_is_the_same_alone_and_among_others():
 
 
 def test_bodies_that_go_where_they_are_told_cannot_be_pushed_and_it_is_said_at_the_door():
-    event = {"do": "push", "at_s": 0.2, "robots": {"group": "flock"}, "speed_mps": 0.4}
+    event = {"do": "impulse", "at_s": 0.2, "robots": {"group": "flock"}, "speed_mps": 0.4}
     mapping = changed("events", [event])
     mapping["physics"] = {"engine": "kinematic"}
     with pytest.raises(
@@ -96,7 +96,7 @@ def test_bodies_that_go_where_they_are_told_cannot_be_pushed_and_it_is_said_at_t
 def test_of_engines_side_by_side_only_the_one_with_forces_pushes():
     mapping = changed("physics", {"engine": "auto"})
     mapping["robots"]["big"]["body"] = "point"
-    mapping["events"] = [{"do": "push", "at_s": 0.0, "robots": {"names": ["flock-2"]}, "speed_mps": 0.4}]
+    mapping["events"] = [{"do": "impulse", "at_s": 0.0, "robots": {"names": ["flock-2"]}, "speed_mps": 0.4}]
     scenario = scenario_from(mapping, "s.toml")
     world, watch = World(scenario, [1], {}), Watch()
     assert set(world.engines) == {"discs", "kinematic"}

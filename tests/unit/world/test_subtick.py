@@ -220,7 +220,7 @@ class FromBoth(Sender):
 def test_of_an_arena_that_leaves_what_was_received_within_its_last_tick_counts_and_the_rest_is_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
-    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], judge=OverAfter(3), timed=backend)
+    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], stop_conditions=OverAfter(3), timed=backend)
     loop.run(6)
     last = loop.end()
     assert last is not None

@@ -81,8 +81,8 @@ class Events:
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
-            if (by_mps := self._conditions.take_pushes()) is not None:
-                world.push(by_mps)
+            if (by_mps := self._conditions.take_impulses()) is not None:
+                world.apply_impulse(by_mps)
             if medium:
                 medium.disrupt(self._conditions.disruption())
         if medium and self._radio:

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.interfaces import AgentBackend, Judge, Observer, TimedBackend
+from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import News
@@ -77,18 +77,18 @@ class Loop:
         backend: AgentBackend,
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
-        judge: Judge | None = None,
+        stop_conditions: StopConditions | None = None,
         interventions: Interventions | None = None,
         timed: TimedBackend | None = None,
     ) -> None:
-        """`judge` is asked after each tick, once observers saw it; without one no arena is over before the run is.
+        """`stop_conditions` are asked after each tick, once observers saw it; without them no arena ends before the run.
 
         `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it
         is to put packets on air and hand them over while a tick goes on.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
-        self._judge = judge
+        self._stop_conditions = stop_conditions
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._interventions = interventions
         course = interventions.course if interventions else None
@@ -155,7 +155,7 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
-        over = self._judge.over() if self._judge else None
+        over = self._stop_conditions.over() if self._stop_conditions else None
         if over is not None:
             self._leave(over & self._running)
         return truth

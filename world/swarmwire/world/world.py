@@ -142,10 +142,10 @@ class World:
                 mask = failed[name].reshape(shape)[:, group.start : group.stop] if name in failed else None
                 sensor.failed = mask if mask is not None and mask.any() else None
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (rows, 2) in m/s, but not in arenas that left."""
         by_mps = np.where(self.rows_running[:, None], by_mps, 0.0)
-        self._physics.push(by_mps.reshape(self.static.arenas, self.static.robots, 2))
+        self._physics.apply_impulse(by_mps.reshape(self.static.arenas, self.static.robots, 2))
         self._show()
 
     def _brake(self) -> None:

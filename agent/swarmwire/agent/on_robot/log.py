@@ -77,7 +77,7 @@ class RowFile:
             self._file.close()
 
 
-# --- The log of a robot: a new folder for each start of its agent, which `swarmwire parity` and `radio fit` read.
+# --- The log of a robot: a new folder for each start of its agent, which `swarmwire sim-to-real` and `radio fit` read.
 #
 # `robot.json` says what runs; `ticks.csv`, `received.csv` and `sent.csv` grow once a second; `summary.json` is written
 # at the end, so a log without one is that of a process that was killed. What a full disk loses is counted, and stops

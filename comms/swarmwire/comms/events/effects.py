@@ -100,7 +100,9 @@ class Conditions:
         self.slopes: dict[int, Slope] = {}  # in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # (rows,) each robot's set, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # (rows,) the same, where the second does not hear the first
-        self.pushes: dict[int, FloatArray] = {}  # (rows, 2) m/s that velocities change by at once, in the arena's frame
+        self.impulses_mps: dict[
+            int, FloatArray
+        ] = {}  # (rows, 2) m/s that velocities change by at once, in the arena's frame
 
     def let_go(self, serial: int) -> None:
         """The event at this place in the scenario holds nothing any more."""
@@ -108,12 +110,12 @@ class Conditions:
             if name != "rows":
                 held.pop(serial, None)
 
-    def take_pushes(self) -> FloatArray | None:
+    def take_impulses(self) -> FloatArray | None:
         """What all velocities change by now, (rows, 2) in m/s; None: nothing. It is taken once."""
-        if not self.pushes:
+        if not self.impulses_mps:
             return None
-        by_mps = sum(self.pushes.values(), np.zeros((self.rows, 2)))
-        self.pushes.clear()
+        by_mps = sum(self.impulses_mps.values(), np.zeros((self.rows, 2)))
+        self.impulses_mps.clear()
         return by_mps
 
     @property

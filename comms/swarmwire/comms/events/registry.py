@@ -7,7 +7,7 @@ the `Disruption` that it makes, by the medium.
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
-from swarmwire.comms.events.robot_events import Fail, Kill, Push, Revive
+from swarmwire.comms.events.robot_events import Fail, Impulse, Kill, Revive
 
 # All that `do` may name.
-ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Push)
+ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Impulse)

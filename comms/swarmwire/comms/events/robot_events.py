@@ -131,19 +131,19 @@ class Fail(LastingEvent):
         return Lifetimes(self.per_hour, None if self.for_s is None else to_ns(self.for_s), swarm.keys, serial)
 
 
-# --- Push: robots get another velocity at once, as by a blow.
+# --- Impulse: robots get another velocity at once, as by a blow.
 
 
 @dataclass(frozen=True, kw_only=True)
-class Push(Event):
+class Impulse(Event):
     """The robots' velocity changes by so much in a direction; what follows is up to their motors, and to what they hit.
 
     A robot on wheels is brought back to its command's speed as fast as its motors' force allows, which may be within a
     tick; a dead one only brakes. How many newton seconds that takes is its mass times the speed. Bodies without
-    contacts, which go where they are told, cannot be pushed.
+    contacts, which go where they are told, take no impulse.
     """
 
-    do: str = parameter("push", help="robots get another velocity at once", choices=("push",))
+    do: str = parameter("impulse", help="robots get another velocity at once", choices=("impulse",))
     robots: Selection = parameter(help="which robots; share and count choose among those alive")
     speed_mps: float = parameter(help="how much is added to their velocity", unit="m/s", above=0, at_most=1000)
     direction_rad: float = parameter(
@@ -155,8 +155,8 @@ class Push(Event):
     )
 
     def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
-        """Push them; changed are all that were chosen, dead ones too."""
+        """Apply it; changed are all that were chosen, dead ones too."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         by_mps = self.speed_mps * np.array([cos(self.direction_rad), sin(self.direction_rad)])
-        conditions.pushes[serial] = np.where(chosen[:, None], by_mps, 0.0)
+        conditions.impulses_mps[serial] = np.where(chosen[:, None], by_mps, 0.0)
         return chosen

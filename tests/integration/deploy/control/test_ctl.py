@@ -50,7 +50,7 @@ def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path,
     assert "event 0: kill" in ctl("kill", "flock-1", "flock-4")
     assert "event 1: ramp" in ctl("set", "loss=0.7")
     ctl("partition", "x", "--for", 1)
-    ctl("push", "flock", "20%", "--speed", 0.5, "--direction", 1.57)
+    ctl("impulse", "flock", "20%", "--speed", 0.5, "--direction", 1.57)
     assert "to come" in ctl("events")
     ctl("step", 20)
     now = until(status, lambda status: status["state"] == "paused" and status["tick"] > tick)

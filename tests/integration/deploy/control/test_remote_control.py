@@ -67,7 +67,7 @@ def session_of_people(control: RemoteControl) -> None:
     control.step(7)
     at_tick(control, 12)
     control.event({"do": "ramp", "what": "radio.loss", "to": 0.6})
-    control.event({"do": "push", "robots": {"share": 0.3}, "speed_mps": 0.6, "direction_rad": 1.0})
+    control.event({"do": "impulse", "robots": {"share": 0.3}, "speed_mps": 0.6, "direction_rad": 1.0})
     control.event({"do": "fail", "part": "motors", "robots": {"group": "flock"}, "per_hour": 1000.0, "for_s": 1.0})
     control.step(4)
     at_tick(control, 16)

@@ -33,7 +33,7 @@ EVENTS: tuple[dict[str, Any], ...] = (
     {"do": "kill", "robots": ["flock-1"]},
     {"do": "partition", "halves": "y", "bridge": ["flock-0"]},
     {"do": "fail", "part": "motors", "robots": {"count": 3}, "for_s": 10},
-    {"do": "push", "robots": {"count": 1}, "speed_mps": 0.3},
+    {"do": "impulse", "robots": {"count": 1}, "speed_mps": 0.3},
     {"do": "ramp", "what": "radio.loss", "to": 0.5, "over_s": 5.0},
     {"do": "blackout", "robots": {"count": 1}, "for_s": 1.0},
     {"do": "revive", "robots": {"count": 1}},

@@ -94,7 +94,7 @@ class Engine(Protocol):
         """
         ...
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, n, 2) in m/s; TypeError if the engine knows no forces."""
         ...
 

@@ -56,7 +56,7 @@ class KinematicEngine:
         mark(self._touching, self.touched)
         return onsets
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """TypeError: bodies that go where they are told cannot be pushed, and scenarios that ask for it are refused."""
         raise TypeError("the kinematic engine knows no forces")
 

@@ -79,11 +79,11 @@ class Physics:
         self._gather()
         return onsets
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError where there are no forces."""
         for engine, index in zip(self._engines, self._robots, strict=True):
             if (part := by_mps[:, index]).any():
-                engine.push(part)
+                engine.apply_impulse(part)
         if len(self._engines) > 1:
             self._gather()
 

@@ -25,7 +25,7 @@ from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, 
 
 
 @njit(cache=True)
-def push(
+def apply_impulse(
     motors: Motors,
     target: FloatArray,
     state: FloatArray,
@@ -203,7 +203,7 @@ class ArenaSpace:
         if len(loads):
             loads[:] = rows[self._robots : -1]
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots, (robots, 2) in m/s."""
         for row in np.flatnonzero(by_mps.any(axis=1)).tolist():
             body, (x_mps, y_mps) = self._pushed[row], by_mps[row].tolist()
@@ -273,7 +273,7 @@ class PymunkEngine:
             # A turn that contacts gave to a robot that is braked is slowed down, but not made up for.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
             moved = self._force, self.travel_m, self._unhindered
-            push(self._motors, target, self.state, self._step_s, self._running, *moved)
+            apply_impulse(self._motors, target, self.state, self._step_s, self._running, *moved)
             for arena in self._moving:
                 self._spaces[arena].step(self._step_s)
             self._read()
@@ -284,10 +284,10 @@ class PymunkEngine:
             self._spaces[arena].count_onsets(onsets[arena : arena + 1], self.touched[arena : arena + 1])
         return onsets
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
         for arena in self._moving:
-            self._spaces[arena].push(by_mps[arena])
+            self._spaces[arena].apply_impulse(by_mps[arena])
         self._read()
 
     def leave(self, over: BoolArray) -> None:

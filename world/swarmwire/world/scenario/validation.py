@@ -12,7 +12,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.config import one_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.robot_events import Push
+from swarmwire.comms.events.robot_events import Impulse
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
 from swarmwire.world.actuation.actuators import noise_of
 from swarmwire.world.engines.physics import check_engines, engines_of
@@ -156,7 +156,7 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {why}")
 
 
-def _check_push(scenario: Scenario, bodies: Mapping[str, Body], event: Push) -> None:
+def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impulse) -> None:
     """Only engines with forces can push; and who is pushed must not get through what stands in the way in one step."""
     engines = engines_of(scenario, bodies)
     for group in event.robots.groups(scenario.groups()):
@@ -178,8 +178,8 @@ def check_event(scenario: Scenario, bodies: Mapping[str, Body], event: Event, ke
     try:
         event.check(scenario.groups())
         event.check_bodies(scenario.groups(), bodies)
-        if isinstance(event, Push):
-            _check_push(scenario, bodies, event)
+        if isinstance(event, Impulse):
+            _check_impulse(scenario, bodies, event)
         if event.needs_radio and scenario.radio is not None:
             event.check_radio(scenario.radio)
     except BadInput as error:

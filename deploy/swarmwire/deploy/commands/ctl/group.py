@@ -17,7 +17,7 @@ from swarmwire.deploy.commands.ctl.pace import (
     stop_command,
 )
 from swarmwire.deploy.commands.ctl.radio import jam_command, partition_command, set_command
-from swarmwire.deploy.commands.ctl.robots import kill_command, push_command, revive_command
+from swarmwire.deploy.commands.ctl.robots import impulse_command, kill_command, revive_command
 from swarmwire.deploy.commands.ctl.status import status_command
 from swarmwire.deploy.commands.help_text import flowing
 
@@ -99,7 +99,7 @@ ctl_app.command("speed")(speed_command)
 ctl_app.command("stop")(stop_command)
 ctl_app.command("kill")(kill_command)
 ctl_app.command("revive")(revive_command)
-ctl_app.command("push")(push_command)
+ctl_app.command("impulse")(impulse_command)
 ctl_app.command("partition")(partition_command)
 ctl_app.command("jam")(jam_command)
 ctl_app.command("set")(set_command)

@@ -1,4 +1,4 @@
-"""`swarmwire ctl kill`, `revive` and `push`: what happens to robots."""
+"""`swarmwire ctl kill`, `revive` and `impulse`: what happens to robots."""
 
 from typing import Annotated
 
@@ -42,7 +42,7 @@ def revive_command(context: typer.Context, robots: Which) -> None:
     give(context.obj, {"do": "revive", "robots": selection_of(robots)})
 
 
-def push_command(
+def impulse_command(
     context: typer.Context,
     robots: Which,
     speed_mps: Annotated[float, typer.Option("--speed", help="Added to their velocity, m/s.", metavar="M/S")],
@@ -54,7 +54,7 @@ def push_command(
 
     For example along y:
 
-      swarmwire ctl push flock-3 --speed 0.5 --direction 1.57
+      swarmwire ctl impulse flock-3 --speed 0.5 --direction 1.57
     """
-    table = {"do": "push", "robots": selection_of(robots), "speed_mps": speed_mps, "direction_rad": direction_rad}
+    table = {"do": "impulse", "robots": selection_of(robots), "speed_mps": speed_mps, "direction_rad": direction_rad}
     give(context.obj, table)

@@ -97,7 +97,7 @@ class DiscsEngine:
                 return onsets
             self._list_near(fastest_mps)
 
-    def push(self, by_mps: FloatArray) -> None:
+    def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
         self.state[:, :, 3:5] += by_mps
 

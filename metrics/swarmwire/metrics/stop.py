@@ -29,7 +29,7 @@ class Condition:
         return f"{self.metric} {self.comparison.replace('_', ' ')} {self.limit:g}{hold}"
 
 
-class Judge:
+class StopConditions:
     """Observer that finds arenas over.
 
     Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.

@@ -1,11 +1,13 @@
-"""A parity as a page: the tables, and of each metric both distributions."""
+"""A sim-to-real comparison as a page: the tables, and of each metric both distributions."""
 
 import math
 from collections.abc import Sequence
 
-from swarmwire.metrics.parity.distribution_figure import distribution_figure
-from swarmwire.metrics.parity.parity import MetricRow, Parity
-from swarmwire.metrics.parity.parity_texts import (
+from swarmwire.metrics.report.section import Figure, Report, Section, Table
+from swarmwire.metrics.report.svg import as_svg
+from swarmwire.metrics.sim_to_real.comparison import MetricRow, SimToReal
+from swarmwire.metrics.sim_to_real.distribution_figure import distribution_figure
+from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -14,12 +16,10 @@ from swarmwire.metrics.parity.parity_texts import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.report.section import Figure, Report, Section, Table
-from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.texts import number_text
 
 
-def parity_report(of: Parity, title: str, told: Sequence[str]) -> Report:
+def sim_to_real_report(of: SimToReal, title: str, told: Sequence[str]) -> Report:
     """The page; `told` is what differs in the settings, and what is amiss with the logs, a line each.
 
     BadInput without matplotlib.
@@ -39,7 +39,7 @@ def parity_report(of: Parity, title: str, told: Sequence[str]) -> Report:
 
 
 def _figure(row: MetricRow) -> Figure:
-    name = f"parity-{row.metric.name}"
+    name = f"sim-to-real-{row.metric.name}"
     runs = f"{len(row.runs)} emulated runs, each and all together," if len(row.runs) > 1 else "the emulated run"
     caption = f"`{row.metric.name}` in {runs} and in the log: {row.metric.help or 'the user’s own'}."
     return Figure(name, as_svg(distribution_figure(row), name), caption)

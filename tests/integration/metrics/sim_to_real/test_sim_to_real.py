@@ -8,9 +8,19 @@ import pytest
 
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.parity.emulated_runs import EmulatedRun, EmulatedRuns, runs_of_folder
-from swarmwire.metrics.parity.parity import MetricRow, Parity, RadioRow, Spread, parity
-from swarmwire.metrics.parity.parity_texts import (
+from swarmwire.metrics.real_log.measured_log import measured_log
+from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.sim_to_real.comparison import (
+    MetricRow,
+    RadioRow,
+    SimToReal,
+    Spread,
+    compare_sim_to_real,
+)
+from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns, runs_of_folder
+from swarmwire.metrics.sim_to_real.radio_values import RadioValue
+from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -19,10 +29,6 @@ from swarmwire.metrics.parity.parity_texts import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.parity.radio_values import RadioValue
-from swarmwire.metrics.real_log.measured_log import measured_log
-from swarmwire.metrics.real_log.real_logs import read_real_logs
-from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.statistics.interval import UNKNOWN
 from tests.support.metrics.real_log.as_logs import BEGAN_S, Watched, as_logs
 from tests.support.metrics.real_log.emulated import watched
@@ -64,9 +70,9 @@ def runs():
     return watched_runs, EmulatedRuns("small", many, 10, 6)
 
 
-def compared(emulated: EmulatedRuns, of: Watched, folder) -> Parity:
+def compared(emulated: EmulatedRuns, of: Watched, folder) -> SimToReal:
     logs = read_real_logs(as_logs(of, folder, phase_s=PHASES_S))
-    return parity(emulated, measured_log(logs, MEASURES, of.static), MEASURES)
+    return compare_sim_to_real(emulated, measured_log(logs, MEASURES, of.static), MEASURES)
 
 
 def test_a_run_is_near_itself(runs, tmp_path):
@@ -121,7 +127,7 @@ def test_a_metric_that_neither_side_can_have_is_passed_over_one_that_one_has_is_
     neither = tuple(replace(run, series={"target_best": nothing, "order": nothing}) for run in many.runs)
     log = measured_log(read_real_logs(as_logs(watched(seed=11), tmp_path)), MEASURES)
     log = replace(log, series={"target_best": nothing, "order": log.series["order"]})
-    found = parity(replace(many, runs=neither), log, [METRICS["target_best"](), METRICS["order"]()])
+    found = compare_sim_to_real(replace(many, runs=neither), log, [METRICS["target_best"](), METRICS["order"]()])
     assert (found.undefined, found.never, found.rows) == (("order",), (), ())
 
 
@@ -173,11 +179,11 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
     half = Watched()
     half.static, half.truths = of.static, of.truths[:100]
     short = replace(runs[1], runs=(emulated_run(half, 1),))
-    found = parity(short, measured_log(logs, MEASURES, of.static, 10.0), MEASURES)
+    found = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static, 10.0), MEASURES)
     rows = {row.of.name: row for row in found.radio}
     assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.03)
     assert rows["delivery"].of.log == pytest.approx(rows["delivery"].emulated.median, abs=0.02)
-    whole = parity(short, measured_log(logs, MEASURES, of.static), MEASURES)
+    whole = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static), MEASURES)
     assert whole.radio == ()
     assert all(length in whole.not_compared["delivery"] for length in ("19.9 s", "10 s"))
 
@@ -194,7 +200,7 @@ def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, t
     logs = read_real_logs(folder)
     measures = [*MEASURES, METRICS["latency_air"](), METRICS["latency_agent"]()]
     log = measured_log(logs, measures, watched_runs[0].static)
-    found = parity(many, log, measures)
+    found = compare_sim_to_real(many, log, measures)
     assert [row.of.name for row in found.radio][2:] == [f"latency to agent {p}" for p in ("p50", "p90", "p99")]
     assert found.radio[2].of.runs[0] == many.runs[0].radio["latency_agent_s"]["p50"]
     assert found.radio[2].of.log == pytest.approx(found.radio[2].of.runs[0], abs=0.011)

@@ -1,4 +1,4 @@
-"""A parity on the terminal: the verdict, what differs beforehand, and the tables, the worst first."""
+"""A sim-to-real comparison on the terminal: the verdict, what differs beforehand, and the tables, the worst first."""
 
 from collections.abc import Sequence
 
@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.text import Text
 
 from swarmwire.deploy.terminal.rows import print_rows
-from swarmwire.metrics.parity.parity import Parity
-from swarmwire.metrics.parity.parity_texts import (
+from swarmwire.metrics.sim_to_real.comparison import SimToReal
+from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -18,7 +18,7 @@ from swarmwire.metrics.parity.parity_texts import (
 )
 
 
-def print_parity(of: Parity, told: Sequence[str], console: Console) -> None:
+def print_sim_to_real(of: SimToReal, told: Sequence[str], console: Console) -> None:
     """All of it; `told` is what differs in the settings, and what is amiss with the logs, a line each."""
     for line in told:
         console.print(Text(f"note: {line}"), soft_wrap=True)

@@ -1,10 +1,10 @@
-"""A parity as people read it: cells of its tables, its verdict in a line, and what the numbers mean."""
+"""A sim-to-real comparison as people read it: cells of its tables, its verdict in a line, and what the numbers mean."""
 
 import math
 from collections import defaultdict
 from collections.abc import Mapping
 
-from swarmwire.metrics.parity.parity import MIN_RUNS, MetricRow, Parity, RadioRow, Spread
+from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.texts import interval_text, number_text
 
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
@@ -40,10 +40,10 @@ def spread_text(of: Spread) -> str:
     return f"{number_text(of.median)} ({number_text(of.low)} to {number_text(of.high)})"
 
 
-def verdict(of: Parity) -> str:
+def verdict(of: SimToReal) -> str:
     """One line: how many of the metrics, and of the radio's numbers, lie within what the runs tell."""
     if not of.rows and not of.radio:
-        return "No number is on both sides: nothing can be said of parity."
+        return "No number is on both sides: nothing can be said of sim-to-real agreement."
     metrics, radio = [row.within is True for row in of.judged], [row.within is True for row in of.judged_radio]
     outside = [row.metric.name for row in of.judged if not row.within]
     outside += [row.of.name for row in of.judged_radio if not row.within]
@@ -66,7 +66,7 @@ def verdict(of: Parity) -> str:
     )
 
 
-def meanings(of: Parity) -> list[str]:
+def meanings(of: SimToReal) -> list[str]:
     """What the numbers mean, a sentence or two a line."""
     lines = [
         f"The first {number_text(of.duration_s)} s are compared, counted from the start of each. "
@@ -89,7 +89,7 @@ def meanings(of: Parity) -> list[str]:
     return lines
 
 
-def left_out(of: Parity) -> list[str]:
+def left_out(of: SimToReal) -> list[str]:
     """What is not compared, and why, a line each reason."""
     lines = [f"not in the log: {', '.join(names)}: {why}" for why, names in _by_reason(of.not_in_log).items()]
     lines += [f"not compared: {', '.join(names)}: {why}" for why, names in _by_reason(of.not_compared).items()]

@@ -1,4 +1,4 @@
-"""`swarmwire parity` and `swarmwire radio fit` of robots' logs, in this process: what they print, write and refuse."""
+"""`swarmwire sim-to-real` and `swarmwire radio fit` of robots' logs: what they print, write and refuse."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ from tests.support.metrics.real_log.emulated import METRICS, SMALL, flock, watch
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
     """A run's folder, and the logs that its robots would have written."""
-    here = tmp_path_factory.mktemp("parity")
+    here = tmp_path_factory.mktemp("sim-to-real")
     return here / "run", as_logs(watched(out=here / "run"), here / "logs")
 
 
@@ -32,7 +32,7 @@ def campaign(tmp_path_factory):
 
 
 def test_a_run_and_its_logs_side_by_side(folders, monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "parity", *folders)
+    code, out, errors = called(monkeypatch, capsys, "sim-to-real", *folders)
     assert (code, errors) == (0, "")
     head = next(line for line in out.splitlines() if line.startswith("metric"))
     assert head.split() == ["metric", "emulated", "log", "distance", "spread", "KS", "within"]
@@ -48,7 +48,7 @@ def test_differences_of_settings_stand_before_the_numbers(folders, tmp_path, mon
         says = json.loads((robot / "robot.json").read_text())
         says["body"]["radius_m"] = 0.04
         (robot / "robot.json").write_text(json.dumps({**says, "rate_hz": 20, "params": {"alignment": 2.0}}))
-    code, out, _ = called(monkeypatch, capsys, "parity", folders[0], logs)
+    code, out, _ = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)
     assert code == 0
     told = [line for line in out.splitlines() if line.startswith("note: different ")]
     for said in ("robots: 6 .*5", "10 Hz .*20 Hz", "separation_m 0.8 .*0.4 .*alignment 1.0 .*2.0", "body epuck"):
@@ -58,12 +58,12 @@ def test_differences_of_settings_stand_before_the_numbers(folders, tmp_path, mon
 
 def test_another_agent_is_named(folders, tmp_path, monkeypatch, capsys):
     logs = as_logs(flock(), tmp_path / "logs", about={"agent": "walk.py:Walk"})
-    out = called(monkeypatch, capsys, "parity", folders[0], logs)[1]
+    out = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)[1]
     assert re.search("swarmwire.agent.behaviours:Flocking .*walk.py:Walk ", out)
 
 
 def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "parity", f"{campaign}@radio.loss=0.3", folders[1])
+    code, out, errors = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", folders[1])
     assert (code, errors) == (0, "")
     assert "over 3 runs" in out.splitlines()[-1]
     order = next(line for line in out.splitlines() if line.startswith("order "))
@@ -74,24 +74,24 @@ def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
 
 def test_a_shorter_log_is_not_held_against_a_longer_runs_totals(folders, campaign, tmp_path, monkeypatch, capsys):
     logs = as_logs(watched("duration_s=8"), tmp_path / "logs")
-    out = called(monkeypatch, capsys, "parity", f"{campaign}@radio.loss=0.3", logs)[1]
+    out = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", logs)[1]
     assert not [line for line in out.splitlines() if line.startswith(("delivery ", "packets sent", "latency p50"))]
     told = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, delivery, latency "))
     assert "20 s" in told
-    out = called(monkeypatch, capsys, "parity", folders[0], logs)[1]  # a run folder has counts of each tick
+    out = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)[1]  # a run folder has counts of each tick
     assert [line for line in out.splitlines() if line.startswith("packets sent")]
     assert "not compared: delivery, latency " in out or "not compared: latency " in out
 
 
 def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    page, table = tmp_path / "parity.html", tmp_path / "parity.csv"
-    code, out, _ = called(monkeypatch, capsys, "parity", *folders, "--to", page, "--csv", table)
+    page, table = tmp_path / "sim-to-real.html", tmp_path / "sim-to-real.csv"
+    code, out, _ = called(monkeypatch, capsys, "sim-to-real", *folders, "--to", page, "--csv", table)
     assert (code, out.splitlines()[-2:]) == (0, [f"written: {page}", f"written: {table}"])
     text = page.read_text()
     assert "<svg" in text
     assert "Side by side" in text
-    assert (tmp_path / "parity-figures" / "parity-order.svg").exists()
+    assert (tmp_path / "sim-to-real-figures" / "sim-to-real-order.svg").exists()
     rows = {row["name"]: row for row in csv.DictReader(table.read_text().splitlines())}
     assert float(rows["order"]["log"]) == pytest.approx(float(rows["order"]["emulated_q50"]), abs=0.01)
     assert rows["collisions"]["what"] == "not in the log"
@@ -108,10 +108,10 @@ def test_what_cannot_be_is_refused_in_one_line(folders, campaign, tmp_path, monk
         ((run, tmp_path / "none"), f"{tmp_path}/none: "),
         ((campaign, logs), "one design point of 2"),
         ((f"{campaign}@radio.loss=0.5", logs), "radio.loss: "),
-        ((run, logs, "--to", "parity.pdf"), ".html"),
-        ((run, logs, "--csv", "parity.txt"), ".csv"),
+        ((run, logs, "--to", "sim-to-real.pdf"), ".html"),
+        ((run, logs, "--csv", "sim-to-real.txt"), ".csv"),
     ):
-        code, out, errors = called(monkeypatch, capsys, "parity", *arguments)
+        code, out, errors = called(monkeypatch, capsys, "sim-to-real", *arguments)
         assert (code, out) == (2, ""), arguments
         assert errors.startswith("error: ")
         assert told in errors

@@ -13,9 +13,9 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.pdr import PacketDeliveryRatio
-from swarmwire.metrics.parity.emulated_runs import EmulatedRuns
-from swarmwire.metrics.parity.radio_values import RadioValue, radio_values, why_no_radio
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
+from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns
+from swarmwire.metrics.sim_to_real.radio_values import RadioValue, radio_values, why_no_radio
 from swarmwire.metrics.statistics.block_bootstrap import mean_difference_interval
 from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
 from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
@@ -82,7 +82,7 @@ class RadioRow:
 
 
 @dataclass(frozen=True)
-class Parity:
+class SimToReal:
     """The whole comparison."""
 
     runs: int
@@ -116,7 +116,7 @@ class Parity:
         return (len(self.judged) + ranks * len(self.judged_radio)) / (self.runs + 1)
 
 
-def parity(emulated: EmulatedRuns, log: MeasuredLog, metrics: Sequence[Metric]) -> Parity:
+def compare_sim_to_real(emulated: EmulatedRuns, log: MeasuredLog, metrics: Sequence[Metric]) -> SimToReal:
     """Compare metrics over the time that log and runs have in common, counted from the start of each."""
     duration_s = min(log.duration_s, *(run.duration_s for run in emulated.runs), math.inf)
     rows: list[MetricRow] = []
@@ -147,7 +147,7 @@ def parity(emulated: EmulatedRuns, log: MeasuredLog, metrics: Sequence[Metric]) 
     has_radio = any(run.radio for run in emulated.runs)
     not_compared = {of.name: why for of in numbers if not of.runs} if why is not None and has_radio else {}
     lists = (tuple(names) for names in (absent, undefined, never))
-    return Parity(len(emulated.runs), duration_s, tuple(rows), radio, lacks, not_compared, *lists)
+    return SimToReal(len(emulated.runs), duration_s, tuple(rows), radio, lacks, not_compared, *lists)
 
 
 def _of_range(emulated: EmulatedRuns, metrics: Sequence[Metric]) -> dict[str, str]:

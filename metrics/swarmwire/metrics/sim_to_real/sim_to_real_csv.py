@@ -1,10 +1,10 @@
-"""A parity as a table for programs."""
+"""A sim-to-real comparison as a table for programs."""
 
 import csv
 import math
 from pathlib import Path
 
-from swarmwire.metrics.parity.parity import Parity
+from swarmwire.metrics.sim_to_real.comparison import SimToReal
 from swarmwire.metrics.whole_file import check_path, chosen_file
 
 COLUMNS = (
@@ -26,7 +26,7 @@ COLUMNS = (
 )
 
 
-def write_parity(of: Parity, to: Path) -> None:
+def write_sim_to_real(of: SimToReal, to: Path) -> None:
     """Write a row per metric and number of the radio; BadInput unless the path is that of a .csv that can be written.
 
     Empty: unknown. `what` is metric or radio; of what was not in the log or not compared, all numbers are empty.
@@ -38,7 +38,7 @@ def write_parity(of: Parity, to: Path) -> None:
         writer.writerows(_rows(of))
 
 
-def _rows(of: Parity) -> list[dict[str, str]]:
+def _rows(of: SimToReal) -> list[dict[str, str]]:
     rows: list[dict[str, str]] = []
     for row in of.rows:
         about = {"name": row.metric.name, "what": "metric", "unit": row.metric.unit, "kind": row.metric.kind}

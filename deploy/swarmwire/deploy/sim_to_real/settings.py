@@ -10,7 +10,7 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.agents import agent_specs
-from swarmwire.deploy.parity.emulation import Emulation
+from swarmwire.deploy.sim_to_real.emulation import Emulation
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RobotLog
 

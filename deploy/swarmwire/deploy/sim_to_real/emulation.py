@@ -1,4 +1,4 @@
-"""The emulated side of a parity: the runs of a folder, the scenario that they were made from, and its metrics."""
+"""The emulated side of a sim-to-real comparison: runs of a folder, their scenario and its metrics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +11,9 @@ from swarmwire.deploy.measuring import measuring
 from swarmwire.metrics.campaign.formats import ABOUT
 from swarmwire.metrics.campaign.selection import select
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.parity.emulated_runs import EmulatedRuns, runs_of_campaign, runs_of_folder
 from swarmwire.metrics.record.names import SCENARIO, STATIC
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns, runs_of_campaign, runs_of_folder
 from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World

@@ -1,4 +1,4 @@
-"""`swarmwire parity`."""
+"""`swarmwire sim-to-real`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 
-def parity_command(
+def sim_to_real_command(
     emulated: Annotated[
         str,
         typer.Argument(
@@ -29,18 +29,18 @@ def parity_command(
 
       swarmwire robots logs fleet.toml --fetch logs/monday
 
-      swarmwire parity campaigns/lab logs/monday --to parity.html
+      swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
     """
     # Imported here: polars, scipy and numba take a second, which --help should not.
     from rich.console import Console
 
-    from swarmwire.deploy.parity.emulation import read_emulation
-    from swarmwire.deploy.parity.settings import differing_settings
-    from swarmwire.deploy.terminal.parity_table import print_parity
-    from swarmwire.metrics.parity.parity import parity
-    from swarmwire.metrics.parity.parity_csv import write_parity
+    from swarmwire.deploy.sim_to_real.emulation import read_emulation
+    from swarmwire.deploy.sim_to_real.settings import differing_settings
+    from swarmwire.deploy.terminal.sim_to_real_table import print_sim_to_real
     from swarmwire.metrics.real_log.measured_log import measured_log
     from swarmwire.metrics.real_log.real_logs import read_real_logs
+    from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
+    from swarmwire.metrics.sim_to_real.sim_to_real_csv import write_sim_to_real
     from swarmwire.metrics.whole_file import check_path
 
     for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
@@ -49,15 +49,15 @@ def parity_command(
     logs, emulation = read_real_logs(log), read_emulation(emulated)
     shortest_s = min(run.duration_s for run in emulation.runs.runs)
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
-    found = parity(emulation.runs, measured, emulation.metrics)
+    found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
     told = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
-    print_parity(found, told, Console(highlight=False))
+    print_sim_to_real(found, told, Console(highlight=False))
     if to is not None:
-        from swarmwire.metrics.parity.parity_report import parity_report
         from swarmwire.metrics.report.write_report import write_report
+        from swarmwire.metrics.sim_to_real.sim_to_real_report import sim_to_real_report
 
-        write_report(parity_report(found, f"{emulation.runs.name} and {log.name}", told), to)
+        write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), to)
         typer.echo(f"written: {to}")
     if csv is not None:
-        write_parity(found, csv)
+        write_sim_to_real(found, csv)
         typer.echo(f"written: {csv}")

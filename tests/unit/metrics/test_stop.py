@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
-from swarmwire.metrics.judge import Condition, Judge
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.stop import Condition, StopConditions
 from tests.support.metrics.truths import static, truth
 
 NONE = math.nan
@@ -50,18 +50,18 @@ def judged(values, *conditions, kind=Script):
     """The judge after these values (ticks, arenas) at 10 Hz, and in which tick each arena was found over (None)."""
     of = static(1, arenas=len(values[0]))
     metrics = Metrics([kind(values=tuple(map(tuple, values)))])
-    judge = Judge(metrics, conditions)
+    stop_conditions = StopConditions(metrics, conditions)
     metrics.begin(of)
-    judge.begin(of)
+    stop_conditions.begin(of)
     found = [None] * of.arenas
     for tick in range(len(values)):
-        for observer in (metrics, judge):
+        for observer in (metrics, stop_conditions):
             observer.see(truth(of, tick))
-        over = judge.over()
+        over = stop_conditions.over()
         for arena in range(of.arenas):
             if over is not None and over[arena] and found[arena] is None:
                 found[arena] = tick
-    return judge.end(None)["stops"], found
+    return stop_conditions.end(None)["stops"], found
 
 
 def one(series, *conditions, **options):

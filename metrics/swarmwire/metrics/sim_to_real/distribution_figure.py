@@ -7,8 +7,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.parity.parity import MetricRow
 from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
+from swarmwire.metrics.sim_to_real.comparison import MetricRow
 
 _HEIGHT_IN = 2.1
 _BINS = 40
