@@ -9,7 +9,7 @@ import numpy as np
 from docs.pictures.radio.sheet import line_color, panels, say
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import RangedSensorSpec
+from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensors import Infrared, Light, Proximity, Rim, Ring, Scan
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Rim, Ring, Scan
 
 N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent, one for each robot
 

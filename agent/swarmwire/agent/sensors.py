@@ -19,7 +19,7 @@ from swarmwire.agent.readings import (
 from swarmwire.agent.step_context import Turn
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import SensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.clock import to_s
 
 

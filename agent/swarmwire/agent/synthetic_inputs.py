@@ -10,8 +10,9 @@ import numpy as np
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.bodies.sensors import Camera, CustomSensorSpec, GroundColour
+from swarmwire.comms.bodies.sensor_specs import Camera, GroundColour
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import NO_TX_STATUSES, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.tick_io import GroupReadings

@@ -5,7 +5,8 @@ from inspect import getdoc
 
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS, RangedSensorSpec, SensorSpec
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
+from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 
 
 def sensor_tables() -> str:

@@ -7,7 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import Battery, GroundColour, Light, Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Light, Proximity, Scan
+from swarmwire.comms.bodies.sensor_specs import Battery, GroundColour
 from tests.support.robots.rig import Fields
 
 _SHARE = st.floats(0.0, 1.0)

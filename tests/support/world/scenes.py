@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import SensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle

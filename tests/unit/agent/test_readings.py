@@ -11,8 +11,8 @@ from swarmwire.agent.host import hosted
 from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.custom import CustomActuatorSpec
-from swarmwire.comms.bodies.sensors import Battery, CustomSensorSpec, Imu
+from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
+from swarmwire.comms.bodies.sensor_specs import Battery, Imu
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from tests.support.agent.hosts import MEASURES, group, readings

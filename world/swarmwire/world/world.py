@@ -9,7 +9,8 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import CustomSensorSpec, SensorSpec
+from swarmwire.comms.bodies.custom import CustomSensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.ground import ground_of

@@ -13,23 +13,17 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.custom import (
     CustomActuatorSpec,
+    CustomSensorSpec,
     custom_actuator_spec,
     custom_sensor_spec,
     read_custom_actuator_spec,
     read_custom_sensor_spec,
 )
 from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.sensors import (
-    SENSOR_SPECS,
-    Compass,
-    CustomSensorSpec,
-    Infrared,
-    Light,
-    Odometry,
-    Proximity,
-    Scan,
-    SensorSpec,
-)
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.sensor_specs import Compass, Odometry
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import one_of, parameter
 from swarmwire.comms.errors import BadInput

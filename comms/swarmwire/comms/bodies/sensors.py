@@ -3,8 +3,7 @@
 A file per sense. A new one: its sheet in a file here, and its line in `SENSOR_SPECS`.
 """
 
-from swarmwire.comms.bodies.custom import CustomSensorSpec
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, ResponseCurve, Rim, Ring, Scan
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
 from swarmwire.comms.bodies.sensor_specs import (
     Battery,
     Bumper,
@@ -15,7 +14,7 @@ from swarmwire.comms.bodies.sensor_specs import (
     Odometry,
     Positioning,
 )
-from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 
 # By the name that a sheet and an agent's `needs` have for the sense.
 SENSOR_SPECS: dict[str, type[SensorSpec]] = {
@@ -32,25 +31,3 @@ SENSOR_SPECS: dict[str, type[SensorSpec]] = {
     "imu": Imu,
     "battery": Battery,
 }
-
-__all__ = [
-    "SENSOR_SPECS",
-    "Battery",
-    "Bumper",
-    "Camera",
-    "Compass",
-    "CustomSensorSpec",
-    "GroundColour",
-    "Imu",
-    "Infrared",
-    "Light",
-    "Odometry",
-    "Positioning",
-    "Proximity",
-    "RangedSensorSpec",
-    "ResponseCurve",
-    "Rim",
-    "Ring",
-    "Scan",
-    "SensorSpec",
-]

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.bodies.body import Body, body_names, load_body
+from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.sensors import CustomSensorSpec, RangedSensorSpec
+from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import limits_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass

@@ -3,22 +3,20 @@
 import math
 
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.bodies.sensors import (
+from swarmwire.comms.bodies.ranging_specs import Light, Rim, Scan
+from swarmwire.comms.bodies.sensor_specs import (
     Battery,
     Bumper,
     Camera,
     Compass,
-    CustomSensorSpec,
     GroundColour,
     Imu,
-    Light,
     Odometry,
     Positioning,
-    Rim,
-    Scan,
-    SensorSpec,
 )
+from swarmwire.comms.bodies.spec import SensorSpec
 
 
 def facts_of(body: Body) -> list[tuple[str, str]]:

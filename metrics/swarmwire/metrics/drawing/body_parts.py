@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.sensors import Bumper, GroundColour, Infrared, Light, Proximity, Rim, Scan
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Rim, Scan
+from swarmwire.comms.bodies.sensor_specs import Bumper, GroundColour
 from swarmwire.metrics.drawing.looks import INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, PAPER, SMALL_PT, Look
 
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Light, Proximity
+from swarmwire.comms.bodies.ranging_specs import Light, Proximity
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.viewer.colors import LIGHT, MARK, packed

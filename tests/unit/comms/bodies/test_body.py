@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body, merged
-from swarmwire.comms.bodies.sensors import Positioning, Proximity
+from swarmwire.comms.bodies.ranging_specs import Proximity
+from swarmwire.comms.bodies.sensor_specs import Positioning
 from swarmwire.comms.errors import BadInput
 
 WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
-from swarmwire.comms.bodies.custom import MAX_WIDE
-from swarmwire.comms.bodies.sensors import CustomSensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDE, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, Actuations
 from swarmwire.world.custom.loading import made_actuator, made_sensor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries

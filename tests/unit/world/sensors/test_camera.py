@@ -9,7 +9,7 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.sensors import Camera
+from swarmwire.comms.bodies.sensor_specs import Camera
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.truth import Obstacle
 from tests.support.world.scenes import read, scene

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS, RangedSensorSpec
+from swarmwire.comms.bodies.sensors import SENSOR_SPECS
+from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.sensors import SENSORS
 from swarmwire.world.world import World

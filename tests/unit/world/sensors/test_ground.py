@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.bodies.sensors import GroundColour
+from swarmwire.comms.bodies.sensor_specs import GroundColour
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch

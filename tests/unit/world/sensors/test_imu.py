@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Imu
+from swarmwire.comms.bodies.sensor_specs import Imu
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.world.sensors import Scene
 from tests.support.world.scenes import scene, staged

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Infrared, Proximity, ResponseCurve
+from swarmwire.comms.bodies.ranging_specs import Infrared, Proximity, ResponseCurve
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.samples import posed

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Positioning
+from swarmwire.comms.bodies.sensor_specs import Positioning
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.world import World

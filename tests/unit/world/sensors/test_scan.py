@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.bodies.ranging_specs import Scan
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
 from tests.support.world.scenes import read, scene

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Camera, Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.sensor_specs import Camera
 from swarmwire.comms.truth import Boundary
 from swarmwire.world.sensors import SENSORS
 from tests.support.world import brute_force

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Camera, Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.sensor_specs import Camera
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
 from swarmwire.world.sensors import SENSORS, Scene

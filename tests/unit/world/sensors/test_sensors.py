@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.sensors import Compass, Odometry, Proximity
+from swarmwire.comms.bodies.ranging_specs import Proximity
+from swarmwire.comms.bodies.sensor_specs import Compass, Odometry
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene

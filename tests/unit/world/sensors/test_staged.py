@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import SensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Field, Noise

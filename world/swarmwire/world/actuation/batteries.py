@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import HOLONOMIC, limits_of
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import MAX_WIDE, CustomActuatorSpec
-from swarmwire.comms.bodies.sensors import CustomSensorSpec, SensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDE, CustomActuatorSpec, CustomSensorSpec
+from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.plugins import custom_class, entry_points_of

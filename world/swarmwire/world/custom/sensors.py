@@ -11,8 +11,7 @@ from typing import Any, Literal, cast, get_args, get_type_hints
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.custom import MAX_WIDE
-from swarmwire.comms.bodies.sensors import CustomSensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDE, CustomSensorSpec
 from swarmwire.comms.errors import CustomCodeFailed
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
-from swarmwire.comms.bodies.custom import CustomActuatorSpec
-from swarmwire.comms.bodies.sensors import CustomSensorSpec
+from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensors import Camera
+from swarmwire.comms.bodies.sensor_specs import Camera
 from swarmwire.comms.geometry.obstacle_index import near_things
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import borrowing

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Imu
+from swarmwire.comms.bodies.sensor_specs import Imu
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal

@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Light
+from swarmwire.comms.bodies.ranging_specs import Light
 from swarmwire.comms.geometry.obstacle_index import ray_to_thing
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import sort

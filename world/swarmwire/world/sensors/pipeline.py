@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.bodies.sensors import RangedSensorSpec, SensorSpec
+from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
 from swarmwire.comms.truth import Group

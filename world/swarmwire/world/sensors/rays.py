@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import FORMS
-from swarmwire.comms.bodies.sensors import Infrared, Proximity, Rim
+from swarmwire.comms.bodies.ranging_specs import FORMS, Infrared, Proximity, Rim
 from swarmwire.comms.geometry.obstacle_index import Things, near_things, ray_to_thing, things_within
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of, sort

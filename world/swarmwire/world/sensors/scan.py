@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.bodies.ranging_specs import Scan
 from swarmwire.comms.geometry.obstacle_index import near_things
 from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import sort

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensors import Battery, Bumper, Compass, GroundColour, Odometry, Positioning
+from swarmwire.comms.bodies.sensor_specs import Battery, Bumper, Compass, GroundColour, Odometry, Positioning
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal

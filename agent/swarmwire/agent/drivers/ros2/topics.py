@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels
-from swarmwire.comms.bodies.sensors import GroundColour, Light, Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Light, Proximity, Scan
+from swarmwire.comms.bodies.sensor_specs import GroundColour
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import (
     COMMAND_BYTES,

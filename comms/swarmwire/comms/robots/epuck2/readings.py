@@ -10,8 +10,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import within_a_turn
-from swarmwire.comms.bodies.sensors import Battery, Scan
+from swarmwire.comms.bodies.ranging_specs import Scan, within_a_turn
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP
 
 PROXIMITY_FULL = 4095  # 12 bits

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensors import Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Proximity, Scan
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages

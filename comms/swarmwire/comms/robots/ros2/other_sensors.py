@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
 from swarmwire.comms.robots.ros2.messages import Messages
 

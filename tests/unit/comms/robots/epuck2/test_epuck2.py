@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.bodies.ranging_specs import Scan
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
 from swarmwire.comms.robots.epuck2.commands import (

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.sensors import Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import Proximity, Scan
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensors import Battery
+from swarmwire.comms.bodies.sensor_specs import Battery
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.sensors import Light, Proximity
+from swarmwire.comms.bodies.ranging_specs import Light, Proximity
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits

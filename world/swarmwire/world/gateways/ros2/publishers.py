@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.sensors import Scan
+from swarmwire.comms.bodies.ranging_specs import Scan
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
