@@ -6,7 +6,7 @@ from typing import Any
 from benchmarks.lines import print_line, spread
 from benchmarks.robot_steps import CASES
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.registry import METRICS
@@ -38,7 +38,7 @@ class Timed:
             metrics.see(truth)
             self.spent_ns[name].append(self._clock.now_ns() - start_ns)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing to tell."""
         return {}
 

@@ -8,7 +8,7 @@ import psutil
 
 from benchmarks import scenes
 from benchmarks.lines import report, spread
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.scenario.file import scenario_from
@@ -55,7 +55,7 @@ class Consumption:
         self.runner_us = (theirs_s - self._begun_s[1]) / ticks / len(runners) * 1e6
         self._begun_s = its_s, theirs_s
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from swarmwire.agent.on_robot.assembly import run_robot
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.loop import RobotLoop
-from swarmwire.agent.on_robot.plan import plan_of
-from swarmwire.agent.on_robot.safety import End
+from swarmwire.agent.on_robot.plan import robot_config
+from swarmwire.agent.on_robot.safety import StopFlag
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 
@@ -56,8 +56,8 @@ def main() -> None:
     file, seconds, *given = sys.argv[1:]
     steps, clock = MeasuredSteps(), WallClock()
     flags = {key: (key, json.loads(value)) for key, _, value in (text.partition("=") for text in given)}
-    plan = plan_of(read_settings(Path(file), flags), file, clock)
-    run_robot(plan, clock, End(), "measured", float(seconds))
+    plan = robot_config(read_settings(Path(file), flags), file, clock)
+    run_robot(plan, clock, StopFlag(), "measured", float(seconds))
     print(json.dumps(steps.told() | {"rss_mb": most_memory_mb()}), flush=True)
 
 

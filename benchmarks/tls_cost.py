@@ -29,8 +29,8 @@ from swarmwire.deploy.certificates.folder_access import network_in
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.backends import allocation
-from swarmwire.world.backends.join_policy import Door, Terms
-from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
+from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
+from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
 
@@ -113,9 +113,9 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
         backends: dict[str, LockstepBackend] = {}
         for kind in KINDS:
             at: list[str] = []
-            around = Surroundings(opened=at.extend)
+            around = BackendHooks(opened=at.extend)
             backend = LockstepBackend(
-                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, terms=Terms(open=True)
+                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, terms=JoinPolicy(open=True)
             )
             stack.callback(backend.close)
             backend.open()
@@ -148,9 +148,9 @@ def _certificates(folder: Path, names: tuple[str, ...]) -> Path:
     return folder
 
 
-def _door(kind: str, folder: Path, certs: Path, names: tuple[str, ...]) -> Door:
+def _door(kind: str, folder: Path, certs: Path, names: tuple[str, ...]) -> ListenSettings:
     if kind == "unix":
-        return Door((unix_endpoint(f"{folder}/world"),))
+        return ListenSettings((unix_endpoint(f"{folder}/world"),))
     if kind == "tcp":
-        return Door(("tcp/127.0.0.1:0",))
-    return Door(("tls/127.0.0.1:0",), network_in(certs, "world"), agents_access(Keys(kind), RunAccess(names)))
+        return ListenSettings(("tcp/127.0.0.1:0",))
+    return ListenSettings(("tls/127.0.0.1:0",), network_in(certs, "world"), agents_access(Keys(kind), RunAccess(names)))

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
@@ -39,7 +39,7 @@ class Timed:
         self.own_ns.append(measured_ns - start_ns)
         self.spent_ns.append(self._clock.now_ns() - measured_ns)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Close the recording."""
         start_ns = self._clock.now_ns()
         told = self._recording.end(last)

@@ -25,7 +25,7 @@ from benchmarks import scenes
 from benchmarks.echoes import RUN
 from benchmarks.lines import report
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire import frames, tick_frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
@@ -82,7 +82,7 @@ class Stopwatch:
             self.floor_s += [self._floor.tick_s() for _ in range(3)]
         self._since_s = CLOCK.now_ns() * 1e-9
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
 

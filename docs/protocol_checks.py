@@ -15,9 +15,9 @@ from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Values
+from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Values
 from swarmwire.comms.wire import frames, join, tick_frames
-from swarmwire.comms.wire.join import LIMITS, JoinRequest, Offer, OfferedGroup
+from swarmwire.comms.wire.join import LIMITS, GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.world.backends import inbox, join_policy, lockstep, realtime, registry, zenoh_backend
@@ -67,8 +67,8 @@ def _joining(page: _Page) -> Iterator[Comparison]:
     group = GroupAssignment("g", "a", {}, load_body("epuck"), ROWS, ("g-0", "g-1"), np.zeros(2, np.uint64))
     assigned = Assignment((group,), 1, ()).as_mapping()
     for name, keys_of_it in {
-        "offer": _names(Offer) | {"v"},
-        "offered group": _names(OfferedGroup),
+        "offer": _names(SessionInfo) | {"v"},
+        "offered group": _names(GroupInfo),
         "join request": _names(JoinRequest) | {"v"},
         "assignment": {*assigned, "v", "memory"},
         "assigned group": set(assigned["groups"][0]),
@@ -85,7 +85,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, Notes(ROWS, np.array([0, 0]), ("x",))),
         leds=LedChanges(ROWS, ROWS, ROWS),
-        own=Actuations(ROWS, ROWS, zeros),
+        own=ActuatorCommands(ROWS, ROWS, zeros),
         values=Values(ROWS, zeros),
     )
     tick = encode_tick(0, sensors, received, TxStatuses(one, one, one))

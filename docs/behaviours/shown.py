@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from docs.experiments.places import Places
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' readings", "scanner's readings"
@@ -60,7 +60,7 @@ SHOWN = {
 def find_shown(name: str, places: Places) -> Shown:
     """What is shown of a behaviour; BadInput names those that there are, or says that it has no campaign."""
     if name not in SHOWN:
-        raise BadInput("NAME", name, f"unknown behaviour; expected {one_of(SHOWN, name)}")
+        raise BadInput("NAME", name, f"unknown behaviour; expected {did_you_mean(SHOWN, name)}")
     campaign = places.campaigns / f"{name}.toml"
     if not campaign.exists():
         raise BadInput(str(campaign), "", "is missing: expected the campaign of a behaviour")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.whole_file import chosen_file
@@ -54,7 +54,9 @@ def digest_of(experiment: Experiment, folder: Path) -> "pl.DataFrame":
     there = campaign.runs.columns
     for name in experiment.columns:
         if name not in there:
-            raise BadInput(str(folder), name, f"expected a column that the campaign has: {one_of(tuple(there), name)}")
+            raise BadInput(
+                str(folder), name, f"expected a column that the campaign has: {did_you_mean(tuple(there), name)}"
+            )
     ends = [name for name in ENDS if name in there]
     chosen = dict.fromkeys((*BEGIN, *campaign.parameters, *ends, *experiment.columns, *LAST))
     return campaign.runs.select(*chosen)
@@ -84,6 +86,6 @@ def _folders(experiment: Experiment, places: Places, given: Sequence[Path]) -> d
     for folder in given:
         if folder.name not in known:
             raise BadInput(
-                "FOLDER", str(folder), f"expected a folder named as its campaign: {one_of(known, folder.name)}"
+                "FOLDER", str(folder), f"expected a folder named as its campaign: {did_you_mean(known, folder.name)}"
             )
     return {folder.name: folder for folder in given}

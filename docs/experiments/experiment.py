@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.experiments.places import Places
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def find_experiment(name: str, places: Places) -> Experiment:
     known = names(places)
     name = name.replace("_", "-")
     if name not in known:
-        raise BadInput("NAME", name, f"unknown experiment; expected {one_of(known, name)}")
+        raise BadInput("NAME", name, f"unknown experiment; expected {did_you_mean(known, name)}")
     file = places.figures / f"{name.replace('-', '_')}.py"
     module = _module(file)
     for wanted in NEEDED:

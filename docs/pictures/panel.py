@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
@@ -44,7 +44,7 @@ class Picture:
             self._console.print(panel_view(self._figures, simulation.controls, simulation.health(), WIDTH, keys=True))
             simulation.controls.quit()
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing is left to draw."""
         return {}
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import zenoh
 
-from swarmwire.agent.runner import Inbox, answers, given_robots
+from swarmwire.agent.runner import TickInbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
@@ -26,14 +26,14 @@ class EncodedBackend:
         """`backwards` gives the first runner the last robots."""
         parts = split(assignment, runners)
         self._lockstep = Lockstep(parts[::-1] if backwards else parts)
-        self._runners: dict[str, tuple[Inbox, Iterator[bytes]]] = {}
+        self._runners: dict[str, tuple[TickInbox, Iterator[bytes]]] = {}
         self._order = np.random.default_rng(1)
         self._parts = len(parts)
 
     def start(self) -> None:
         """Let each runner join, decode its robots and make its agents."""
         for number in range(self._parts):
-            name, inbox = f"r{number}", Inbox()
+            name, inbox = f"r{number}", TickInbox()
             assignment, memory = given_robots(self._lockstep.join(name, JoinRequest().encode()))
             self._runners[name] = inbox, answers(assignment, memory, inbox)
             self._lockstep.answer(name, next(self._runners[name][1]))

@@ -15,9 +15,9 @@ from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.agent.runner import given_robots
 from swarmwire.comms.config import check_format
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.run_views import Scene
+from swarmwire.comms.run_views import ObservedRun
 from swarmwire.comms.wire import control_frames, frames, observer_frames
-from swarmwire.comms.wire.join import JoinRequest, Offer
+from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.radio_bridge import BridgeInfo
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaign.campaign import read_campaign
@@ -111,11 +111,11 @@ def frame(kind: str, number: Any) -> frames.Frame:
 WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
     "frame": (BadFrame, lambda v: frames.decode(packed(v=v, kind="", tick=0, arrays={}, values={}))),
     "request to join": (BadFrame, lambda v: JoinRequest.decode(packed(v=v))),
-    "offer": (BadFrame, lambda v: Offer.decode(packed(v=v))),
+    "offer": (BadFrame, lambda v: SessionInfo.decode(packed(v=v))),
     "assignment": (BadFrame, lambda v: given_robots(packed(v=v))),
     "terms of a medium": (BadFrame, lambda v: BridgeInfo.decode(packed(v=v))),
     "scene": (BadFrame, lambda v: observer_frames.decode_scene(frame("scene", v))),
-    "truth": (BadFrame, lambda v: observer_frames.decode_truth(frame("truth", v), Scene.__new__(Scene))),
+    "truth": (BadFrame, lambda v: observer_frames.decode_truth(frame("truth", v), ObservedRun.__new__(ObservedRun))),
     "control": (BadInput, lambda v: control_frames.decode_request(packed(v=v, do="pause"))),
     "answer to control": (BadFrame, lambda v: control_frames.decode_reply(packed(v=v))),
 }

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from swarmwire.agent.joining import ABOUT as JOIN
 from swarmwire.agent.joining import add_join, join_parsed
-from swarmwire.agent.on_robot.safety import SIGNALS, End, by_signals
+from swarmwire.agent.on_robot.safety import SIGNALS, StopFlag, by_signals
 from swarmwire.agent.on_robot.settings import (
     AGENT,
     BAD_INPUT,
@@ -136,13 +136,13 @@ def _run(parsed: argparse.Namespace) -> int:
         become_guard(settings, parsed.given, ["stop-motors", *parsed.given[1:]])
     from swarmwire.agent.on_robot.assembly import run_robot
     from swarmwire.agent.on_robot.guard import CLOSED
-    from swarmwire.agent.on_robot.plan import plan_of
+    from swarmwire.agent.on_robot.plan import robot_config
 
-    end, wall, pipe = End(), WallClock(), parsed.heartbeats
+    end, wall, pipe = StopFlag(), WallClock(), parsed.heartbeats
     clock = _clock(settings, wall)
     try:
         with by_signals(end, patient=pipe is not None):
-            plan = plan_of(settings, _where(parsed), clock)
+            plan = robot_config(settings, _where(parsed), clock)
             return run_robot(plan, clock, end, wall.utc_stamp(), parsed.duration_s, pipe)
     finally:  # all is closed, whatever was raised
         if pipe is not None:
@@ -151,10 +151,10 @@ def _run(parsed: argparse.Namespace) -> int:
 
 
 def _check(parsed: argparse.Namespace) -> int:
-    from swarmwire.agent.on_robot.plan import plan_of
+    from swarmwire.agent.on_robot.plan import robot_config
 
     settings = _settings(parsed)
-    sys.stdout.write(f"{settings.name}: {plan_of(settings, _where(parsed), _clock(settings, WallClock()))}\n")
+    sys.stdout.write(f"{settings.name}: {robot_config(settings, _where(parsed), _clock(settings, WallClock()))}\n")
     return ENDED
 
 
@@ -188,9 +188,9 @@ def _wanted() -> bool:
 
 
 def _drivers(_: argparse.Namespace) -> int:
-    from swarmwire.agent.drivers.driver import told_drivers
+    from swarmwire.agent.drivers.driver import list_drivers
 
-    sys.stdout.write("\n".join(told_drivers()) + "\n")
+    sys.stdout.write("\n".join(list_drivers()) + "\n")
     return ENDED
 
 

@@ -11,7 +11,7 @@ from swarmwire.agent.agent import Agent, AgentClass, load_agent
 from swarmwire.agent.parameters import make, parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.step_context import Turn
+from swarmwire.agent.step_context import StepContext
 from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
@@ -22,7 +22,7 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
 
-class Told(NamedTuple):
+class Inbox(NamedTuple):
     """Packets received and tx statuses, in the orders that these promise; true if there is any."""
 
     received: ReceivedPackets
@@ -31,24 +31,24 @@ class Told(NamedTuple):
     def __bool__(self) -> bool:
         return bool(len(self.received) or len(self.tx_status))
 
-    def followed_by(self, other: "Told") -> "Told":
+    def followed_by(self, other: "Inbox") -> "Inbox":
         """Both together."""
-        return Told(
+        return Inbox(
             ReceivedPackets.joined([self.received, other.received]),
             TxStatuses.joined([self.tx_status, other.tx_status]),
         )
 
-    def of(self, rows: IntArray) -> "Told":
+    def of(self, rows: IntArray) -> "Inbox":
         """What is for these robot rows, (n,), rising."""
         return self.parted(rows)[0]
 
-    def parted(self, rows: IntArray) -> "tuple[Told, Told]":
+    def parted(self, rows: IntArray) -> "tuple[Inbox, Inbox]":
         """What is for these robot rows, (n,), and what is for others."""
         received, told = np.isin(self.received.receiver, rows), np.isin(self.tx_status.row, rows)
         if received.all() and told.all():
-            return self, Told(self.received.select(NONE), self.tx_status.select(NONE))
+            return self, Inbox(self.received.select(NONE), self.tx_status.select(NONE))
         ours, theirs = (
-            Told(self.received.select(np.flatnonzero(h)).compacted(), self.tx_status.select(np.flatnonzero(o)))
+            Inbox(self.received.select(np.flatnonzero(h)).compacted(), self.tx_status.select(np.flatnonzero(o)))
             for h, o in ((received, told), (~received, ~told))
         )
         return ours, theirs
@@ -67,21 +67,21 @@ DRAWS_APART = 1 << 20  # calls for a purpose that a step, or a hearing, does not
 SENT, FIRST_OWN, ACTED = "host.sent", "host.first_own", "host.acted"
 
 
-class Host:
+class AgentExecutor:
     """The agents of all robots of an assignment."""
 
     def __init__(self, assignment: Assignment, memory: Memory | None = None) -> None:
         """`memory` is what earlier agents of some of these robots remembered; others start afresh."""
         self._rate_hz = assignment.rate_hz
-        self._groups = {group.name: hosted(group, load_agent(group.agent)) for group in assignment.groups}
-        self._waiting: Told | None = None  # that came between ticks; None: nothing
+        self._groups = {group.name: agent_group(group, load_agent(group.agent)) for group in assignment.groups}
+        self._waiting: Inbox | None = None  # that came between ticks; None: nothing
         for name, kept in (memory or {}).items():
             self._groups[name].recall(kept)
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
         rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
-        came = Told(received, tx_status).of(np.sort(rows))
+        came = Inbox(received, tx_status).of(np.sort(rows))
         if came:
             self._waiting = self._waiting.followed_by(came) if self._waiting else came
 
@@ -103,7 +103,7 @@ class Host:
             acting_rows = [self._groups[name].group.rows for name in readings]
             # Also what waits for the dead of these groups: it is lost with them.
             its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
-            received, tx_status = Told(received, tx_status).followed_by(its) if its else (received, tx_status)
+            received, tx_status = Inbox(received, tx_status).followed_by(its) if its else (received, tx_status)
         acting = ((self._groups[name], group) for name, group in readings.items())
         return Actions.joined(
             [agents.act(self._time(tick, agents.group), group, received, tx_status) for agents, group in acting]
@@ -118,7 +118,7 @@ class Host:
         return tick, time_ns, tick_start_ns(tick + group.act_every_ticks, self._rate_hz) - time_ns
 
 
-class Hosted(ABC):
+class AgentGroup(ABC):
     """The agents of one group: what both kinds share."""
 
     def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, receives: bool) -> None:
@@ -147,7 +147,7 @@ class Hosted(ABC):
             self._first_own[np.arange(len(self.group.rows))[place][fresh]] = sent_before[fresh]
             self.keep(readings.rows)
             self.rows = readings.rows
-        turn = Turn(
+        turn = StepContext(
             self.group,
             self.needs,
             time,
@@ -164,7 +164,7 @@ class Hosted(ABC):
             self._readings, self._hearings = readings, 0
         return turn.end()
 
-    def on_receive(self, time: tuple[int, int, int], told: Told) -> SentPackets:
+    def on_receive(self, time: tuple[int, int, int], told: Inbox) -> SentPackets:
         """What robots send that read, between steps, what they were `told`; `time` is as for `act`, but now."""
         readings = self._readings
         if readings is None:
@@ -172,7 +172,7 @@ class Hosted(ABC):
         place = np.searchsorted(self.group.rows, self.rows)
         sent_before = self._sent_before[place]
         self._hearings += 1
-        turn = Turn(
+        turn = StepContext(
             self.group,
             self.needs,
             time,
@@ -235,11 +235,11 @@ class Hosted(ABC):
         return TxStatuses(at, mine.id, mine.result).select(np.flatnonzero(own))
 
     @abstractmethod
-    def step(self, turn: Turn) -> None:
+    def step(self, turn: StepContext) -> None:
         """Let the agents act."""
 
     @abstractmethod
-    def listen(self, turn: Turn) -> None:
+    def listen(self, turn: StepContext) -> None:
         """Let the agents read between steps."""
 
     @abstractmethod
@@ -247,7 +247,7 @@ class Hosted(ABC):
         """Keep the memory of robots that act again, drop that of others, give new ones a fresh one."""
 
 
-class _Vector(Hosted):
+class _Vector(AgentGroup):
     """One VectorAgent for all robots of the group, and the State that it works on."""
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
@@ -258,13 +258,13 @@ class _Vector(Hosted):
         freeze(self._agent, self._per_robot)
         self._state: State = state_of(kind).fresh(len(group.rows))
 
-    def step(self, turn: Turn) -> None:
+    def step(self, turn: StepContext) -> None:
         self._call(self._agent.step, turn)
 
-    def listen(self, turn: Turn) -> None:
+    def listen(self, turn: StepContext) -> None:
         self._call(self._agent.on_receive, turn)
 
-    def _call(self, method: Callable[[Robots, State], None], turn: Turn) -> None:
+    def _call(self, method: Callable[[Robots, State], None], turn: StepContext) -> None:
         if self._per_robot:
             place = np.searchsorted(self.group.rows, turn.readings.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
@@ -288,7 +288,7 @@ class _Vector(Hosted):
         return True
 
 
-class _Single(Hosted):
+class _Single(AgentGroup):
     """An Agent for each robot of the group."""
 
     def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
@@ -296,17 +296,17 @@ class _Single(Hosted):
         self._kind = kind
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
-    def step(self, turn: Turn) -> None:
+    def step(self, turn: StepContext) -> None:
         for at, row in enumerate(cast("list[int]", turn.readings.rows.tolist())):
             self._call(self._agents[row].step, turn, at, row)
 
-    def listen(self, turn: Turn) -> None:
+    def listen(self, turn: StepContext) -> None:
         told = np.union1d(turn.received.receiver, turn.tx_status_rows)
         for at in cast("list[int]", told.tolist()):
             row = int(turn.readings.rows[at])
             self._call(self._agents[row].on_receive, turn, at, row)
 
-    def _call(self, method: Callable[[Robot], None], turn: Turn, at: int, row: int) -> None:
+    def _call(self, method: Callable[[Robot], None], turn: StepContext, at: int, row: int) -> None:
         try:
             method(Robot(turn, at))
         except (Exception, SystemExit) as error:
@@ -339,7 +339,7 @@ def of_state(name: str) -> str:
     return f"state.{name}"
 
 
-def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
+def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
     """The agents of a group, of this class; AgentFailed if one cannot be made."""
     try:
         return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
@@ -347,7 +347,7 @@ def hosted(group: GroupAssignment, kind: AgentClass) -> Hosted:
         raise _failed(list(group.robot_names), error) from error
 
 
-def _failed(robots: list[str], error: BaseException, turn: Turn | None = None) -> AgentFailed:
+def _failed(robots: list[str], error: BaseException, turn: StepContext | None = None) -> AgentFailed:
     """The failure of an agent, told from its own first line on, and when it was."""
     own = error.__traceback__
     while own is not None and own.tb_frame.f_globals["__name__"] in (__name__, make.__module__):

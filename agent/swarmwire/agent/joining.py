@@ -23,18 +23,18 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED
-from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, Inbox, play
+from swarmwire.agent.runner import NO_ROBOTS, Asked, Ended, TickInbox, play
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.frames import VERSION
-from swarmwire.comms.wire.join import JoinRequest, Offer
+from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, fault_of_name, run_of
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 
 if TYPE_CHECKING:
-    from swarmwire.agent.runner import Inbox
+    from swarmwire.agent.runner import TickInbox
 
 # zenoh's stubs leave out the types of what a session answers.
 
@@ -95,7 +95,7 @@ class Joining:
         return f"{host or 'runner'}-{os.getpid()}-{token_hex(2)}"
 
 
-def join(joining: Joining, inbox: Inbox, say: Callable[[str], None]) -> Ended:
+def join(joining: Joining, inbox: TickInbox, say: Callable[[str], None]) -> Ended:
     """Play robots of a run to its end, or until `inbox.leave()`; `say` is told what people should know.
 
     BadInput for what cannot be asked for, RunnerLost if the world is not there, or says no.
@@ -156,20 +156,20 @@ def _runs_to_come(session: zenoh.Session) -> set[str]:
     return found
 
 
-def _offer(session: zenoh.Session, keys: Keys, runner: str) -> Offer:
+def _offer(session: zenoh.Session, keys: Keys, runner: str) -> SessionInfo:
     for reply in session.get(keys.offer(runner), payload=msgpack.packb({"v": VERSION}), timeout=OFFER_S):
         if reply.err is not None:
             raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string())
         if reply.ok is not None:
             try:
-                return Offer.decode(reply.ok.payload.to_bytes())
+                return SessionInfo.decode(reply.ok.payload.to_bytes())
             except BadFrame as fault:
                 raise RunnerLost(runner, NO_ROBOTS, f"another version of swarmwire: {fault}") from fault
     raise RunnerLost(runner, NO_ROBOTS, f"the world told nothing of its run: it may not let {runner} in")
 
 
 def _own_agents(
-    offer: Offer, joining: Joining, say: Callable[[str], None]
+    offer: SessionInfo, joining: Joining, say: Callable[[str], None]
 ) -> tuple[Mapping[str, str], Mapping[str, str]]:
     """By group, the spec and the sha256 of this machine's own agent; what is not here is told, and left out."""
     given = _given(joining.agents, [group.name for group in offer.groups])
@@ -261,11 +261,11 @@ def names_in(text: str) -> tuple[str, ...]:
 
 def play_told(joining: "Joining") -> int:
     """Play, tell on standard error what people should know, and how it ended; the exit code. Errors as `join`."""
-    from swarmwire.agent.runner import Inbox
+    from swarmwire.agent.runner import TickInbox
 
     if replace(joining.network, connect=(joining.endpoint,)).warning is not None:
         _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
-    inbox = Inbox()
+    inbox = TickInbox()
     with _leaving_by_signals(inbox):
         ended = join(joining, inbox, _say)
     _say(_TOLD[ended.how] + (f": {ended.why}" if ended.why else ""))
@@ -286,7 +286,7 @@ def _say(text: str) -> None:
 
 
 @contextmanager
-def _leaving_by_signals(inbox: "Inbox") -> Generator[None]:
+def _leaving_by_signals(inbox: "TickInbox") -> Generator[None]:
     """While it holds, the first Ctrl-C, or a signal to end, leaves the run; a second Ctrl-C ends at once."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {number: now for number in numbers if (now := signal.getsignal(number)) != signal.SIG_IGN}

@@ -1,6 +1,6 @@
 """The local backend: all agents of a run in this process."""
 
-from swarmwire.agent.host import Host
+from swarmwire.agent.host import AgentExecutor
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
@@ -15,11 +15,11 @@ class LocalBackend:
 
     def __init__(self, assignment: Assignment) -> None:
         self._assignment = assignment
-        self._host: Host | None = None
+        self._host: AgentExecutor | None = None
 
     def start(self) -> None:
         """Make the agents."""
-        self._host = Host(self._assignment)
+        self._host = AgentExecutor(self._assignment)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
@@ -43,7 +43,7 @@ class LocalBackend:
         """Forget the agents."""
         self._host = None
 
-    def _started(self) -> Host:
+    def _started(self) -> AgentExecutor:
         if self._host is None:
             raise RuntimeError("the backend has not been started")
         return self._host

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeVar, cast, get_args, get_origin, get_type_
 import numpy as np
 
 from swarmwire.agent.vector_agent import PerRobot, PerRobotDefault, VectorAgent
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
@@ -57,7 +57,7 @@ def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, An
     declared = parameters_of(kind)
     for name in params:
         if name not in declared:
-            raise BadParameter(name, f"unknown parameter of {kind.__name__}; expected {one_of(declared, name)}")
+            raise BadParameter(name, f"unknown parameter of {kind.__name__}; expected {did_you_mean(declared, name)}")
     for name, parameter in declared.items():
         if name not in params and parameter.default is REQUIRED:
             raise BadParameter(name, f"is missing: expected {TYPES[parameter.type]}")

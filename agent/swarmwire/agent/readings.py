@@ -8,7 +8,14 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Rim, Ring, Scan
+from swarmwire.comms.bodies.ranging_specs import (
+    InfraredSpec,
+    LightSpec,
+    ProximitySpec,
+    RadialSpec,
+    RayArraySpec,
+    ScanSpec,
+)
 
 N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent, one for each robot
 
@@ -16,8 +23,8 @@ N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a V
 # --- Readings of sensors around a body.
 
 
-S = TypeVar("S", bound=Ring)
-R = TypeVar("R", bound=Rim)
+S = TypeVar("S", bound=RadialSpec)
+R = TypeVar("R", bound=RayArraySpec)
 
 
 @dataclass(frozen=True)
@@ -47,15 +54,15 @@ class _AtRim(Around[N, R]):
         return self.spec.response.distance_m(self.value)
 
 
-class ProximityReading(_AtRim[N, Proximity]):
+class ProximityReading(_AtRim[N, ProximitySpec]):
     """The rays of proximity, (…, rays): value is 0 for nothing, 1 for touching."""
 
 
-class InfraredReading(_AtRim[N, Infrared]):
+class InfraredReading(_AtRim[N, InfraredSpec]):
     """The rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
 
 
-class LightReading(Around[N, Light]):
+class LightReading(Around[N, LightSpec]):
     """Photocells, (…, cells): value is 0 for dark."""
 
 
@@ -208,7 +215,7 @@ class ScanReading:
     """The rays of the scanner."""
 
     range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
-    spec: Scan
+    spec: ScanSpec
 
     @property
     def angle_rad(self) -> FloatArray:

@@ -9,7 +9,7 @@ from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.readings import BumperReading, CameraReading, CustomReading
 from swarmwire.agent.robots import Draw, forward_and_turn
 from swarmwire.agent.sensors import Sensors
-from swarmwire.agent.step_context import Turn
+from swarmwire.agent.step_context import StepContext
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
@@ -23,7 +23,7 @@ class Robot(Sensors[float]):
 
     __slots__ = ("_draw", "_row", "radio")
 
-    def __init__(self, turn: Turn, row: int) -> None:
+    def __init__(self, turn: StepContext, row: int) -> None:
         super().__init__(turn)
         self._row = row
         self._draw: Draw | None = None
@@ -98,7 +98,7 @@ class Robot(Sensors[float]):
 class RadioPort:
     """The robot's radio: an unreliable medium."""
 
-    def __init__(self, turn: Turn, row: int) -> None:
+    def __init__(self, turn: StepContext, row: int) -> None:
         self._turn, self._row = turn, row
 
     @overload

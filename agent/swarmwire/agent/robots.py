@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.readings import BumperReadings, CameraReadings, CustomReading
 from swarmwire.agent.sensors import Sensors
-from swarmwire.agent.step_context import Turn
+from swarmwire.agent.step_context import StepContext
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.drives import rgb_of
@@ -67,7 +67,7 @@ class Robots(Sensors[FloatArray]):
 
     __slots__ = ("draw", "radio")
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: StepContext) -> None:
         super().__init__(turn)
         self.radio = RadioRows(turn)
         self.draw = Draws(turn.keys, turn.tick, turn.first_draw)
@@ -159,7 +159,7 @@ class Robots(Sensors[FloatArray]):
 class RadioRows:
     """The radios of n robots: an unreliable medium."""
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: StepContext) -> None:
         self._turn = turn
 
     def received(self, kind: type[M]) -> Packets[M]:

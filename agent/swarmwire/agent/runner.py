@@ -7,7 +7,6 @@ they wait for the tick. All that arrives lands in one queue, put there by the ne
 per subscription, so a runner stays small. Where the world keeps memory, each answer carries what the agents remember.
 """
 
-# zenoh's stubs leave out the return types of put, reply and close.
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import math
@@ -23,7 +22,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, load_agent
-from swarmwire.agent.host import Host, layout_of
+from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, BadFrame, RunnerLost
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
@@ -34,6 +33,9 @@ from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
+
+# zenoh's stubs leave out the return types of put, reply and close.
+
 
 JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
 POLL_S = 5.0  # for the world, each time
@@ -69,14 +71,14 @@ def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], 
         reason = str(error).split(" at ")[0]
         raise RunnerLost(runner, NO_ROBOTS, f"no connection to its world within {JOIN_S:g} s: {reason}") from error
     with closed_after(session):
-        return play(session, Keys(run_id), runner, Inbox(), lambda: PLAIN, joined)
+        return play(session, Keys(run_id), runner, TickInbox(), lambda: PLAIN, joined)
 
 
 def play(
     session: zenoh.Session,
     keys: Keys,
     runner: str,
-    inbox: "Inbox",
+    inbox: "TickInbox",
     asked: Callable[[], Asked],
     joined: Callable[[Assignment], None] = lambda _: None,
 ) -> Ended:
@@ -106,7 +108,7 @@ def play(
     return inbox.ended
 
 
-class Inbox:
+class TickInbox:
     """What arrives from the world, put in by the network thread: frames, and whether the world is there.
 
     Attributes:
@@ -210,7 +212,7 @@ class Inbox:
                     return
 
 
-def _watched_world(session: zenoh.Session, keys: Keys, inbox: Inbox) -> "zenoh.Subscriber[None] | None":
+def _watched_world(session: zenoh.Session, keys: Keys, inbox: TickInbox) -> "zenoh.Subscriber[None] | None":
     """What tells of the world's token, which is there; None: it did not appear in time.
 
     Where very many come at once, zenoh now and then tells one of them nothing of a token that is there: it asks again.
@@ -269,10 +271,10 @@ def _memory(assignment: Assignment, data: bytes) -> Memory:
     return memory
 
 
-def answers(assignment: Assignment, memory: Memory | None, inbox: Inbox) -> Iterator[bytes]:
+def answers(assignment: Assignment, memory: Memory | None, inbox: TickInbox) -> Iterator[bytes]:
     """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
     try:
-        host = Host(assignment, memory)
+        host = AgentExecutor(assignment, memory)
         yield frames.encode("ready", -1, {})
         for told in inbox.ticks(assignment, host.receive):
             if len(told) == 2:

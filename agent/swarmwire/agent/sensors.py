@@ -16,19 +16,19 @@ from swarmwire.agent.readings import (
     ProximityReading,
     ScanReading,
 )
-from swarmwire.agent.step_context import Turn
+from swarmwire.agent.step_context import StepContext
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.clock import to_s
 
 
-class Handle:
+class RobotHandle:
     """A view of one tick of one group."""
 
     __slots__ = ("_turn",)
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: StepContext) -> None:
         self._turn = turn
 
     @property
@@ -53,7 +53,7 @@ class Handle:
 S = TypeVar("S", bound=SensorSpec)
 
 
-class Sensors(Handle, Generic[N]):
+class Sensors(RobotHandle, Generic[N]):
     """The senses of one robot, or of n with a leading axis n, here written …; but for those that differ in form."""
 
     __slots__ = ()  # what is set on a handle by mistake is refused

@@ -8,15 +8,15 @@ from numpy.typing import ArrayLike
 from swarmwire.agent.packet import NotDeclared, Packets, ReceivedLists
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
-from swarmwire.comms.bodies.body import NotFitted
+from swarmwire.comms.bodies.body import IncompatibleBody
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.packets import BROADCAST, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import (
-    NO_ACTUATIONS,
+    NO_ACTUATOR_COMMANDS,
     NO_LED_CHANGES,
     NO_VALUES,
     Actions,
-    Actuations,
+    ActuatorCommands,
     GroupReadings,
     LedChanges,
     Notes,
@@ -29,7 +29,7 @@ OUTCOMES = "radio.tx_status"  # what `needs` calls the tx statuses of addressed 
 NOT_SWITCHED = -1
 
 
-class Turn:
+class StepContext:
     """The robots `sensors.rows` of a group in one tick.
 
     `received.receiver` and `tx_status.row` count these rows from 0.
@@ -124,7 +124,7 @@ class Turn:
         ids = self._sent_before[place].copy()
         self._sent_before[place] += 1
         # Whoever does not ask is not told, and nothing of it crosses the wire.
-        tx_status_id = np.where(receiver == BROADCAST, UNTOLD, ids) if self._asks else None
+        tx_status_id = np.where(receiver == BROADCAST, NOT_MEASURED, ids) if self._asks else None
         self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
         return ids
 
@@ -138,7 +138,7 @@ class Turn:
             receiver = int(to)
         id_ = self._sent_before.item(place)
         self._sent_before[place] = id_ + 1
-        tx_status_id = np.array((UNTOLD if to is None else id_,)) if self._asks else None
+        tx_status_id = np.array((NOT_MEASURED if to is None else id_,)) if self._asks else None
         sender = self.readings.rows[place : place + 1]
         self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
         return id_
@@ -181,7 +181,7 @@ class Turn:
         """The colours to switch an LED of each body to, or all, (n, leds), to write into; NotFitted if it has none."""
         body = self.group.body
         if not body.led_count:
-            raise NotFitted(f"the body {body.name} has no LEDs")
+            raise IncompatibleBody(f"the body {body.name} has no LEDs")
         if which is not None and not 0 <= which < body.led_count:
             raise ValueError(f"led(which=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {which}")
         if self._leds is None:
@@ -197,7 +197,7 @@ class Turn:
         body = self.group.body
         if name not in body.actuators:
             has = ", ".join(body.actuators) or "none"
-            raise NotFitted(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
+            raise IncompatibleBody(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
         given, width = np.asarray(values, np.float64), body.actuators[name].width
         if self._own is None:
             self._own = np.full((self.n, sum(spec.width for spec in body.actuators.values())), np.nan)
@@ -241,7 +241,7 @@ class Turn:
             sent,
             Notes.none() if self._state is None else self._notes(self._state),
             NO_LED_CHANGES if self._leds is None else self._led_changes(self._leds),
-            NO_ACTUATIONS if self._own is None else self._actuations(self._own),
+            NO_ACTUATOR_COMMANDS if self._own is None else self._actuations(self._own),
             NO_VALUES if self._value is None else self._values(self._value),
         )
 
@@ -253,9 +253,9 @@ class Turn:
         place, which = np.nonzero(leds != NOT_SWITCHED)
         return LedChanges(self.readings.rows[place], which, leds[place, which])
 
-    def _actuations(self, own: FloatArray) -> Actuations:
+    def _actuations(self, own: FloatArray) -> ActuatorCommands:
         at, place = np.nonzero(~np.isnan(own))
-        return Actuations(self.readings.rows[at], place, own[at, place])
+        return ActuatorCommands(self.readings.rows[at], place, own[at, place])
 
     def _notes(self, state: IntArray) -> Notes:
         noted = np.flatnonzero(state >= 0)

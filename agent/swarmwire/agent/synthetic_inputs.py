@@ -12,9 +12,17 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.bodies.sensor_specs import Camera, GroundColour
+from swarmwire.comms.bodies.sensor_specs import CameraSpec, GroundSpec
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import NO_TX_STATUSES, UNTOLD, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.packets import (
+    NO_TX_STATUSES,
+    NOT_MEASURED,
+    Payloads,
+    ReceivedPackets,
+    SentPackets,
+    TxResult,
+    TxStatuses,
+)
 from swarmwire.comms.tick_io import GroupReadings
 
 
@@ -61,7 +69,7 @@ class _Ether:
 
     def show(self, sent: SentPackets) -> None:
         self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        asked = np.flatnonzero(self._sent.tx_status_ids != UNTOLD)
+        asked = np.flatnonzero(self._sent.tx_status_ids != NOT_MEASURED)
         row, id_ = self._sent.sender[asked], self._sent.tx_status_ids[asked]
         chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
         new = TxStatuses(row, id_, (chance * len(TxResult)).astype(np.int64))
@@ -83,7 +91,7 @@ class _Ether:
         return ReceivedPackets(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
 
 
-class Given(NamedTuple):
+class SyntheticInputs(NamedTuple):
     """What a group is given in a tick: time (its number, start and length in ns), senses, packets and tx statuses."""
 
     time: tuple[int, int, int]
@@ -92,7 +100,7 @@ class Given(NamedTuple):
     tx_status: TxStatuses
 
 
-def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]]:
+def inputs(trial: Trial) -> Iterator[tuple[SyntheticInputs, Callable[[SentPackets], None]]]:
     """What the robots are given, tick by tick, and whom to show what they sent."""
     key, body = draws.derive_key("inputs", trial.seed), trial.spec
     ether = _Ether(key)
@@ -101,7 +109,7 @@ def inputs(trial: Trial) -> Iterator[tuple[Given, Callable[[SentPackets], None]]
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
         sensors = GroupReadings(rows, _readings(body, key, tick, rows))
-        yield Given(time, sensors, ether.received(tick, rows), ether.tx_status(tick)), ether.show
+        yield SyntheticInputs(time, sensors, ether.received(tick, rows), ether.tx_status(tick)), ether.show
 
 
 def _readings(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
@@ -145,9 +153,9 @@ def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
         share = _uniform(key, tick, "scan", (n, body.scan.rays))
         fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
     ground, camera = body.sensors.get("ground"), body.sensors.get("camera")
-    if isinstance(ground, GroundColour):
+    if isinstance(ground, GroundSpec):
         fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
-    if isinstance(camera, Camera):
+    if isinstance(camera, CameraSpec):
         shape = n, camera.most_blobs
         none = np.arange(camera.most_blobs) >= _uniform(key, tick, "blobs", (n, 1)) * camera.most_blobs
         nearest_first = np.sort(_uniform(key, tick, "distance", shape), axis=1)

@@ -11,24 +11,24 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import Agent, AgentClass
-from swarmwire.agent.host import Hosted, hosted
-from swarmwire.agent.synthetic_inputs import Given, Trial, inputs
+from swarmwire.agent.host import AgentGroup, agent_group
+from swarmwire.agent.synthetic_inputs import SyntheticInputs, Trial, inputs
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
-from swarmwire.comms.packets import BROADCAST, TAG_BYTES, UNTOLD, SentPackets
+from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, TAG_BYTES, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupReadings
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 
-Deed = tuple[int, str, str]  # robot, what it did, and the value, exactly
+Action = tuple[int, str, str]  # robot, what it did, and the value, exactly
 SPEEDS = ("linear_mps", "angular_radps", "lateral_mps")
 
 
-def deeds(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
+def actions_of(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
     """What each robot did, by its row: the exact value of each deed, by its name."""
     found: dict[int, dict[str, str]] = {robot: {} for robot in actions.rows.tolist()}
     for robot, what, value in chain(_driven(actions), _shown(actions), _actuated(actions, body), _sent(actions.sent)):
@@ -36,7 +36,7 @@ def deeds(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
     return found
 
 
-def _driven(actions: Actions) -> Iterator[Deed]:
+def _driven(actions: Actions) -> Iterator[Action]:
     for name in SPEEDS:
         speeds: list[float] = getattr(actions, name).tolist()
         for robot, drives, speed in zip(actions.rows.tolist(), actions.drive.tolist(), speeds, strict=True):
@@ -44,7 +44,7 @@ def _driven(actions: Actions) -> Iterator[Deed]:
                 yield robot, f"drive: {name}", repr(speed)
 
 
-def _shown(actions: Actions) -> Iterator[Deed]:
+def _shown(actions: Actions) -> Iterator[Action]:
     notes, leds = actions.notes, actions.leds
     codes: list[int] = notes.code.tolist()
     for robot, code in zip(notes.rows.tolist(), codes, strict=True):
@@ -55,20 +55,20 @@ def _shown(actions: Actions) -> Iterator[Deed]:
         yield robot, f"led {which}", f"0x{rgb:06x}"
 
 
-def _actuated(actions: Actions, body: Body) -> Iterator[Deed]:
+def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
     places = [f"{name}[{at}]" for name, spec in body.actuators.items() for at in range(spec.width)]
     rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
     for robot, at, number in zip(rows, place, value, strict=True):
         yield robot, f"actuate: {places[at]}", repr(number)
 
 
-def _sent(sent: SentPackets) -> Iterator[Deed]:
+def _sent(sent: SentPackets) -> Iterator[Action]:
     packets: dict[int, int] = {}  # of each robot, up to now
     columns = sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()
     for at, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
         number = packets[robot] = packets.get(robot, 0) + 1
         yield robot, f"packet {number}: to", "all" if to == BROADCAST else f"robot {to}"
-        if tx_status_id != UNTOLD:
+        if tx_status_id != NOT_MEASURED:
             yield robot, f"packet {number}: id", str(tx_status_id)
         for name, value in _fields(sent.payloads.row(at)):
             yield robot, f"packet {number}: {name}", value
@@ -102,7 +102,7 @@ class Comparison:
 
     def check(self, tick: int, first: Actions, second: Actions) -> None:
         """AssertionError with the first robot that does not do the same in both, and what it does in each."""
-        one, other = deeds(first, self.body), deeds(second, self.body)
+        one, other = actions_of(first, self.body), actions_of(second, self.body)
         different = [robot for robot in one if one[robot] != other[robot]]
         if different:
             robot, *others = different
@@ -151,15 +151,17 @@ def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None 
         show(first.sent)
 
 
-def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> Hosted:
+def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> AgentGroup:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
     params = params_of(trial.params or {}, rows)
-    return hosted(GroupAssignment("trial", "", params, trial.spec, rows, names, keys), kind)
+    return agent_group(GroupAssignment("trial", "", params, trial.spec, rows, names, keys), kind)
 
 
-def _only(row: int, given: Given) -> Given:
+def _only(row: int, given: SyntheticInputs) -> SyntheticInputs:
     at = np.flatnonzero(given.readings.rows == row)
     own = GroupReadings(given.readings.rows[at], {name: column[at] for name, column in given.readings.fields.items()})
     received = given.received.select(np.flatnonzero(given.received.receiver == row))
-    return Given(given.time, own, received, given.tx_status.select(np.flatnonzero(given.tx_status.row == row)))
+    return SyntheticInputs(
+        given.time, own, received, given.tx_status.select(np.flatnonzero(given.tx_status.row == row))
+    )

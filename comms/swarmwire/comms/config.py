@@ -14,7 +14,7 @@ from swarmwire.comms.errors import BadInput
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class Bounds:
     """What a parameter means and which values it may take (bounds are inclusive unless they start with `above`)."""
 
     help: str
@@ -38,17 +38,17 @@ def parameter(
     choices: tuple[str, ...] = (),
 ) -> Any:
     """A dataclass field with a `Limits` in its metadata; without default the value must be given."""
-    limits = Limits(help, unit, at_least, at_most, above, below, choices)
+    limits = Bounds(help, unit, at_least, at_most, above, below, choices)
     return field(default=default, metadata={"limits": limits})
 
 
-def limits_of(of: "Field[Any]") -> Limits:
+def bounds_of(of: "Field[Any]") -> Bounds:
     """The limits of a dataclass field made by `parameter` (empty ones for any other field)."""
     found = of.metadata.get("limits")
-    return found if isinstance(found, Limits) else Limits(help="")
+    return found if isinstance(found, Bounds) else Bounds(help="")
 
 
-def fault_of(value: float, limits: Limits) -> str | None:
+def fault_of(value: float, limits: Bounds) -> str | None:
     """What was expected of `value`, in words, or None if it is within its limits.
 
     >>> fault_of(-1.0, Limits("how long it lasts", unit="s", above=0.0))
@@ -74,7 +74,7 @@ class NoParameters:
 # --- Enumerations whose members say what they mean.
 
 
-class Explained(IntEnum):
+class ExplainedEnum(IntEnum):
     """Integers, each with its meaning: `NAME = 0, "what it means"`."""
 
     meaning: str
@@ -90,7 +90,7 @@ class Explained(IntEnum):
 # --- The names that there are, in words: for errors about one that there is not.
 
 
-def one_of(known: Iterable[str], given: object = None) -> str:
+def did_you_mean(known: Iterable[str], given: object = None) -> str:
     """The words "one of a, b, c", and which of these was probably meant, if what was `given` is near one of them.
 
     >>> one_of(["range_m", "loss"], "range")

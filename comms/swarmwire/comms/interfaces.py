@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Protocol
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 
 class AgentBackend(Protocol):
@@ -39,7 +39,7 @@ class Observer(Protocol):
         """One tick is over; the arrays may be kept but not written to."""
         ...
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The run is over; `last` counts what was in flight. Returns this observer's part of the summary."""
         ...
 
@@ -56,7 +56,7 @@ class StopConditions(Protocol):
 # received.
 
 
-class Put(NamedTuple):
+class SubtickPackets(NamedTuple):
     """Packets that came from agents in the middle of a tick."""
 
     at_ns: int  # when they came, simulated time
@@ -67,7 +67,7 @@ class Put(NamedTuple):
 class SubtickMedium(Protocol):
     """The medium while a tick goes on, with the poses of its start."""
 
-    def send(self, put: Put) -> None:
+    def send(self, put: SubtickPackets) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
         ...
 

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from numba import njit
 
 
-def borrowing(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def kernel(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit` for kernels that allocate nothing; what is not called `from_python` other kernels alone can call."""
     uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True}
     ways_in: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not from_python}

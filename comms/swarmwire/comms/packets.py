@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from swarmwire.comms.config import Explained
+from swarmwire.comms.config import ExplainedEnum
 
 
-class Fate(Explained):
+class Fate(ExplainedEnum):
     """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
 
     RECEIVED = 0, "reached the receiver"
@@ -37,7 +37,7 @@ FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summarie
 
 BROADCAST = -1  # addressed to whoever is within reach
 NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
-UNTOLD = -1  # the tx status id of a packet whose sender does not ask
+NOT_MEASURED = -1  # the tx status id of a packet whose sender does not ask
 TAG_BYTES = 2  # at the start of a payload: which class of messages it is
 
 
@@ -134,7 +134,7 @@ class SentPackets:
     @property
     def tx_status_ids(self) -> IntArray:
         """`tx_status_id`, also where nobody asks, (k,)."""
-        return np.full(len(self), UNTOLD) if self.tx_status_id is None else self.tx_status_id
+        return np.full(len(self), NOT_MEASURED) if self.tx_status_id is None else self.tx_status_id
 
     def select(self, index: IntArray) -> "SentPackets":
         """The packets of `index` (k,), in its order."""
@@ -227,7 +227,7 @@ class ReceivedPackets:
 # --- What a sender's radio knows of an addressed packet once it is done with it: all but what became of it elsewhere.
 
 
-class TxResult(Explained):
+class TxResult(ExplainedEnum):
     """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"

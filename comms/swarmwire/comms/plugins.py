@@ -14,7 +14,7 @@ from traceback import extract_tb
 from types import CodeType
 from typing import Any, TypeVar, cast
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 T = TypeVar("T")
@@ -46,7 +46,7 @@ def installed_class(group: str, name: str, base: type[T], what: str, where: str,
     """
     points = installed_points(group)
     if name not in points:
-        raise BadInput(where, key, f"expected a {what}: {one_of(points, name)}; got {name!r}")
+        raise BadInput(where, key, f"expected a {what}: {did_you_mean(points, name)}; got {name!r}")
     if len({point.value for point in points[name]}) > 1:
         brought = ", ".join(f"{point.value} of {_package(point)}" for point in points[name])
         raise BadInput(where, key, f"expected one {what} of the name {name!r}, got {brought}")

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.tick_io import GroupReadings, Readings
-from swarmwire.comms.truth import Departed, Finished, Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
 
 
 def static_of(static: Static, arena: int) -> Static:
@@ -59,30 +59,30 @@ def readings_within(readings: Readings, rows: slice) -> Readings:
     return found
 
 
-def _tally_of(tally: Tally, arena: int) -> Tally:
+def _tally_of(tally: PacketCounts, arena: int) -> PacketCounts:
     one = slice(arena, arena + 1)
-    return Tally(tally.sent[one], tally.intended[one], tally.in_range[one], tally.fates[one])
+    return PacketCounts(tally.sent[one], tally.intended[one], tally.in_range[one], tally.fates[one])
 
 
-def _finished_of(finished: Finished, arena: int) -> Finished:
+def _finished_of(finished: ReceptionRecords, arena: int) -> ReceptionRecords:
     own = finished.arena == arena
-    columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(Finished)}
+    columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(ReceptionRecords)}
     payloads = columns.pop("payloads")
     kept: dict[str, Any] = {name: None if column is None else column[own] for name, column in columns.items()}
-    return Finished(**{**kept, "arena": np.zeros_like(kept["arena"])}, payloads=payloads)
+    return ReceptionRecords(**{**kept, "arena": np.zeros_like(kept["arena"])}, payloads=payloads)
 
 
-def _departed_of(departed: Departed, arena: int) -> Departed:
+def _departed_of(departed: TransmissionRecords, arena: int) -> TransmissionRecords:
     own = departed.arena == arena
-    kept: dict[str, Any] = {field.name: getattr(departed, field.name)[own] for field in fields(Departed)}
-    return Departed(**{**kept, "arena": np.zeros_like(kept["arena"])})
+    kept: dict[str, Any] = {field.name: getattr(departed, field.name)[own] for field in fields(TransmissionRecords)}
+    return TransmissionRecords(**{**kept, "arena": np.zeros_like(kept["arena"])})
 
 
 # --- A run as those see it who look on from another process: some of its ticks, and the numbers measured so far.
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class MetricSeries:
     """A metric whose values come with each glimpse."""
 
     name: str
@@ -91,16 +91,16 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ObservedRun:
     """What a run tells once to whoever begins to look on."""
 
     static: Static
-    series: tuple[Series, ...]
+    series: tuple[MetricSeries, ...]
     selected: str  # the robot that is shown in detail
 
 
 @dataclass(frozen=True, slots=True)
-class Glimpse:
+class ObservedTick:
     """One tick, with what happened in the ticks since the glimpse before.
 
     `truth` is the state of its tick; its contact onsets, tally and events are those of the last `ticks` ticks together.

@@ -80,7 +80,7 @@ NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))  # nobody switches any
 
 
 @dataclass(frozen=True, slots=True)
-class Actuations:
+class ActuatorCommands:
     """The numbers that some robots set in one tick, a row each; of two rows of a place the later counts."""
 
     rows: IntArray  # (k,) robot row: arena x robots + index
@@ -91,11 +91,11 @@ class Actuations:
         return len(self.rows)
 
     @classmethod
-    def joined(cls, parts: "list[Actuations]") -> "Actuations":
+    def joined(cls, parts: "list[ActuatorCommands]") -> "ActuatorCommands":
         """Those of all parts, in order."""
         parts = [part for part in parts if len(part)]
         if len(parts) < 2:
-            return parts[0] if parts else NO_ACTUATIONS
+            return parts[0] if parts else NO_ACTUATOR_COMMANDS
         return cls(
             np.concatenate([part.rows for part in parts]),
             np.concatenate([part.place for part in parts]),
@@ -103,7 +103,7 @@ class Actuations:
         )
 
 
-NO_ACTUATIONS = Actuations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))  # nobody acts
+NO_ACTUATOR_COMMANDS = ActuatorCommands(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))  # nobody acts
 
 
 # --- Values: the numbers that agents tell whoever looks on (`note(value=1.25)`). They change nothing in the run.
@@ -157,7 +157,7 @@ class Actions:
     sent: SentPackets = field(default_factory=SentPackets.none)
     notes: Notes = field(default_factory=Notes.none)
     leds: LedChanges = NO_LED_CHANGES
-    own: Actuations = NO_ACTUATIONS  # of actuators of the user's own
+    own: ActuatorCommands = NO_ACTUATOR_COMMANDS  # of actuators of the user's own
     values: Values = NO_VALUES
 
     @classmethod
@@ -178,6 +178,6 @@ class Actions:
             SentPackets.joined([part.sent for part in parts]),
             Notes.joined([part.notes for part in parts]),
             LedChanges.joined([part.leds for part in parts]),
-            Actuations.joined([part.own for part in parts]),
+            ActuatorCommands.joined([part.own for part in parts]),
             Values.joined([part.values for part in parts]),
         )

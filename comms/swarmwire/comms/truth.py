@@ -13,7 +13,7 @@ from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads, offsets
 from swarmwire.comms.tick_io import Readings
 
-NOBODY = -1  # in place of a robot; of a receiver: all that the packet was meant for
+NO_ROBOT = -1  # in place of a robot; of a receiver: all that the packet was meant for
 Boundary = Literal["walls", "open", "torus"]  # walls, nothing at all, or the opposite side
 
 
@@ -128,7 +128,7 @@ class Static:
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class ReceptionRecords:
     """Links whose fate became final since the last tick: a row per (packet, receiver it might have reached).
 
     A packet that never went on air (queue full, too large, sender dead, its radio off) has one row with receiver -1.
@@ -151,14 +151,14 @@ class Finished:
     payload: IntArray | None = None  # (k,) the row of `payloads`; None: not known
     payloads: Payloads | None = None
 
-    def of(self, arenas: BoolArray) -> "Finished":
+    def of(self, arenas: BoolArray) -> "ReceptionRecords":
         """The links of these arenas (arenas,)."""
         index = np.flatnonzero(arenas[self.arena])
         columns = {name: column[index] for name, column in _columns(self).items()}
         return replace(self, **columns)
 
     @classmethod
-    def joined(cls, parts: "list[Finished]") -> "Finished":
+    def joined(cls, parts: "list[ReceptionRecords]") -> "ReceptionRecords":
         """The links of all parts, one or more, which are alike in what they know."""
         some = [part for part in parts if len(part.arena)]
         if len(some) < 2:
@@ -172,19 +172,19 @@ class Finished:
         return replace(some[0], **columns)
 
 
-def _columns(table: "Finished | Departed") -> dict[str, Any]:
+def _columns(table: "ReceptionRecords | TransmissionRecords") -> dict[str, Any]:
     """The arrays that a table has, by name; the payloads are none."""
     named = ((field.name, getattr(table, field.name)) for field in fields(table) if field.name != "payloads")
     return {name: column for name, column in named if column is not None}
 
 
-def _joined_columns(tables: "Sequence[Finished] | Sequence[Departed]") -> dict[str, Any]:
+def _joined_columns(tables: "Sequence[ReceptionRecords] | Sequence[TransmissionRecords]") -> dict[str, Any]:
     """The arrays of tables that have the same ones, by name, one after the other."""
     return {name: np.concatenate([getattr(table, name) for table in tables]) for name in _columns(tables[0])}
 
 
 @dataclass(frozen=True, slots=True)
-class Departed:
+class TransmissionRecords:
     """Packets that left their sender's radio since the last tick, a row each: they came off air, or never went on.
 
     Of a packet that was sent again for want of an acknowledgement, the times are those of one try.
@@ -200,19 +200,19 @@ class Departed:
     on_air_at_ns: IntArray  # (k,)
     off_air_at_ns: IntArray  # (k,) the same if it never was on air
 
-    def of(self, arenas: BoolArray) -> "Departed":
+    def of(self, arenas: BoolArray) -> "TransmissionRecords":
         """The packets of these arenas (arenas,)."""
         index = np.flatnonzero(arenas[self.arena])
-        return Departed(**{name: column[index] for name, column in _columns(self).items()})
+        return TransmissionRecords(**{name: column[index] for name, column in _columns(self).items()})
 
     @classmethod
-    def joined(cls, parts: "list[Departed]") -> "Departed":
+    def joined(cls, parts: "list[TransmissionRecords]") -> "TransmissionRecords":
         """The packets of all parts, one or more."""
         return cls(**_joined_columns([part for part in parts if len(part.arena)] or parts[:1]))
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class PacketCounts:
     """Packets counted since the last tick, a row per arena. Over a run the fates add up to the intended receivers."""
 
     sent: IntArray  # (arenas,) packets handed to the radio
@@ -220,22 +220,24 @@ class Tally:
     in_range: IntArray  # (arenas,) receivers in range after path loss and walls, of fates that became final
     fates: IntArray  # (arenas, fates) fates that became final
 
-    def __add__(self, other: "Tally") -> "Tally":
+    def __add__(self, other: "PacketCounts") -> "PacketCounts":
         """Both together."""
-        return Tally(
+        return PacketCounts(
             self.sent + other.sent,
             self.intended + other.intended,
             self.in_range + other.in_range,
             self.fates + other.fates,
         )
 
-    def of(self, arenas: BoolArray) -> "Tally":
+    def of(self, arenas: BoolArray) -> "PacketCounts":
         """What was counted in these arenas (arenas,), and nothing in the others."""
-        return Tally(self.sent * arenas, self.intended * arenas, self.in_range * arenas, self.fates * arenas[:, None])
+        return PacketCounts(
+            self.sent * arenas, self.intended * arenas, self.in_range * arenas, self.fates * arenas[:, None]
+        )
 
 
 @dataclass(frozen=True, slots=True)
-class Happened:
+class EventRecord:
     """An event that began in this tick, or one that ended after its time."""
 
     serial: int  # its place in the scenario; -1: it is not of the scenario's making
@@ -273,10 +275,10 @@ class Truth:
     readings: Readings  # by group, of the robots that act in this tick: what they sensed at its start
     contact_onsets: IntArray  # (arenas, 2) that began in this tick: robot with robot, robot with wall or obstacle
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
-    tally: Tally | None  # None without a radio
-    finished: Finished | None  # None without a radio
-    events: tuple[Happened, ...] = ()  # at the tick's start, in order
-    departed: Departed | None = None  # None without a radio; views of a run elsewhere do not get it
+    tally: PacketCounts | None  # None without a radio
+    finished: ReceptionRecords | None  # None without a radio
+    events: tuple[EventRecord, ...] = ()  # at the tick's start, in order
+    departed: TransmissionRecords | None = None  # None without a radio; views of a run elsewhere do not get it
     movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading of those; None: there are none
     # (rows,) number that the agent told last, NaN: none; None: nobody ever has; views of a run elsewhere do not get it
     value: FloatArray | None = None

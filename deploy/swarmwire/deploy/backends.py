@@ -16,11 +16,11 @@ from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.new_terms import new_terms
 from swarmwire.deploy.runner_processes import RunnerProcesses
 from swarmwire.world.backends import allocation as assignments
-from swarmwire.world.backends.join_policy import Door
+from swarmwire.world.backends.join_policy import ListenSettings
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
-from swarmwire.world.backends.registry import Change, Loss
-from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
+from swarmwire.world.backends.registry import Loss, RunnerEvent
+from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
@@ -41,7 +41,7 @@ class Backends:
     stopped: Callable[[], bool]  # whether waiting for runners is to end
     listening: Listening | None  # for runners that others start, if it does
     lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
-    changed: Callable[[Change], None]  # is told of every runner that came or went
+    changed: Callable[[RunnerEvent], None]  # is told of every runner that came or went
     say: Callable[[str], None]  # what people should know at once
     subticks: Subticks | None = None  # of real time, in which packets cross also between ticks
 
@@ -82,7 +82,7 @@ class Backends:
         parts = assignments.split(whole, self.runners)
         names = [f"r{i}" for i in range(len(parts))]
         with local_endpoint(self.socket) as endpoint:
-            around = Surroundings(
+            around = BackendHooks(
                 trouble,
                 self.stopped,
                 lambda loss: self._survive(loss, endpoint),
@@ -100,11 +100,11 @@ class Backends:
                 for process in processes:
                     process.stop()
 
-    def _around_open(self, listening: Listening) -> Surroundings:
+    def _around_open(self, listening: Listening) -> BackendHooks:
         """What the backend of a world that listens asks and tells."""
         told = listening.told
 
-        def changed(change: Change, free: tuple[str, ...]) -> None:
+        def changed(change: RunnerEvent, free: tuple[str, ...]) -> None:
             self.changed(change)
             self.say(str(change))
             if told is not None:
@@ -119,9 +119,9 @@ class Backends:
             if told is not None:
                 told.opened(endpoints, self.run_id)
 
-        return Surroundings(lambda: None, self.stopped, self.lost, changed, refused, opened)
+        return BackendHooks(lambda: None, self.stopped, self.lost, changed, refused, opened)
 
-    def _changed(self, change: Change) -> None:
+    def _changed(self, change: RunnerEvent) -> None:
         self.changed(change)
         if change.what != "lost":  # which is told with what people can do
             self.say(str(change))
@@ -130,7 +130,7 @@ class Backends:
         self.say(f"refused {runner!r}: {why}")
 
     def _remote(
-        self, door: Door | str, parts: list[Assignment], around: Surroundings
+        self, door: ListenSettings | str, parts: list[Assignment], around: BackendHooks
     ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
         terms = new_terms(self.scenario, self.static, self.agents, self.run_id, factor, self.listening)

@@ -6,7 +6,7 @@ from typing import Any
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.refusals import refusal
 
 
@@ -37,7 +37,7 @@ class Guarded:
         if not self.failed:
             self._try(lambda: self._observer.see(truth))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The run is over; also an observer that failed may close its files."""
         return self._try(lambda: self._observer.end(last)) or {}
 

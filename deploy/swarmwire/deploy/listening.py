@@ -5,11 +5,11 @@ from typing import Protocol
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access
-from swarmwire.comms.wire.join import LIMITS, Limits
+from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.world.backends.join_policy import Door
-from swarmwire.world.backends.registry import GOES_ON, Change
+from swarmwire.world.backends.join_policy import ListenSettings
+from swarmwire.world.backends.registry import GOES_ON, RunnerEvent
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -20,7 +20,7 @@ class Onlooker(Protocol):
         """The world listens, at these endpoints."""
         ...
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """A runner came or went; these robots nobody plays now."""
         ...
 
@@ -38,7 +38,7 @@ class Listening:
     network: Network = field(default_factory=Network)  # the world's certificates
     access: RunAccess | None = None  # who may do what; None: whoever reaches an endpoint may play
     start_with: int | None = None  # robots with an agent that are enough for the first tick; None: all
-    limits: Limits = LIMITS  # what is taken from runners at most
+    limits: JoinLimits = LIMITS  # what is taken from runners at most
     told: Onlooker | None = None  # of runners that come and go
 
     def check(self, scenario: Scenario, robots: int) -> None:
@@ -55,12 +55,12 @@ class Listening:
             expected = "expected stand or coast with --start-with: what robots do that have no agent yet"
             raise BadInput(scenario.source, "run.on_runner_loss", expected)
 
-    def door(self, run_id: str) -> Door:
+    def door(self, run_id: str) -> ListenSettings:
         """Where runners meet the world."""
         access = None if self.access is None else agents_access(Keys(run_id), self.access)
-        return Door(self.endpoints, self.network, access)
+        return ListenSettings(self.endpoints, self.network, access)
 
-    def observers_door(self, run_id: str) -> Door:
+    def observers_door(self, run_id: str) -> ListenSettings:
         """Where observers meet the world."""
         access = None if self.access is None else observers_access(ObserverKeys(run_id), self.access)
-        return Door(self.observed, self.network, access)
+        return ListenSettings(self.observed, self.network, access)

@@ -8,9 +8,9 @@ from pathlib import Path
 from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.comms.truth import Static
-from swarmwire.comms.wire.join import Offer, OfferedGroup
+from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.listening import Listening
-from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.scenario.scenario import Scenario
 
 KEPT = ("wait", "stand", "coast")  # where another runner may take over
@@ -23,15 +23,15 @@ def new_terms(
     run_id: str,
     factor: float | None,
     listening: Listening | None,
-) -> Terms:
+) -> JoinPolicy:
     """The terms of a run in real time at this factor, or in lockstep; `agents` names, by group, the agent's spec."""
     kinds = {group: load_agent(spec) for group, spec in agents.items()}
     memory = {group: layout_of(kind) for group, kind in kinds.items()}
     kept = memory if scenario.run.on_runner_loss in KEPT else None
     if listening is None:
-        return Terms(memory=kept)
+        return JoinPolicy(memory=kept)
     groups = tuple(
-        OfferedGroup(
+        GroupInfo(
             name=group.name,
             agent=scenario.robots[group.name].agent,
             agent_sha256=agent_sha256(kinds[group.name]),
@@ -40,7 +40,7 @@ def new_terms(
         )
         for group in static.groups
     )
-    offer = Offer(
+    offer = SessionInfo(
         run=run_id,
         scenario=scenario.name,
         scenario_sha256=_sha256(scenario.source),
@@ -49,7 +49,7 @@ def new_terms(
         real_time=factor,
         groups=groups,
     )
-    return Terms(offer, True, listening.start_with, listening.limits, kept)
+    return JoinPolicy(offer, True, listening.start_with, listening.limits, kept)
 
 
 def _sha256(source: str) -> str:

@@ -12,7 +12,7 @@ from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
-from swarmwire.world.backends.registry import Change, Loss
+from swarmwire.world.backends.registry import Loss, RunnerEvent
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
@@ -36,7 +36,7 @@ def outcome(
     inputs: InputsRecord | None,
     interventions: InterventionsRecord | None,
     losses: Sequence[Loss],
-    changes: Sequence[Change],
+    changes: Sequence[RunnerEvent],
     engines: Sequence[str],
     realtime: RealTimeReport | None,
     folder: Path | None,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from swarmwire.deploy.record.inputs import RecordedInputs
-from swarmwire.world.live_events import Intervention
+from swarmwire.world.live_events import LiveEvent
 
 
 @dataclass(frozen=True)
@@ -12,5 +12,5 @@ class Replay:
 
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
-    interventions: tuple[Intervention, ...] = ()  # what people did to it
+    interventions: tuple[LiveEvent, ...] = ()  # what people did to it
     subtick_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts

@@ -11,7 +11,7 @@ from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
 from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.backends.realtime_backend import RealTimeReport
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Result:
     inputs: InputsRecord | None = None  # what came from outside, if anything did
     interventions: InterventionsRecord | None = None  # what people did to it while it went on, if anything
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
-    runner_changes: tuple[Change, ...] = ()  # who joined, left, was lost and returned, in order
+    runner_changes: tuple[RunnerEvent, ...] = ()  # who joined, left, was lost and returned, in order
     realtime: RealTimeReport | None = None
     gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
     error: str | None = None  # why it failed

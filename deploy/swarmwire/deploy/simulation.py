@@ -54,10 +54,10 @@ from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.stop import StopConditions as MetricStopConditions
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
-from swarmwire.world.backends.registry import Change, Loss, RunnerHealth
+from swarmwire.world.backends.registry import Loss, RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
-from swarmwire.world.live_events import Interventions
+from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, custom_code
 from swarmwire.world.scenario.scenario import Scenario
@@ -150,7 +150,7 @@ class Simulation:
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
-        self.interventions = Interventions(
+        self.interventions = LiveEvents(
             self.scenario,
             {group.name: group.body for group in self.static.groups},
             self._record.keep,
@@ -162,7 +162,7 @@ class Simulation:
         for observer in (TooLarge(self._record.say), *self._recorders(what, listening), *observers):
             self.watch(observer)
         self._losses: list[Loss] = []
-        self._changes: list[Change] = []
+        self._changes: list[RunnerEvent] = []
         self._not_its_own = False  # whether it began with robots that had no agent, or code of a foreign runner
         self.served: Served | None = None
         self._backends = self._new_backends(socket, listening)

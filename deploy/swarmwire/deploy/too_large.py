@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 
 class TooLarge:
@@ -30,6 +30,6 @@ class TooLarge:
             who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
             self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing for the summary, which counts the fate."""
         return {}

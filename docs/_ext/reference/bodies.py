@@ -8,7 +8,7 @@ from typing import Any, cast
 from reference.markdown import NOTHING, code, number, table
 from reference.parameters import HEAD, parameter_rows
 from swarmwire.comms.bodies.body import Body, body_names, load_body
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 
 Figure = tuple[str, str, object]  # path within the sheet, unit, value
 
@@ -52,7 +52,7 @@ def _of(sheet: Any, prefix: str, skipped: tuple[str, ...] = ()) -> Iterator[Figu
         if is_dataclass(value):
             yield from _of(value, f"{prefix}{of.name}.")
         elif of.name not in skipped and value not in (of.default, {}):
-            yield prefix + of.name, limits_of(of).unit, value
+            yield prefix + of.name, bounds_of(of).unit, value
 
 
 def _value(value: object) -> str:

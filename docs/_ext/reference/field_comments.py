@@ -11,7 +11,7 @@ from typing import Any
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 
 PARTS = ("comms", "agent", "world", "metrics", "deploy")
 FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (?!noqa|pyright:)(.*)$", re.MULTILINE)
@@ -31,7 +31,7 @@ def help_of(path: str) -> str:
     place, _, field = path.rpartition(".")
     module, _, name = place.rpartition(".")
     kind = getattr(sys.modules.get(module), name, None)
-    limits = [limits_of(of) for of in fields(kind) if of.name == field] if is_dataclass(kind) else []
+    limits = [bounds_of(of) for of in fields(kind) if of.name == field] if is_dataclass(kind) else []
     return "".join(f"{of.help}, in {of.unit}" if of.unit else of.help for of in limits)
 
 

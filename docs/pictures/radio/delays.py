@@ -6,7 +6,7 @@ import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
-from swarmwire.comms.radio.stages.delays import delay_law, varying_delay_ns
+from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
 
 MEAN_S, DEVIATION_S = 0.02, 0.008
 DRAWS = (np.arange(40_000) + 0.5) / 40_000  # evenly, so that the picture shows the law and not its draws
@@ -18,7 +18,7 @@ def draw() -> None:
     """Write delays.svg."""
     figure, (spread, tails) = panels(2, 2.6)
     for index, distribution in enumerate(DISTRIBUTIONS):
-        law = delay_law(Delays(distribution, MEAN_S, DEVIATION_S))
+        law = delay_distribution(Delays(distribution, MEAN_S, DEVIATION_S))
         delay_ms = 1e-6 * np.array([varying_delay_ns(law, u) for u in DRAWS])
         share, _ = np.histogram(delay_ms, BINS_MS)
         spread.stairs(share / len(DRAWS), BINS_MS, color=line_color(index), lw=1.3, label=distribution)

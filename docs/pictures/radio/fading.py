@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.radio.config.phy import Fading
 from swarmwire.comms.radio.propagation.decibels import to_db
-from swarmwire.comms.radio.propagation.fading import fading_gain, fading_law, scattered_between
+from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model, scattered_between
 from swarmwire.metrics.drawing.looks import INK
 
 FREQUENCY_HZ = 2.44e9
@@ -31,7 +31,7 @@ def draw() -> None:
     figure, (way, shares, lags) = panels(3, 2.75, (1.25, 1.0, 1.0))
     places = 50.0 * uniform(int(KEY), np.arange(PAIRS)[:, None], np.arange(4), 0, 0)
     for index, (label, (fading, theory)) in enumerate(KINDS.items()):
-        law = fading_law(fading, FREQUENCY_HZ)
+        law = fading_model(fading, FREQUENCY_HZ)
         along = [to_db(fading_gain(law, KEY, 0, 1, 3.0, 4.0, x, 0.0)) for x in WAY_M]
         way.plot(WAY_M, along, color=line_color(index), lw=1.1, label=label)
         gains = np.sort([fading_gain(law, KEY, 0, pair + 1, *place) for pair, place in enumerate(places)])

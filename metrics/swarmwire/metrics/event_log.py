@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.truth import Happened, Static, Tally, Truth
+from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 
 
 class EventLog:
@@ -36,12 +36,12 @@ class EventLog:
                 }
             )
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The events so far."""
         return {"events": self._events}
 
 
-def names(event: Happened, static: Static) -> list[list[str]]:
+def names(event: EventRecord, static: Static) -> list[list[str]]:
     """The names of the robots that an event changed, a list per arena."""
     changed = event.changed.reshape(static.arenas, static.robots)
     return [[static.robot_names[index] for index in np.flatnonzero(own)] for own in changed]

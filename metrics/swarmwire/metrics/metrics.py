@@ -11,7 +11,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.plain import plain
@@ -73,7 +73,7 @@ class Metrics:
         """What `latest` tells, (metrics, arenas)."""
         return self._latest
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The statistics over the ticks seen."""
         mean = self._sum / np.where(self._seen > 0, self._seen, np.nan)
         columns = {"final": self._latest, "mean": mean, "min": self._min, "max": self._max}

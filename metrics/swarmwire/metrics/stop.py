@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import to_ns, to_s
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metrics import Metrics
 
 Comparison = Literal["at_least", "at_most", "above", "below"]
@@ -76,7 +76,7 @@ class StopConditions:
         """Which arenas have been found over so far, (arenas,); None: none."""
         return self._over if self._over.any() else None
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """When each arena was over, in s from the start of the run, and by which condition; None where it was not."""
         stops = [self._stop(arena) for arena in range(len(self._over))]
         return {"stop": [str(condition) for condition in self._conditions], "stops": stops}

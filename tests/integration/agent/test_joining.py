@@ -10,7 +10,7 @@ import zenoh
 
 from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import Joining, join
-from swarmwire.agent.runner import Inbox
+from swarmwire.agent.runner import TickInbox
 from swarmwire.comms.errors import BadInput, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire import frames
@@ -36,7 +36,7 @@ def ticks_of(*numbers: int) -> list[bytes]:
 def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
-    ended = join(Joining(world.endpoint, name="r", **keys), Inbox(), said.append)
+    ended = join(Joining(world.endpoint, name="r", **keys), TickInbox(), said.append)
     return ended.how, ended.why, said
 
 
@@ -148,9 +148,9 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):
-            join(Joining(endpoint, name="r"), Inbox(), print)
+            join(Joining(endpoint, name="r"), TickInbox(), print)
     with pytest.raises(RunnerLost, match=f"nobody answers at {endpoint}") as lost:
-        join(Joining(endpoint, name="r", connect_s=SHORT_S), Inbox(), print)
+        join(Joining(endpoint, name="r", connect_s=SHORT_S), TickInbox(), print)
     assert isinstance(lost.value.__cause__, zenoh.ZError)
 
 
@@ -166,7 +166,7 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
 )
 def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict[str, Any], expected: str) -> None:
     with pytest.raises(BadInput, match=expected):
-        join(Joining(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Inbox(), print)
+        join(Joining(**{"endpoint": "tcp/127.0.0.1:1", **keys}), TickInbox(), print)
 
 
 def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:

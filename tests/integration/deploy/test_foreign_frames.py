@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
@@ -47,7 +47,7 @@ class Vandal:
             # The loop, in whose thread this runs, can only answer afterwards.
             list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
 

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
@@ -239,7 +239,7 @@ class Looks:
     def see(self, truth: Truth) -> None:
         self.seen.append(truth)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 

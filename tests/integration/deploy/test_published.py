@@ -13,7 +13,7 @@ import zenoh
 
 from swarmwire.comms.clock import NS_PER_S, WallClock, to_s
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.truth import EventRecord
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import run
@@ -107,7 +107,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
             until(observer._is_watched)
             glimpses = []
             for tick in range(100):  # a hundredth of a second each
-                kill = (Happened(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
+                kill = (EventRecord(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
                 now = truth(of, tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
                 metrics.see(now)
                 clock.time_ns += NS_PER_S // 100

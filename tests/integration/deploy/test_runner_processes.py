@@ -7,7 +7,7 @@ from typing import Any
 import psutil
 import pytest
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.deploy.commands import LOSSY
@@ -29,7 +29,7 @@ class Policies:
         agent_host = [child for child in psutil.Process().children() if "swarmwire.agent.agent_host" in child.cmdline()]
         self.found = [os.sched_getscheduler(runner.pid) for process in agent_host for runner in process.children()]
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """No part of the summary."""
         return {}
 

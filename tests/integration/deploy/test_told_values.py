@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import Recording, repeat
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.run_folder import RunFolder
@@ -65,7 +65,7 @@ class Kept:
         self.errors.append(float(self._metrics.latest["consensus_error"][-1]))
         self.values.append(truth.value)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 

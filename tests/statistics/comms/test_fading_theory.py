@@ -5,10 +5,10 @@ import pytest
 
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.phy import Fading
-from swarmwire.comms.radio.propagation.fading import fading_gain, fading_law
+from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 
 KEY = np.uint64(derive_key("fading"))
-LAW = fading_law(Fading(), 2.44e9)._replace(wave_number=2.44e9 / 299_792_458.0)
+LAW = fading_model(Fading(), 2.44e9)._replace(wave_number=2.44e9 / 299_792_458.0)
 
 
 def test_a_robots_signal_fades_as_often_and_as_long_as_theory_says():

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import AgentClass
-from swarmwire.agent.host import Hosted, hosted
+from swarmwire.agent.host import AgentGroup, agent_group
 from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
@@ -79,13 +79,13 @@ def one_group(tick: int, rows: list[int]) -> Readings:
     return {"flock": readings(tick, rows)}
 
 
-def host_of(kind: AgentClass, rows: list[int]) -> Hosted:
+def host_of(kind: AgentClass, rows: list[int]) -> AgentGroup:
     """Whatever runs an agent of this class for these rows."""
-    return hosted(group("", rows), kind)
+    return agent_group(group("", rows), kind)
 
 
 def step(
-    host: Hosted, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: TxStatuses = NO_TX_STATUSES
+    host: AgentGroup, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: TxStatuses = NO_TX_STATUSES
 ) -> Actions:
     """One step of the robots in these rows."""
     return host.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, told)

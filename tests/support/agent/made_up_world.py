@@ -12,7 +12,7 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import Offer, OfferedGroup
+from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from tests.support.agent.hosts import assignment, group, spec
@@ -20,8 +20,8 @@ from tests.support.agent.hosts import assignment, group, spec
 REFUSED = "refused by the test"
 NOTHING = b""  # an answer that is none
 ASSIGNED = assignment(group(spec("Counter"), [0, 1]))
-OFFERED = OfferedGroup("flock", spec("Counter"), agent_sha256(load_agent(spec("Counter"))), 2, ("flock-0", "flock-1"))
-OFFER = Offer("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode()
+OFFERED = GroupInfo("flock", spec("Counter"), agent_sha256(load_agent(spec("Counter"))), 2, ("flock-0", "flock-1"))
+OFFER = SessionInfo("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode()
 
 
 def given(**change: Any) -> bytes:

@@ -14,11 +14,11 @@ import zenoh
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
-from swarmwire.agent.runner import Inbox, answers, given_robots
+from swarmwire.agent.runner import TickInbox, answers, given_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.deploy.listening import Listening
@@ -26,9 +26,9 @@ from swarmwire.deploy.new_terms import KEPT
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.registry import Change, OnLoss
+from swarmwire.world.backends.registry import OnLoss, RunnerEvent
 from tests.support.deploy.commands import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)
@@ -60,7 +60,7 @@ class Watcher:
         if self.steps and self.steps[0][0](truth):
             self.steps.pop(0)[1]()
 
-    def end(self, last: Tally | None) -> dict[str, object]:
+    def end(self, last: PacketCounts | None) -> dict[str, object]:
         return {}
 
 
@@ -72,10 +72,10 @@ class Joiners:
         self.endpoint = ""
         self.before: Sequence[str] = ()  # of each command: what starts it
         self.processes: dict[str, subprocess.Popen[str]] = {}  # by the label under which it was started
-        self.changes: list[Change] = []
+        self.changes: list[RunnerEvent] = []
         self.refusals: list[tuple[str, str]] = []
         self.first: list[tuple[str | Path, ...]] = []  # who joins as soon as the world listens, one after the other
-        self.on_change: Callable[[Change], object] = lambda _: None
+        self.on_change: Callable[[RunnerEvent], object] = lambda _: None
 
     @property
     def overrides(self) -> list[str]:
@@ -105,7 +105,7 @@ class Joiners:
         self.endpoint = endpoints[0]
         self._next()
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         self.changes.append(change)
         self._next()
         self.on_change(change)
@@ -151,10 +151,10 @@ class EncodedJoiners:
 
     def __init__(self, assignment: Assignment, on_loss: OnLoss, script: Mapping[int, Sequence[str]]) -> None:
         kept = {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
-        terms = Terms(open=True, start_with=0, memory=kept if on_loss in KEPT else None)
+        terms = JoinPolicy(open=True, start_with=0, memory=kept if on_loss in KEPT else None)
         self.roster = Lockstep([assignment], on_loss, terms)
         self._script = script
-        self._runners: dict[str, tuple[Inbox, Iterator[bytes]]] = {}
+        self._runners: dict[str, tuple[TickInbox, Iterator[bytes]]] = {}
 
     def start(self) -> None:
         for line in self._script[-1]:
@@ -176,7 +176,7 @@ class EncodedJoiners:
         if what == "join":
             asked = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
             given = self.roster.join(name, JoinRequest(**(asked if robots else {})).encode())
-            inbox = Inbox()
+            inbox = TickInbox()
             self._runners[name] = inbox, answers(*given_robots(given), inbox)
             self._deliver(self.roster.answer(name, next(self._runners[name][1])))
         elif what == "leave":

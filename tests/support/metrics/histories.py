@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.comms.packets import BROADCAST, Fate
-from swarmwire.comms.truth import Departed, Finished, Light, Static, Truth
+from swarmwire.comms.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 from tests.support.metrics.swarm.swarms import mixed, rolled
@@ -58,7 +58,7 @@ def _place(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) 
     return rolled(place_m) if boundary == "torus" else place_m
 
 
-def _links(rng: Any, of: Static, alive: Array, tick: int) -> Finished:
+def _links(rng: Any, of: Static, alive: Array, tick: int) -> ReceptionRecords:
     """Some packets of robots alive to others of their arena, sent in the last few ticks."""
     pairs = [
         (arena, a, b)
@@ -72,14 +72,16 @@ def _links(rng: Any, of: Static, alive: Array, tick: int) -> Finished:
     one, final_ns = np.ones_like(arena), tick * TICK_NS - rng.integers(0, TICK_NS, len(arena))
     sent_ns = final_ns - rng.integers(1, 3 * TICK_NS, len(arena))
     fate, size = rng.choice(np.array(FATES, np.int64), len(arena)), rng.integers(8, 90, len(arena))
-    return Finished(arena, sender, receiver, one, -one, tick * one, sent_ns, sent_ns, final_ns, fate, size, one)
+    return ReceptionRecords(arena, sender, receiver, one, -one, tick * one, sent_ns, sent_ns, final_ns, fate, size, one)
 
 
-def _packets(rng: Any, alive: Array, tick: int) -> Departed:
+def _packets(rng: Any, alive: Array, tick: int) -> TransmissionRecords:
     arena, sender = (column.copy() for column in np.argwhere(alive & (rng.random(alive.shape) < 0.4)).T)
     one, on_ns = np.ones_like(arena), tick * TICK_NS - rng.integers(0, TICK_NS, len(arena))
     off_ns = on_ns + rng.integers(1, 2 * TICK_NS, len(arena))
-    return Departed(arena, sender, BROADCAST * one, tick * one, one, 0 * one, Fate.RECEIVED + 0 * one, on_ns, off_ns)
+    return TransmissionRecords(
+        arena, sender, BROADCAST * one, tick * one, one, 0 * one, Fate.RECEIVED + 0 * one, on_ns, off_ns
+    )
 
 
 def _edges(of: Static, place_m: Array, alive: Array) -> Array:
@@ -142,7 +144,11 @@ def at_rest(robots: int, alive: bool) -> History:
     """Robots in the middle that do nothing, say nothing and hear nothing, 1 m from a light."""
     of = static(robots, lights=[[Light(1.0, 0.0, 1.0)]])
     fields: dict[str, Any] = {"alive": np.full(robots, alive), "edges": np.zeros((0, 2), np.int64)}
-    fields |= {"finished": no_rows(Finished), "departed": no_rows(Departed), "tally": tally({}, sent=0)}
+    fields |= {
+        "finished": no_rows(ReceptionRecords),
+        "departed": no_rows(TransmissionRecords),
+        "tally": tally({}, sent=0),
+    }
     return History(of, tuple(truth(of, tick, **fields) for tick in range(TICKS)))
 
 
@@ -265,7 +271,7 @@ def and_then_nothing(history: History) -> History:
     own: dict[str, Any] = {"tick": last.tick + 1, "time_ns": last.time_ns + TICK_NS}
     own["contact_onsets"] = 0 * last.contact_onsets
     if last.tally is not None:
-        own |= {"finished": no_rows(Finished), "departed": no_rows(Departed)}
+        own |= {"finished": no_rows(ReceptionRecords), "departed": no_rows(TransmissionRecords)}
         own["tally"] = tally(*[{}] * history.static.arenas, sent=0)
     return replace(history, ticks=(*history.ticks, replace(last, **own)))
 

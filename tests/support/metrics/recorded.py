@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Finished
+from swarmwire.comms.truth import ReceptionRecords
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import record_summary, recorders
 from tests.support.clocks import StillClock
@@ -51,4 +51,6 @@ def links(
         np.array(c, np.int64).ravel() for c in columns
     )
     sent, final, size = on_air - 1, on_air + 1000, np.full(len(sender), 10)
-    return Finished(arena, sender, receiver, receivers, to, sequence, sent, on_air, final, fate, size, tag, rssi_dbm)
+    return ReceptionRecords(
+        arena, sender, receiver, receivers, to, sequence, sent, on_air, final, fate, size, tag, rssi_dbm
+    )

@@ -7,7 +7,16 @@ import numpy as np
 
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.packets import BROADCAST, Fate
-from swarmwire.comms.truth import Departed, Finished, Group, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import (
+    Group,
+    Light,
+    Obstacle,
+    PacketCounts,
+    ReceptionRecords,
+    Static,
+    TransmissionRecords,
+    Truth,
+)
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.metrics import Metrics
 
@@ -66,22 +75,24 @@ def edges(*pairs: tuple[int, int]) -> np.ndarray[Any, Any]:
     return np.array(pairs, np.int64).reshape(-1, 2)
 
 
-def tally(*fates: Mapping[Fate, int], sent: int = 1) -> Tally:
+def tally(*fates: Mapping[Fate, int], sent: int = 1) -> PacketCounts:
     """A row per mapping; every fate but out_of_range counts as in range."""
     table = np.zeros((len(fates), len(Fate)), np.int64)
     for arena, counts in enumerate(fates):
         for fate, count in counts.items():
             table[arena, fate] = count
     intended = table.sum(axis=1)
-    return Tally(np.full(len(fates), sent, np.int64), intended, intended - table[:, Fate.OUT_OF_RANGE], table)
+    return PacketCounts(np.full(len(fates), sent, np.int64), intended, intended - table[:, Fate.OUT_OF_RANGE], table)
 
 
 def finished(
     sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.RECEIVED, arena: int = 0
-) -> Finished:
+) -> ReceptionRecords:
     sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
     zero = np.zeros(len(sent), np.int64)
-    return Finished(zero + arena, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero)
+    return ReceptionRecords(
+        zero + arena, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero
+    )
 
 
 def watch(of: Static, ticks: Iterable[Truth], *observers: Any) -> None:
@@ -118,7 +129,7 @@ def departed(
     to: int = BROADCAST,
     sequence: int = 0,
     arena: int = 0,
-) -> Departed:
+) -> TransmissionRecords:
     """A packet of each of these senders."""
     columns = (arena, sender, to, sequence, intended, out_of_range, int(fate), on_air_at_ns, off_air_at_ns)
-    return Departed(*(np.array(column, np.int64) for column in np.broadcast_arrays(*columns)))
+    return TransmissionRecords(*(np.array(column, np.int64) for column in np.broadcast_arrays(*columns)))

@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import Light, Proximity, Scan
-from swarmwire.comms.bodies.sensor_specs import Battery, GroundColour
+from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import BatterySpec, GroundSpec
 from tests.support.robots.rig import Fields
 
 _SHARE = st.floats(0.0, 1.0)
@@ -32,25 +32,25 @@ def _numbers(**of: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
 
 def _proximity(body: Body) -> st.SearchStrategy[Fields]:
     sheet = body.sensors["proximity"]
-    assert isinstance(sheet, Proximity)
+    assert isinstance(sheet, ProximitySpec)
     return _wide("proximity.value", len(sheet.angles_deg), _SHARE)
 
 
 def _light(body: Body) -> st.SearchStrategy[Fields]:
     sheet = body.sensors["light"]
-    assert isinstance(sheet, Light)
+    assert isinstance(sheet, LightSpec)
     return _wide("light.value", len(sheet.angles_deg), _SHARE)
 
 
 def _ground(body: Body) -> st.SearchStrategy[Fields]:
     sheet = body.sensors["ground"]
-    assert isinstance(sheet, GroundColour)
+    assert isinstance(sheet, GroundSpec)
     return _wide("ground.shade", len(sheet.points_m), _SHARE)
 
 
 def _scan(body: Body) -> st.SearchStrategy[Fields]:
     sheet = body.sensors["scan"]
-    assert isinstance(sheet, Scan)
+    assert isinstance(sheet, ScanSpec)
     ranges = st.one_of(st.floats(sheet.range_min_m, 0.999 * sheet.range_m), st.just(inf))
     return _wide("scan.range_m", sheet.rays, ranges)
 
@@ -62,7 +62,7 @@ def _imu(body: Body) -> st.SearchStrategy[Fields]:
 
 def _battery(body: Body) -> st.SearchStrategy[Fields]:
     sheet = body.sensors["battery"]
-    assert isinstance(sheet, Battery)
+    assert isinstance(sheet, BatterySpec)
 
     def fields(charge: float) -> Fields:
         voltage_v = sheet.empty_v + charge * (sheet.full_v - sheet.empty_v)

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.runners.raw_runner import RawRunner, Says, honestly
 
@@ -47,7 +47,7 @@ class Played:
         self.at = endpoints[0], run_id
         self.runners["honest"] = RawRunner(*self.at, "honest", ROBOTS)
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         if change.what == "joined" and change.runner == "honest":
             self.runners["odd"] = RawRunner(*self.at, "odd", ROBOTS, self.says, self.early)
 
@@ -62,5 +62,5 @@ class Played:
         assert backend is not None
         self.counted.append(Counter(backend.counts()))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}

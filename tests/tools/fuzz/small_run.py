@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.host import Host, layout_of
+from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, Notes, Readings, Values
+from swarmwire.comms.tick_io import Actions, ActuatorCommands, Notes, Readings, Values
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
@@ -19,7 +19,7 @@ from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.backends.allocation import split, whole
-from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
@@ -88,8 +88,8 @@ class SmallRun:
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.truths: list[Truth] = []
         self.given: Actions | None = None  # in place of the agents' actions
-        self._hosts = dict(zip(RUNNERS, map(Host, self.parts), strict=True))
-        self._roster = joined(Lockstep(list(self.parts), terms=Terms(memory=self.layouts)))
+        self._hosts = dict(zip(RUNNERS, map(AgentExecutor, self.parts), strict=True))
+        self._roster = joined(Lockstep(list(self.parts), terms=JoinPolicy(memory=self.layouts)))
 
     def do(self, actions: Actions) -> Truth:
         """A tick with these actions."""
@@ -141,7 +141,7 @@ def with_all(actions: Actions) -> Actions:
     """The actions with a note, a custom actuator and a custom value."""
     one = actions.rows[:1]
     note = Notes(one, np.zeros(1, np.int64), ("searching",))
-    own = Actuations(one, np.zeros(1, np.int64), np.array([0.5]))
+    own = ActuatorCommands(one, np.zeros(1, np.int64), np.array([0.5]))
     return replace(actions, notes=note, own=own, values=Values(one, np.array([1.5])))
 
 

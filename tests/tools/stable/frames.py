@@ -9,12 +9,12 @@ from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.run_views import Glimpse, Scene
-from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Values
-from swarmwire.comms.truth import Finished, Happened, Tally, Truth
+from swarmwire.comms.run_views import ObservedRun, ObservedTick
+from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Values
+from swarmwire.comms.truth import EventRecord, PacketCounts, ReceptionRecords, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
-from swarmwire.comms.wire.join import JoinRequest, Offer, OfferedGroup
+from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.observer_frames import OBSERVED_VERSION, encode_scene, encode_truth
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_packets, encode_sent, encode_tick
@@ -69,7 +69,7 @@ def text() -> str:
         "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
         "packets": _frame(encode_packets(1, 1, 1, _received(), TxStatuses(*_ints(3, OUTCOMES)))),
         "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
-        f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(Scene, left)) for left in LEFT_OUT)),
+        f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(ObservedRun, left)) for left in LEFT_OUT)),
         "message, on air": f"{Told(x_m=1.5, count=3, place=-2.25, turns=-1).encode().hex(' ')}\n",
         f"truth, version {OBSERVED_VERSION}": _frame(encode_truth(_glimpse())),
     }
@@ -124,7 +124,7 @@ def _actions() -> Actions:
         SentPackets(*_ints(2, SENT), payloads, _ints(SENT)),
         Notes(*_ints(2, NOTED), ("",)),
         LedChanges(*_ints(3, SWITCHED)),
-        Actuations(*_ints(2, ACTUATED), _floats(ACTUATED)),
+        ActuatorCommands(*_ints(2, ACTUATED), _floats(ACTUATED)),
         Values(_ints(TOLD), _floats(TOLD)),
     )
 
@@ -139,11 +139,11 @@ def _memory() -> Memory:
     return {"GROUP": GroupMemory(_ints(TOLD_OF), {"COLUMN": _floats(TOLD_OF, WIDE)})}
 
 
-def _offer(real_time: float | None) -> Offer:
-    return Offer("RUN", "s", "a", "1", 1, real_time, (OfferedGroup("g", "a", "a", 1, ("g-0",)),))
+def _offer(real_time: float | None) -> SessionInfo:
+    return SessionInfo("RUN", "s", "a", "1", 1, real_time, (GroupInfo("g", "a", "a", 1, ("g-0",)),))
 
 
-def _glimpse() -> Glimpse:
+def _glimpse() -> ObservedTick:
     rows = ARENAS * ROBOTS
     flags = np.ones(rows, np.bool_)
     truth = Truth(
@@ -160,9 +160,9 @@ def _glimpse() -> Glimpse:
         readings=_readings(),
         contact_onsets=_ints(ARENAS, 2),
         edges=_ints(EDGES, 2),
-        tally=Tally(*_ints(3, ARENAS), _ints(ARENAS, len(Fate))),
-        finished=Finished(*_ints(12, LINKS), rssi_dbm=_floats(LINKS)),
-        events=(Happened(1, 0.5, "", True, flags),),
+        tally=PacketCounts(*_ints(3, ARENAS), _ints(ARENAS, len(Fate))),
+        finished=ReceptionRecords(*_ints(12, LINKS), rssi_dbm=_floats(LINKS)),
+        events=(EventRecord(1, 0.5, "", True, flags),),
         movable=_floats(ARENAS, MOVABLE, 3),
     )
-    return Glimpse(truth, 1, 1, _floats(SERIES, ARENAS))
+    return ObservedTick(truth, 1, 1, _floats(SERIES, ARENAS))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import AgentFailed
@@ -24,7 +24,7 @@ FLOATING = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "ma
 def acted(kind: type[Any], **spec: Any) -> Actions:
     """What three robots of this body do in their first step."""
     body = body_from({"like": "epuck", "name": "mine", **spec}, "mine.toml")
-    host = hosted(replace(group("", ROWS), body=body), kind)
+    host = agent_group(replace(group("", ROWS), body=body), kind)
     return host.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
@@ -102,7 +102,7 @@ def test_what_a_body_cannot_do_is_said_clearly(kind: type[Any], fault: str) -> N
 def test_a_body_without_leds_says_so() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
     with pytest.raises(AgentFailed, match="NotFitted: the body epuck has no LEDs"):
-        hosted(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
+        agent_group(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
             (0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES)
         )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, Robot
-from swarmwire.agent.host import Host, _Single
+from swarmwire.agent.host import AgentExecutor, _Single
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
@@ -18,8 +18,8 @@ def numbers(sent: SentPackets) -> list[tuple[int, float]]:
     return list(zip(sent.sender.tolist(), told, strict=True))
 
 
-def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> Host:
-    host = Host(assignment(group(spec(agent), rows, name)))
+def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
+    host = AgentExecutor(assignment(group(spec(agent), rows, name)))
     host.act(tick, {name: readings(tick, rows)}, SILENCE)
     return host
 
@@ -45,7 +45,7 @@ def test_packets_wait_for_the_step_of_those_that_hear_only_then() -> None:
 
 
 def test_whoever_has_not_stepped_yet_hears_in_its_first_step() -> None:
-    host = Host(assignment(group(spec("Echo"), [0, 1])))
+    host = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
     host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert len(host.on_receive(0, 10)) == 0
     assert numbers(host.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
@@ -61,7 +61,7 @@ def test_the_dead_hear_nothing_and_what_waits_for_them_is_lost() -> None:
 
 
 def test_packets_of_a_group_that_does_not_act_now_wait_for_it() -> None:
-    host = Host(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
+    host = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
     host.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
     host.act(0, {"often": readings(0, [0])}, SILENCE)
     assert numbers(host.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]

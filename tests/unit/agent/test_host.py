@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
-from swarmwire.agent.host import Host
+from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
@@ -254,8 +254,8 @@ def test_a_robot_that_comes_back_starts_afresh_and_the_others_keep_their_memory(
 
 @pytest.mark.parametrize("kind", ["Counter", "VectorCounter"])
 def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
-    together = Host(assignment(group(spec(kind), [2, 5])))
-    alone = [Host(assignment(group(spec(kind), [row]))) for row in (2, 5)]
+    together = AgentExecutor(assignment(group(spec(kind), [2, 5])))
+    alone = [AgentExecutor(assignment(group(spec(kind), [row]))) for row in (2, 5)]
     for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
         at_once = together.act(tick, one_group(tick, rows), SILENCE)
         each = [

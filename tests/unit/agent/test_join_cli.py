@@ -9,12 +9,12 @@ import pytest
 from swarmwire.agent import joining
 from swarmwire.agent.joining import Joining
 from swarmwire.agent.on_robot.settings import INTERRUPTED
-from swarmwire.agent.runner import Ended, Inbox
+from swarmwire.agent.runner import Ended, TickInbox
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIG_IGN, signal.default_int_handler], ids=["in background", "in front"])
 def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, capsys, interrupt: Any) -> None:
-    def killed(_joining: Joining, inbox: Inbox, _say: Any) -> Ended:
+    def killed(_joining: Joining, inbox: TickInbox, _say: Any) -> Ended:
         os.kill(os.getpid(), signal.SIGTERM)
         return Ended("left" if inbox._arrived.get(timeout=10.0) is None else "gone")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.host import Host, layout_of
+from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
@@ -29,7 +29,7 @@ def acting(tick: int) -> list[int]:
     return [row for row in ROWS if (row + tick) % 4]
 
 
-def act(host: Host, tick: int) -> Actions:
+def act(host: AgentExecutor, tick: int) -> Actions:
     return host.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), told(tick))
 
 
@@ -37,7 +37,7 @@ def ids(actions: Actions) -> list[int]:
     return [] if actions.sent.tx_status_id is None else actions.sent.tx_status_id.tolist()
 
 
-def over_the_wire(host: Host, name: str) -> Memory:
+def over_the_wire(host: AgentExecutor, name: str) -> Memory:
     layouts = {"flock": layout_of(load_agent(spec(name)))}
     return decode_memory(frames.decode(encode_memory(host.memory(["flock"]))), layouts)
 
@@ -45,10 +45,10 @@ def over_the_wire(host: Host, name: str) -> Memory:
 @pytest.mark.parametrize("name", ["VectorInsisting", "VectorCounter"])
 @pytest.mark.parametrize("at", range(1, 7))
 def test_another_host_goes_on_as_the_first_would_have(name: str, at: int) -> None:
-    first = Host(WHOLE[name])
+    first = AgentExecutor(WHOLE[name])
     for tick in range(at):
         act(first, tick)
-    second = Host(WHOLE[name], over_the_wire(first, name))
+    second = AgentExecutor(WHOLE[name], over_the_wire(first, name))
     for tick in range(at, at + 6):
         got, expected = act(second, tick), act(first, tick)
         assert plain(got) == plain(expected)
@@ -56,11 +56,11 @@ def test_another_host_goes_on_as_the_first_would_have(name: str, at: int) -> Non
 
 
 def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> None:
-    first = Host(WHOLE["VectorCounter"])
+    first = AgentExecutor(WHOLE["VectorCounter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
     kept = {"flock": first.memory(["flock"])["flock"].of(np.array([1, 5]))}
-    second = Host(WHOLE["VectorCounter"], kept)
+    second = AgentExecutor(WHOLE["VectorCounter"], kept)
     got = second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES))
     assert dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True)) == {
         0: 1.0,
@@ -72,20 +72,20 @@ def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> No
 
 
 def test_a_robot_that_did_not_act_last_starts_afresh_when_it_does() -> None:
-    first = Host(WHOLE["VectorCounter"])
+    first = AgentExecutor(WHOLE["VectorCounter"])
     first.act(0, one_group(0, ROWS), ReceivedPackets.none(MEASURES))
     first.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES))
-    got = Host(WHOLE["VectorCounter"], first.memory(["flock"])).act(
+    got = AgentExecutor(WHOLE["VectorCounter"], first.memory(["flock"])).act(
         2, one_group(2, [1, 2]), ReceivedPackets.none(MEASURES)
     )
     assert got.linear_mps.tolist() == [3.0, 1.0]
 
 
 def test_an_agent_of_one_robot_starts_afresh() -> None:
-    first = Host(WHOLE["Counter"])
+    first = AgentExecutor(WHOLE["Counter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
-    second = Host(WHOLE["Counter"], over_the_wire(first, "Counter"))
+    second = AgentExecutor(WHOLE["Counter"], over_the_wire(first, "Counter"))
     assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0] * len(ROWS)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets, SentPackets
 from tests.support.agent.hosts import group, readings, received_from
@@ -19,7 +19,7 @@ NOTHING: ReceivedPackets = received_from(SentPackets.none(), [])
 
 
 def failure(kind: AgentClass, steps: int = 1) -> str:
-    host = hosted(group("", [0, 1, 2]), kind)
+    host = agent_group(group("", [0, 1, 2]), kind)
     for _ in range(steps - 1):
         host.act(TIME, readings(3, [0, 1, 2]), NOTHING)
     with pytest.raises(AgentFailed) as caught:

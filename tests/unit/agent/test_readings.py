@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from swarmwire.agent import Agent, VectorAgent
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.bodies.sensor_specs import Battery, Imu
+from swarmwire.comms.bodies.sensor_specs import BatterySpec, ImuSpec
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from tests.support.agent.hosts import MEASURES, group, readings
@@ -148,8 +148,8 @@ BODY = replace(
     readings={
         **EPUCK.readings,
         "gas": CustomSensorSpec(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
-        "imu": Imu(),
-        "battery": Battery(capacity_wh=1.0),
+        "imu": ImuSpec(),
+        "battery": BatterySpec(capacity_wh=1.0),
     },
     actuators={"horn": CustomActuatorSpec("a:C", {}, 1), "arm": CustomActuatorSpec("a:D", {}, 3)},
 )
@@ -252,7 +252,7 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
                 robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
 
         rows = [2, 3, 5]
-        host = hosted(replace(group("", rows), body=BODY), Some)
+        host = agent_group(replace(group("", rows), body=BODY), Some)
         own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).own
         return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
 

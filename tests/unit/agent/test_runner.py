@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from swarmwire.agent import runner
-from swarmwire.agent.runner import PLAIN, Inbox, given_robots
+from swarmwire.agent.runner import PLAIN, TickInbox, given_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
@@ -31,8 +31,8 @@ class Sample:
     payload: Bytes
 
 
-def inbox_of(*arrived: Any) -> Inbox:
-    inbox = Inbox()
+def inbox_of(*arrived: Any) -> TickInbox:
+    inbox = TickInbox()
     for item in arrived:
         inbox._arrived.put(item if isinstance(item, bool) else Sample(Bytes(item)))
     return inbox
@@ -182,7 +182,7 @@ def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
     monkeypatch.setattr(runner, "JOIN_S", 0.04)
     monkeypatch.setattr(runner, "POLL_S", 0.01)
     session = Deaf(received)
-    watched = runner._watched_world(session, Keys("run1"), Inbox())  # pyright: ignore[reportArgumentType]
+    watched = runner._watched_world(session, Keys("run1"), TickInbox())  # pyright: ignore[reportArgumentType]
     assert (watched is None) == (received > 4)
     assert (session.declared, session.undeclared) == (declared, undeclared)
 

@@ -20,7 +20,7 @@ from swarmwire.agent import (
     column,
     per_robot,
 )
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of
@@ -148,7 +148,7 @@ class Lanes(VectorAgent):
 
 
 def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
-    host = hosted(group("", rows, params=params), Lanes)
+    host = agent_group(group("", rows, params=params), Lanes)
     actions = host.act((0, 0, 10**8), readings(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
     assert len(actions.linear_mps) == len(acting)
     return actions.angular_radps.tolist()

@@ -14,7 +14,7 @@ from swarmwire.agent.step_context import OUTCOMES
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.sensors import SENSOR_SPECS
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import FATE_NAMES
@@ -82,7 +82,7 @@ def lines_of(kind: Any) -> list[tuple[str, ...]]:
     hints = get_type_hints(kind)
     wanted: list[tuple[str, ...]] = []
     for of in fields(kind):
-        limits = limits_of(of)
+        limits = bounds_of(of)
         inner = [hint for hint in (hints[of.name], *get_args(hints[of.name])) if is_dataclass(hint)]
         default = "" if of.default in (MISSING, None) or inner else json.dumps(of.default)
         wanted.append((of.name, limits.help, limits.unit, default, *limits.choices))
@@ -149,7 +149,7 @@ def test_a_body_tells_the_figures_of_its_sheet(name):
         *((f"sense: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
     ]:
         plain = [of for of in fields(sheet) if not is_dataclass(getattr(sheet, of.name))]
-        figures = [(of.name, limits_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
+        figures = [(of.name, bounds_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
         assert_tells(text[text.index(f"\n{title}\n") :], figures)
 
 

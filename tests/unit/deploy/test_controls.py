@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.controls import LOOK_NS, Controls
@@ -231,7 +231,7 @@ class Asker:
         if self.plan:
             self.plan.pop(0)()
 
-    def end(self, last: Tally | None) -> dict[str, object]:
+    def end(self, last: PacketCounts | None) -> dict[str, object]:
         return {}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from tests.support.deploy.layouts import run_spread
 
 PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
@@ -23,7 +23,7 @@ class StatesSeen:
     def see(self, truth: Truth) -> None:
         self.ticks.append([truth.states[code] for code in truth.state])
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 

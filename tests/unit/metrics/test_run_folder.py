@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.record import recorders, table_writer, tick_recorder
 from swarmwire.metrics.registry import standard
 from swarmwire.metrics.run_folder import SUMMARY_KINDS, RunFolder
@@ -27,7 +27,7 @@ def recorded(request, tmp_path, monkeypatch):
     if request.param == "killed":
         monkeypatch.setattr(table_writer, "join_parts", lambda *_: None)
     monkeypatch.setattr(tick_recorder, "MAX_TICKS", 4)
-    of, kill = static(3, arenas=2), Happened(0, 0.0, "kill", False, np.array([False, True, False] * 2))
+    of, kill = static(3, arenas=2), EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * 2))
     seen = list(wandering(of, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))
     record(tmp_path, of, seen, packets=1.0)
     assert (tmp_path / "ticks").is_dir() == (request.param == "killed")

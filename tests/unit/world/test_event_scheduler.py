@@ -11,7 +11,7 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
@@ -29,7 +29,7 @@ class Watch:
     def see(self, truth: Truth) -> None:
         self.seen.append(truth)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 

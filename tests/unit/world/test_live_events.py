@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.robot_events import Kill
-from swarmwire.world.live_events import MAX_WAITING, Intervention, Interventions
+from swarmwire.world.live_events import MAX_WAITING, LiveEvent, LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.file import scenario_from
@@ -23,9 +23,9 @@ OF_SCENARIO = [
 ]
 
 
-def door(**more: Any) -> Interventions:
+def door(**more: Any) -> LiveEvents:
     scenario = scenario_from(changed("events", OF_SCENARIO), "s.toml")
-    return Interventions(scenario, bodies_of(scenario, "s.toml"), **more)
+    return LiveEvents(scenario, bodies_of(scenario, "s.toml"), **more)
 
 
 def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_next_tick():
@@ -37,7 +37,7 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
     assert [number for number, _ in taken] == [2, 3]
     assert isinstance(taken[0][1], Kill)
     assert taken[0][1].at_s == 0.4
-    assert kept == [Intervention(4, 2, KILL), Intervention(4, 3, SET)]
+    assert kept == [LiveEvent(4, 2, KILL), LiveEvent(4, 3, SET)]
     assert given.take(5, RATE_HZ) == []
 
 
@@ -120,7 +120,7 @@ def test_a_number_that_is_set_takes_the_place_of_what_it_was_set_to_before():
 def test_what_contradicts_a_number_that_was_changed_is_refused():
     bursts = {"good_s": 1.0, "bad_s": 1.0, "loss_good": 0.1, "loss_bad": 0.9}
     scenario = scenario_from(changed("radio", {"range_m": 2.0, "bursts": bursts}), "s.toml")
-    given = Interventions(scenario, bodies_of(scenario, "s.toml"))
+    given = LiveEvents(scenario, bodies_of(scenario, "s.toml"))
     assert scenario.radio
     assert scenario.radio.bursts
     worse = given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
@@ -132,7 +132,7 @@ def test_what_contradicts_a_number_that_was_changed_is_refused():
 
 
 def test_what_cannot_be_recorded_does_not_happen():
-    def full(_: Intervention) -> None:
+    def full(_: LiveEvent) -> None:
         raise OSError("no room")
 
     given = door(keep=full)
@@ -144,7 +144,7 @@ def test_what_cannot_be_recorded_does_not_happen():
 
 
 def test_an_event_whose_end_cannot_be_recorded_goes_on():
-    def ends_do_not_fit(given: Intervention) -> None:
+    def ends_do_not_fit(given: LiveEvent) -> None:
         if given.table is None:
             raise OSError("no room")
 
@@ -167,7 +167,7 @@ def test_a_run_that_is_paused_lets_only_so_many_wait():
 
 
 def test_a_repetition_takes_what_was_done_and_nothing_new():
-    done = [Intervention(3, 2, KILL), Intervention(3, 3, SET), Intervention(7, 2, None)]
+    done = [LiveEvent(3, 2, KILL), LiveEvent(3, 3, SET), LiveEvent(7, 2, None)]
     given = door(replayed=done)
     assert {tick: [number for number, _ in given.take(tick, RATE_HZ)] for tick in (2, 3, 7)} == {
         2: [],
@@ -178,14 +178,14 @@ def test_a_repetition_takes_what_was_done_and_nothing_new():
         with pytest.raises(BadInput, match="the repetition"):
             refused()
     with pytest.raises(BadInput, match="^event 2 that was given: robots: is missing"):
-        door(replayed=[Intervention(0, 2, {"do": "kill"})])
+        door(replayed=[LiveEvent(0, 2, {"do": "kill"})])
     with pytest.raises(BadInput, match="^event 1 that was given: expected a number that no other event has"):
-        door(replayed=[Intervention(0, 1, KILL)])
+        door(replayed=[LiveEvent(0, 1, KILL)])
 
 
 def test_an_event_that_is_given_begins_and_ends_in_the_run_at_the_ticks_it_was_given_and_ended():
     scenario = posed([[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]])
-    given, watch = Interventions(scenario, bodies_of(scenario, "s.toml")), Watch()
+    given, watch = LiveEvents(scenario, bodies_of(scenario, "s.toml")), Watch()
     loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], interventions=given)
     loop.run(2)
     number = given.give({"do": "kill", "robots": {"names": ["a-1"]}})

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import Put, SubtickMedium
+from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.file import scenario_from
@@ -50,7 +50,7 @@ def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int,
 def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
     medium = in_time(Radio(99.0, latency_s=0.002))
     medium.begin(0)
-    medium.send(Put(10 * MS, None, packet(0)))
+    medium.send(SubtickPackets(10 * MS, None, packet(0)))
     assert received_at(medium.advance(12 * MS)[0]) == []
     assert received_at(medium.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
     assert received_at(medium.advance(13 * MS)[0]) == []
@@ -64,21 +64,21 @@ def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
 def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
     medium = in_time(Radio(99.0, send_offset=0.05))
     medium.begin(0)
-    medium.send(Put(1 * MS, 0, packet(0)))
-    medium.send(Put(2 * MS, None, packet(0)))
-    medium.send(Put(60 * MS, 0, packet(2)))  # too late for its turn: at once
+    medium.send(SubtickPackets(1 * MS, 0, packet(0)))
+    medium.send(SubtickPackets(2 * MS, None, packet(0)))
+    medium.send(SubtickPackets(60 * MS, 0, packet(2)))  # too late for its turn: at once
     assert received_at(medium.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
 
 
 def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
     medium = in_time(Radio(99.0, send_offset=0.25))
     medium.begin(0)
-    medium.send(Put(1 * MS, 0, packet(0)))
-    medium.send(Put(2 * MS, 0, packet(1)))
+    medium.send(SubtickPackets(1 * MS, 0, packet(0)))
+    medium.send(SubtickPackets(2 * MS, 0, packet(1)))
     for tick in (1, 2):
         assert not len(medium.begin(tick * TICK_NS)[0].received)
     assert received_at(medium.begin(3 * TICK_NS)[0].received) == [(0, 250 * MS)]
-    medium.send(Put(301 * MS, 3, packet(3)))
+    medium.send(SubtickPackets(301 * MS, 3, packet(3)))
     medium.end()
     assert medium._medium.end().intended.sum() == 3
 
@@ -95,7 +95,7 @@ def test_fates_add_up_and_subticks_change_nothing(radio: Radio, seed: int, subti
 def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
     rng = np.random.default_rng(seed)
     medium, robots = in_time(radio, 5, 2), 5
-    received, tallies = list[Any](), list[Tally]()
+    received, tallies = list[Any](), list[PacketCounts]()
 
     def keep(told: ReceivedPackets) -> None:
         columns = told.receiver, told.sender, told.sequence, told.received_at_ns
@@ -115,7 +115,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
             if sender < 0:
                 keep(medium.advance(at_ns)[0])
             else:
-                medium.send(Put(at_ns, None if at_once else tick, packet(sender)))
+                medium.send(SubtickPackets(at_ns, None if at_once else tick, packet(sender)))
         keep(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
         if one_leaves and tick == 2:
             over = np.array([False, True])
@@ -146,9 +146,9 @@ class Sender:
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
-        medium.send(Put(start_ns + 5 * MS, None, packet(0)))
+        medium.send(SubtickPackets(start_ns + 5 * MS, None, packet(0)))
         wrong = packet(0)
-        medium.send(Put(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
+        medium.send(SubtickPackets(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
         self.told += received_at(medium.advance(start_ns + 50 * MS)[0])
         return Actions.joined([])
 
@@ -163,7 +163,7 @@ class Tallies:
     """An observer that adds up what it is told."""
 
     def __init__(self) -> None:
-        self.tallies: list[Tally] = []
+        self.tallies: list[PacketCounts] = []
 
     def begin(self, static: Static) -> None:
         """Nothing yet."""
@@ -174,7 +174,7 @@ class Tallies:
         self.tallies.append(truth.tally)
         assert truth.tally.fates[:, truth.finished.fate].any() or not len(truth.finished.fate)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 
@@ -211,8 +211,8 @@ class FromBoth(Sender):
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
         for sender in (0, 15) if tick < 3 else (0,):
-            medium.send(Put(start_ns + 5 * MS, None, packet(sender)))
-            medium.send(Put(start_ns + 5 * MS, tick, packet(sender + 1)))
+            medium.send(SubtickPackets(start_ns + 5 * MS, None, packet(sender)))
+            medium.send(SubtickPackets(start_ns + 5 * MS, tick, packet(sender + 1)))
         medium.advance(start_ns + 99 * MS)
         return Actions.joined([])
 

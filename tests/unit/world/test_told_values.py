@@ -1,7 +1,7 @@
 import numpy as np
 
 from swarmwire.comms.tick_io import NO_VALUES, Values
-from swarmwire.world.annotations import ToldValues
+from swarmwire.world.annotations import LatestValues
 
 ALIVE = np.ones(4, np.bool_)
 
@@ -11,13 +11,13 @@ def told(*numbers: tuple[int, float]) -> Values:
     return Values(np.array(rows, np.int64), np.array(value, np.float64))
 
 
-def shown(values: ToldValues) -> list[float | None]:
+def shown(values: LatestValues) -> list[float | None]:
     assert values.value is not None
     return [None if np.isnan(value) else float(value) for value in values.value]
 
 
 def test_a_number_holds_until_the_next_is_told() -> None:
-    values = ToldValues()
+    values = LatestValues()
     values.take(NO_VALUES, ALIVE)
     assert values.value is None
     values.take(told((1, 2.5), (3, -1.0)), ALIVE)
@@ -27,13 +27,13 @@ def test_a_number_holds_until_the_next_is_told() -> None:
 
 
 def test_of_two_numbers_of_a_robot_the_later_counts() -> None:
-    values = ToldValues()
+    values = LatestValues()
     values.take(Values.joined([told((2, 1.0)), NO_VALUES, told((0, 5.0), (2, 2.0))]), ALIVE)
     assert shown(values) == [5.0, None, 2.0, None]
 
 
 def test_the_dead_tell_nothing_and_the_revived_start_afresh() -> None:
-    values, dead = ToldValues(), ALIVE.copy()
+    values, dead = LatestValues(), ALIVE.copy()
     dead[2] = False
     values.forget(~dead)
     values.take(told((2, 1.0)), dead)
@@ -45,7 +45,7 @@ def test_the_dead_tell_nothing_and_the_revived_start_afresh() -> None:
 
 
 def test_what_was_shown_is_not_written_to() -> None:
-    values = ToldValues()
+    values = LatestValues()
     values.take(told((1, 1.0)), ALIVE)
     before = values.value
     values.take(told((1, 2.0)), ALIVE)

@@ -6,7 +6,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.tick_io import MAX_STATES, Notes, Values
 
 
-class ToldValues:
+class LatestValues:
     """The number that each robot told last. `value` is replaced when it changes, never written to.
 
     Attributes:

@@ -8,19 +8,19 @@ import numpy as np
 
 from swarmwire.comms.arrays import KeyArray
 from swarmwire.comms.clock import NS_PER_S, to_ns, to_s
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.truth import Happened, Static
+from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.world.world import World
 
 RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
 
 
 @dataclass
-class Course:
+class EventProgress:
     """How far the events of a run have come, by number; the loop writes it, others may look."""
 
     begun: dict[int, int] = field(default_factory=dict[int, int])  # the tick at whose start each one began
@@ -28,7 +28,7 @@ class Course:
     radio: Radio | None = None  # as events have made it by now
 
 
-class Events:
+class EventScheduler:
     """The events of a run in order of time; at equal times those that end come first, then by number.
 
     The number of an event is its place in the scenario; those that are given while the run goes on have higher ones.
@@ -40,16 +40,16 @@ class Events:
         static: Static,
         keys: KeyArray,
         radio: Radio | None = None,
-        course: Course | None = None,
+        course: EventProgress | None = None,
     ) -> None:
         """`radio` is the scenario's; `course` is told how far the events have come."""
         self._events = dict(enumerate(events))
-        self._course, self._rate_hz = course or Course(), static.rate_hz
+        self._course, self._rate_hz = course or EventProgress(), static.rate_hz
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
         rows = len(keys) * static.robots
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
         self._radio = self._course.radio = radio
-        self._conditions = Conditions(self._swarm.rows)
+        self._conditions = ActiveEffects(self._swarm.rows)
         self._evolving: list[int] = []  # numbers of events that go on changing things
         self._coming: list[tuple[int, bool, int]] = []  # in order: time in ns, whether it begins, number
         for serial, event in self._events.items():
@@ -66,9 +66,9 @@ class Events:
         if serial in self._course.begun and serial not in self._course.over:
             insort(self._coming, (start_ns, False, serial))
 
-    def apply(self, start_ns: int, world: World, medium: RadioMedium | None) -> tuple[Happened, ...]:
+    def apply(self, start_ns: int, world: World, medium: RadioMedium | None) -> tuple[EventRecord, ...]:
         """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
-        happened: list[Happened] = []
+        happened: list[EventRecord] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
             happened.extend(self._run_down(start_ns, world))
         if self._evolving or (self._coming and self._coming[0][0] <= start_ns):
@@ -100,7 +100,7 @@ class Events:
         if event.lasts_s is not None:
             insort(self._coming, (at_ns + to_ns(event.lasts_s), False, serial))
 
-    def _happen(self, serial: int, begins: bool, start_ns: int, world: World) -> list[Happened]:
+    def _happen(self, serial: int, begins: bool, start_ns: int, world: World) -> list[EventRecord]:
         event, conditions = self._events[serial], self._conditions
         if begins:
             # The tick is rounded up, as its start was rounded down to a whole number of ns.
@@ -113,9 +113,9 @@ class Events:
         changed = changed & world.rows_running
         if event.evolves and not changed.any():  # what it does is yet to come
             return []
-        return [Happened(serial, event.at_s, event.do, not begins, changed, event.failing_part)]
+        return [EventRecord(serial, event.at_s, event.do, not begins, changed, event.failing_part)]
 
-    def _run_down(self, start_ns: int, world: World) -> list[Happened]:
+    def _run_down(self, start_ns: int, world: World) -> list[EventRecord]:
         """Robots whose battery is empty are dead, from the first tick on that begins so."""
         empty = world.batteries.empty
         known = self._conditions.kills.get(RUN_DOWN, np.zeros_like(empty))
@@ -123,10 +123,10 @@ class Events:
         if not fell.any():
             return []
         self._conditions.kills[RUN_DOWN] = known | fell
-        return [Happened(RUN_DOWN, to_s(start_ns), "run_down", False, fell, singly=True)]
+        return [EventRecord(RUN_DOWN, to_s(start_ns), "run_down", False, fell, singly=True)]
 
-    def _go_on(self, serial: int, start_ns: int, world: World) -> list[Happened]:
+    def _go_on(self, serial: int, start_ns: int, world: World) -> list[EventRecord]:
         event, here = self._events[serial], world.rows_running
         began, ended = (rows & here for rows in event.go_on(serial, start_ns, self._swarm, self._conditions))
         at_s, part, told = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
-        return [Happened(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]
+        return [EventRecord(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]

@@ -18,7 +18,7 @@ from swarmwire.comms.events.radio_events import Ramp
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
-from swarmwire.world.event_scheduler import Course
+from swarmwire.world.event_scheduler import EventProgress
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import Node, OneOf
 from swarmwire.world.scenario.tables import Table
@@ -72,7 +72,7 @@ MAX_WAITING = 1000  # for the next tick: a run that is paused takes none
 
 
 @dataclass(frozen=True, slots=True)
-class Intervention:
+class LiveEvent:
     """An event that begins at a tick's start because somebody wanted it, or one that ends."""
 
     tick: int
@@ -80,15 +80,15 @@ class Intervention:
     table: Mapping[str, Any] | None  # as it was given; None: the event ends
 
 
-class Interventions:
+class LiveEvents:
     """Any thread may give events and end them; the loop takes what has come, in the order in which it came."""
 
     def __init__(
         self,
         scenario: Scenario,
         bodies: Mapping[str, Body],
-        keep: Callable[[Intervention], None] = lambda _: None,
-        replayed: Sequence[Intervention] | None = None,
+        keep: Callable[[LiveEvent], None] = lambda _: None,
+        replayed: Sequence[LiveEvent] | None = None,
     ) -> None:
         """`keep` records what is taken, or raises OSError: then it is not taken, and what was to end goes on.
 
@@ -104,10 +104,10 @@ class Interventions:
         self._dropped: set[int] = (
             set()
         )  # events that ended before a tick began, or whose beginning could not be recorded
-        self._replayed: dict[int, list[Intervention]] | None = None if replayed is None else {}
+        self._replayed: dict[int, list[LiveEvent]] | None = None if replayed is None else {}
         for given in replayed or ():
             self._replay(given)
-        self.course = Course(radio=scenario.radio)
+        self.course = EventProgress(radio=scenario.radio)
 
     def give(self, table: Mapping[str, Any]) -> int:
         """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
@@ -163,7 +163,7 @@ class Interventions:
             taken: list[tuple[int, Event | None]] = []
             for number, table in due:
                 try:
-                    self._keep(Intervention(tick, number, table))
+                    self._keep(LiveEvent(tick, number, table))
                 except OSError:  # what is not on record would make the run one that cannot be repeated
                     if table is not None:  # else the event goes on
                         self._dropped.add(number)
@@ -233,7 +233,7 @@ class Interventions:
         else:
             self._waiting.append((number, None))
 
-    def _replay(self, given: Intervention) -> None:
+    def _replay(self, given: LiveEvent) -> None:
         assert self._replayed is not None
         if given.table is not None:
             where = f"event {given.number} that was given"

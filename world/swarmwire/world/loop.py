@@ -11,11 +11,11 @@ from swarmwire.comms.events.event import Event
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.radio.results import News
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import Static, Tally, Truth
-from swarmwire.world.event_scheduler import Events
-from swarmwire.world.live_events import Interventions
+from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.world.event_scheduler import EventScheduler
+from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
@@ -78,10 +78,10 @@ class Loop:
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
         stop_conditions: StopConditions | None = None,
-        interventions: Interventions | None = None,
+        interventions: LiveEvents | None = None,
         timed: TimedBackend | None = None,
     ) -> None:
-        """`stop_conditions` are asked after each tick, once observers saw it; without them no arena ends before the run.
+        """`stop_conditions` are asked after each tick, once observers saw it; without them none ends before the run.
 
         `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it
         is to put packets on air and hand them over while a tick goes on.
@@ -92,13 +92,13 @@ class Loop:
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._interventions = interventions
         course = interventions.course if interventions else None
-        self._events = Events(events, world.static, world.keys, medium.radio if medium else None, course)
+        self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, course)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
         self._in_time = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
         self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
-        self._open: Tally | None = None  # of the tick under way: no observer has seen it yet
-        self._stranded: Tally | None = None  # in arenas that left: no observer has seen that they did
+        self._open: PacketCounts | None = None  # of the tick under way: no observer has seen it yet
+        self._stranded: PacketCounts | None = None  # in arenas that left: no observer has seen that they did
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(
@@ -160,7 +160,7 @@ class Loop:
             self._leave(over & self._running)
         return truth
 
-    def end(self) -> Tally | None:
+    def end(self) -> PacketCounts | None:
         """End the medium: what was in flight, and what no observer has seen of a tick that was broken off."""
         if self.medium is None:
             return None
@@ -199,7 +199,7 @@ class Loop:
         packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
-    def _receive(self, start_ns: int) -> tuple[News | None, ReceivedPackets, TxStatuses]:
+    def _receive(self, start_ns: int) -> tuple[Results | None, ReceivedPackets, TxStatuses]:
         """What came of the radio up to a tick's start; of that, what the backend is to be told."""
         if self._in_time:
             news, packets, tx_status = self._in_time.begin(start_ns)

@@ -14,10 +14,10 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
-from swarmwire.comms.interfaces import Put, SubtickMedium
+from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.radio.results import News
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Static
 from swarmwire.world.backends.pacing import Pace
 
@@ -36,7 +36,7 @@ class SubtickRadio:
         self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
 
-    def begin(self, start_ns: int) -> tuple[News, ReceivedPackets, TxStatuses]:
+    def begin(self, start_ns: int) -> tuple[Results, ReceivedPackets, TxStatuses]:
         """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
         self._release(start_ns)
         self._now_ns = start_ns
@@ -44,7 +44,7 @@ class SubtickRadio:
         received, tx_status = self._medium.advance_within(start_ns)
         return self._medium.advance(start_ns), received, tx_status
 
-    def send(self, put: Put) -> None:
+    def send(self, put: SubtickPackets) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
         if not len(put.sent):
             return
@@ -109,7 +109,7 @@ SHARE_EARLY = 5  # of a subtick, at most, that a sleep is shorter: a machine tha
 class Exchange(Protocol):
     """Whoever carries packets between agents and air."""
 
-    def take_in(self) -> Sequence[Put]:
+    def take_in(self) -> Sequence[SubtickPackets]:
         """Packets that agents sent since the last call, `at_ns` in wall time."""
         ...
 

@@ -20,7 +20,7 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
-from swarmwire.world.annotations import States, ToldValues
+from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.custom.loading import CustomActuators, made_sensor
 from swarmwire.world.custom.sensors import CheckedSensor
 from swarmwire.world.engines.physics import Physics, engines_of
@@ -107,7 +107,7 @@ class World:
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.states = States(self.static.arenas, self.static.robots)
-        self.values = ToldValues()
+        self.values = LatestValues()
         self._show()
 
     @property

@@ -11,7 +11,7 @@ from swarmwire.agent.readings import InfraredReading, ProximityReading
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import Rim
+from swarmwire.comms.bodies.ranging_specs import RayArraySpec
 
 LEFT, STRAIGHT, RIGHT = 1, 0, -1
 EITHER = 2  # a side that is still to be drawn
@@ -159,6 +159,6 @@ class MinimalistFlocking(VectorAgent[Turning]):
         robots.drive(linear_mps=linear, angular_radps=self.turn_radps * side)
 
 
-def _answer_at(spec: Rim, distance_m: float) -> float:
+def _answer_at(spec: RayArraySpec, distance_m: float) -> float:
     """What an ideal ray answers to a thing so far from the rim."""
     return float(spec.response.value(np.array(distance_m)))

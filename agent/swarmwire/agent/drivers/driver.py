@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import NoParameters, limits_of
+from swarmwire.comms.config import NoParameters, bounds_of
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.plugins import installed_class, installed_points
 
@@ -101,7 +101,7 @@ def load_driver(name: str, where: str, key: str) -> type[Driver]:
     return installed_class(GROUP, name, Driver, "driver", where, key)
 
 
-def told_drivers() -> list[str]:
+def list_drivers() -> list[str]:
     """Every driver in lines for people: its name, body and options, or why it cannot be used."""
     lines: list[str] = []
     for name in driver_names():
@@ -112,12 +112,12 @@ def told_drivers() -> list[str]:
             continue
         told = (kind.__doc__ or "").strip().partition("\n")[0]
         lines.append(f"{name}: {told} Body: {kind.body_name}")
-        lines += [f"  {told_option(of)}" for of in fields(kind.options)]
+        lines += [f"  {option_text(of)}" for of in fields(kind.options)]
     return lines or ["no drivers are installed"]
 
 
-def told_option(of: "Field[Any]") -> str:
+def option_text(of: "Field[Any]") -> str:
     """An option in a line: its name, default, unit and meaning."""
-    limits = limits_of(of)
+    limits = bounds_of(of)
     value = "must be given" if of.default is MISSING else f"{of.default!r}{f' {limits.unit}' if limits.unit else ''}"
     return f"{of.name} ({value}): {limits.help}"

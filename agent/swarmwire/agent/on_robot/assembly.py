@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.on_robot import reporting
-from swarmwire.agent.on_robot.controller import Mind, RobotSensors, group_of
+from swarmwire.agent.on_robot.controller import Controller, RobotSensors, group_of
 from swarmwire.agent.on_robot.log import RobotLog, new_log
 from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
-from swarmwire.agent.on_robot.network_check import Presence
-from swarmwire.agent.on_robot.plan import OF_POSES, Plan, agent_sha256, check_needs, tracked
-from swarmwire.agent.on_robot.reporting import Onlookers, StatusFile, Terminal, status_path
+from swarmwire.agent.on_robot.network_check import LivenessWatch
+from swarmwire.agent.on_robot.plan import OF_POSES, RobotConfig, agent_sha256, check_needs, tracked
+from swarmwire.agent.on_robot.reporting import RobotObservers, StatusFile, Terminal, status_path
 from swarmwire.agent.on_robot.robot_lock import RobotLock, stop_requests
-from swarmwire.agent.on_robot.safety import OUT_OF_REACH, Control, End, Heartbeats, Motors, Watchdog
+from swarmwire.agent.on_robot.safety import OUT_OF_REACH, Control, Heartbeats, Motors, StopFlag, Watchdog
 from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED, RobotSettings
 from swarmwire.agent.radios.radio import NoRadio, RadioLog, RobotRadio
 from swarmwire.comms.clock import DatedClock, WallClock
@@ -50,7 +50,9 @@ class NetworkParts:
     listen: Callable[[Control], None] = lambda _: None  # let the robot be controlled from now on
 
 
-def network_parts(plan: Plan, clock: DatedClock, log: RadioLog | None, say: Say, closing: ExitStack) -> NetworkParts:
+def network_parts(
+    plan: RobotConfig, clock: DatedClock, log: RadioLog | None, say: Say, closing: ExitStack
+) -> NetworkParts:
     """Radio, tracker and control as the settings say; `closing` is given what is to be closed at the end.
 
     BadInput if an endpoint is taken, or there is no world whose air is to be joined, or it has not this robot.
@@ -78,7 +80,7 @@ def network_parts(plan: Plan, clock: DatedClock, log: RadioLog | None, say: Say,
     def own_pose() -> Pose | None:
         return tracker.pose(own, clock.utc_ns()) if tracker else None
 
-    presence = Presence(clock, say, *_others(settings, radio), own_pose if tracker else None, settings.pace)
+    presence = LivenessWatch(clock, say, *_others(settings, radio), own_pose if tracker else None, settings.pace)
     points: list[ControlPoint] = []
 
     def listen(control: Control) -> None:
@@ -110,7 +112,7 @@ def _opened_tracker(
 
 
 def _made_radio(
-    plan: Plan,
+    plan: RobotConfig,
     session: "zenoh.Session",
     keys: "SwarmKeys",
     tracker: "Tracker | None",
@@ -149,7 +151,12 @@ GUARD_GONE = "the guard is gone"
 
 
 def run_robot(
-    plan: Plan, clock: DatedClock, end: End, stamp: str, duration_s: float | None = None, pipe: int | None = None
+    plan: RobotConfig,
+    clock: DatedClock,
+    end: StopFlag,
+    stamp: str,
+    duration_s: float | None = None,
+    pipe: int | None = None,
 ) -> int:
     """The exit code of one robot's agent, which ran until something ended it.
 
@@ -167,7 +174,13 @@ def run_robot(
 
 
 def _run_alone(
-    plan: Plan, clock: DatedClock, end: End, motors: Motors, stamp: str, duration_s: float | None, pipe: int | None
+    plan: RobotConfig,
+    clock: DatedClock,
+    end: StopFlag,
+    motors: Motors,
+    stamp: str,
+    duration_s: float | None,
+    pipe: int | None,
 ) -> int:
     """As `run_robot`, while no other process of this machine drives the robot."""
     settings, terminal = plan.settings, Terminal(plan.settings.name)
@@ -177,7 +190,7 @@ def _run_alone(
         log.begin(robot_facts(plan, clock))
     facts = {"format": LOG_FORMAT, "name": settings.name, "swarm": settings.swarm, "log": log and str(log.folder)}
     file = StatusFile(status_path(settings.log, settings.name))
-    onlookers = Onlookers(clock, settings.pace, terminal, file, motors.control, facts, log)
+    onlookers = RobotObservers(clock, settings.pace, terminal, file, motors.control, facts, log)
     ended, cause = "error", None
     if plan.body.actuators:
         onlookers.say(f"{', '.join(plan.body.actuators)}: {NO_CALL}")
@@ -210,11 +223,11 @@ def _cause(error: BaseException) -> str:
 
 
 def _assembled(
-    plan: Plan,
+    plan: RobotConfig,
     clock: DatedClock,
-    end: End,
+    end: StopFlag,
     motors: Motors,
-    onlookers: Onlookers,
+    onlookers: RobotObservers,
     log: RobotLog | None,
     pipe: int | None,
     closing: ExitStack,
@@ -232,7 +245,7 @@ def _assembled(
         check_needs(plan.agent.__name__, plan.agent.needs, offer, plan.where)
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, settings.seed)
     measures = None if settings.radio.kind == "none" else network.radio.measures
-    mind = Mind(group, settings.rate_hz, measures, plan.limits)
+    mind = Controller(group, settings.rate_hz, measures, plan.limits)
     needs = frozenset(need for need in plan.agent.needs if not need.startswith("radio."))
     sensors = RobotSensors(plan.driver, needs, tracked(plan.agent.needs, offer), network.own_pose)
     parts = RobotParts(plan.driver, network.radio, mind, sensors, motors, watchdog, clock)
@@ -244,7 +257,7 @@ def _assembled(
     return RobotLoop(parts, settings.rate_hz, end, onlookers, network.counts)
 
 
-def robot_facts(plan: Plan, clock: DatedClock) -> dict[str, Any]:
+def robot_facts(plan: RobotConfig, clock: DatedClock) -> dict[str, Any]:
     """What `robot.json` says of a robot."""
     settings, limits = plan.settings, plan.limits
     return {

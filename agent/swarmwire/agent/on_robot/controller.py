@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.drivers.driver import STOP, Command, Driver
-from swarmwire.agent.host import Host
+from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.on_robot.plan import SpeedLimits
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment
@@ -78,7 +78,7 @@ class Decision:
     sent: SentPackets
 
 
-class Mind:
+class Controller:
     """The host of one agent, and what of its deeds holds beyond the step.
 
     Attributes:
@@ -94,7 +94,7 @@ class Mind:
         self, group: GroupAssignment, rate_hz: int, measures: tuple[str, ...] | None, limits: SpeedLimits
     ) -> None:
         """AgentFailed if the agent cannot be made."""
-        self._host = Host(Assignment((group,), rate_hz, measures))
+        self._host = AgentExecutor(Assignment((group,), rate_hz, measures))
         self._group, self._limits = group, limits
         self._sideways = isinstance(group.body.drive, Holonomic)
         self._command = STOP

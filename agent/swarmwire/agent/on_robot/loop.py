@@ -7,9 +7,9 @@ from math import ceil
 from typing import Any, Protocol
 
 from swarmwire.agent.drivers.driver import STOP, Driver, DriverLost
-from swarmwire.agent.on_robot.controller import Decision, Mind, RobotSensors
+from swarmwire.agent.on_robot.controller import Controller, Decision, RobotSensors
 from swarmwire.agent.on_robot.log import TickRow
-from swarmwire.agent.on_robot.safety import STOP_REQUESTED, End, Motors, Watchdog
+from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
 from swarmwire.comms.packets import SentPackets
@@ -73,7 +73,7 @@ class Pacer:
 FIRST_PAUSE_NS, MAX_PAUSE_NS = to_ns(0.2), to_ns(2.0)
 
 
-def reconnect(driver: Driver, clock: Clock, end: End, meanwhile: Callable[[], None]) -> bool:
+def reconnect(driver: Driver, clock: Clock, end: StopFlag, meanwhile: Callable[[], None]) -> bool:
     """Open the driver, motors off first of all; False if the end came before. `meanwhile` is called several times."""
     pause_ns = FIRST_PAUSE_NS
     while _paused(pause_ns, clock, end, meanwhile):
@@ -87,7 +87,7 @@ def reconnect(driver: Driver, clock: Clock, end: End, meanwhile: Callable[[], No
     return False
 
 
-def _paused(pause_ns: int, clock: Clock, end: End, meanwhile: Callable[[], None]) -> bool:
+def _paused(pause_ns: int, clock: Clock, end: StopFlag, meanwhile: Callable[[], None]) -> bool:
     """Whether the pause is over, rather than the end there."""
     until_ns = clock.now_ns() + pause_ns
     while not end and (left_ns := until_ns - clock.now_ns()) > 0:
@@ -111,14 +111,14 @@ class RobotParts:
 
     driver: Driver
     radio: RobotRadio
-    mind: Mind
+    mind: Controller
     readings: RobotSensors
     motors: Motors
     watchdog: Watchdog
     clock: DatedClock
 
 
-class Onlooker(Protocol):
+class RobotObserver(Protocol):
     """Whoever keeps, shows and reports what the robot does; it cannot stop it."""
 
     def step(self, row: TickRow) -> None:
@@ -145,8 +145,8 @@ class RobotLoop:
         self,
         parts: RobotParts,
         rate_hz: int,
-        end: End,
-        onlooker: Onlooker,
+        end: StopFlag,
+        onlooker: RobotObserver,
         more_counts: Callable[[], dict[str, int]] = dict,
     ) -> None:
         """`more_counts` tells what went wrong in what belongs neither to driver nor radio."""

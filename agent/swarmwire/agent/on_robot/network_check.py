@@ -14,7 +14,7 @@ from swarmwire.comms.wire.radio_bridge import Pose
 TIMEOUT_S = 5.0
 
 
-class Presence:
+class LivenessWatch:
     """Looks when it is told to; without a radio or a tracker there is nothing to be missed."""
 
     def __init__(
@@ -83,7 +83,7 @@ class Presence:
 NOT_YET_VALID = 9  # X509_V_ERR_CERT_NOT_YET_VALID: a robot without a battery for its clock learns the date later
 
 
-def check_proof(network: Network, where: str) -> None:
+def check_certificates(network: Network, where: str) -> None:
     """BadInput at `network.certificate`, `network.key` or `network.ca` in `where`, if they do not go together."""
     certificate, key, ca = network.certificate, network.key, network.ca
     if certificate is None or key is None or ca is None:

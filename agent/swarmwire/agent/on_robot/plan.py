@@ -27,7 +27,7 @@ OF_POSES = ("radio.range", "radio.bearing")  # what poses add to a real radio
 
 
 @dataclass(frozen=True)
-class Offer:
+class Capabilities:
     """What there is on a robot."""
 
     body: Body
@@ -38,7 +38,7 @@ class Offer:
     tracker: bool
 
 
-def check_needs(agent: str, needs: tuple[str, ...], offer: Offer, where: str) -> None:
+def check_needs(agent: str, needs: tuple[str, ...], offer: Capabilities, where: str) -> None:
     """BadInput at `agent` in `where` for the first need that is not met: which, and what would give it."""
     for need in needs:
         fault = _of_radio(need, offer) if need.startswith("radio.") else _of_robot(need, offer)
@@ -46,14 +46,14 @@ def check_needs(agent: str, needs: tuple[str, ...], offer: Offer, where: str) ->
             raise BadInput(where, "agent", f"{agent} needs {need!r}, which {fault}")
 
 
-def tracked(needs: tuple[str, ...], offer: Offer) -> frozenset[str]:
+def tracked(needs: tuple[str, ...], offer: Capabilities) -> frozenset[str]:
     """The senses that the tracker gives: those of the body that the driver does not."""
     if not offer.tracker:
         return frozenset()
     return frozenset(need for need in needs if need in OF_TRACKER and need not in offer.driver_gives)
 
 
-def _of_robot(need: str, offer: Offer) -> str | None:
+def _of_robot(need: str, offer: Capabilities) -> str | None:
     body = offer.body
     if need not in body.sensors:
         return f"the body {body.name} lacks: it has {', '.join(body.sensors) or 'no sensors'}"
@@ -64,7 +64,7 @@ def _of_robot(need: str, offer: Offer) -> str | None:
     return f"the driver {offer.driver} does not give (it gives {measures}){cure}"
 
 
-def _of_radio(need: str, offer: Offer) -> str | None:
+def _of_radio(need: str, offer: Capabilities) -> str | None:
     if need in offer.radio_gives:
         return None
     if offer.radio == "none":
@@ -130,7 +130,7 @@ def _limit(given: float | None, most: float, where: str, key: str, unit: str) ->
 
 
 @dataclass(frozen=True)
-class Plan:
+class RobotConfig:
     """One robot, ready to be run; nothing is connected.
 
     Attributes:
@@ -147,11 +147,11 @@ class Plan:
     limits: SpeedLimits
 
     @property
-    def offer(self) -> Offer:
+    def offer(self) -> Capabilities:
         """What the agent finds; of the world's air, what it tells is known once it was joined."""
         settings = self.settings
         tells = OF_POSES if settings.radio.kind == "zenoh" and settings.tracker else ()
-        return Offer(
+        return Capabilities(
             self.body,
             settings.driver.name,
             self.driver.measures,
@@ -170,7 +170,7 @@ class Plan:
         )
 
 
-def plan_of(settings: RobotSettings, where: str, clock: DatedClock) -> Plan:
+def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> RobotConfig:
     """What the settings in `where` come to; BadInput names the first key that is wrong."""
     driver, body = driver_of(settings, where, clock)
     agent, params = _agent(settings, where)
@@ -178,15 +178,15 @@ def plan_of(settings: RobotSettings, where: str, clock: DatedClock) -> Plan:
         period_s = 1.0 / settings.rate_hz
         raise BadInput(where, "watchdog_s", f"expected more than a period of rate_hz, {period_s:g} s")
     limits = limits_for(body, settings.max_linear_mps, settings.max_angular_radps, where)
-    plan = Plan(settings, where, agent, params, body, driver, limits)
+    plan = RobotConfig(settings, where, agent, params, body, driver, limits)
     needs = agent.needs
     if settings.radio.kind == "world":  # what the medium tells is known once it was joined
         needs = tuple(need for need in needs if not need.startswith("radio."))
     check_needs(agent.__name__, needs, plan.offer, where)
     if settings.network and settings.network.proves:
-        from swarmwire.agent.on_robot.network_check import check_proof  # ssl costs memory
+        from swarmwire.agent.on_robot.network_check import check_certificates  # ssl costs memory
 
-        check_proof(settings.network, where)
+        check_certificates(settings.network, where)
     return plan
 
 

@@ -149,7 +149,7 @@ SILENT = "watchdog: nothing was received of the agent for {:.2f} s; motors off u
 LOG_FULL = "the log cannot be written, and goes on without what is lost: {}"
 
 
-class Onlookers:
+class RobotObservers:
     """Told of each step; once a second they write, every five the terminal shows how the robot is.
 
     Attributes:

@@ -173,7 +173,7 @@ class Control:
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
-class End:
+class StopFlag:
     """Whether the loop is to end, and why; set from any thread, once."""
 
     def __init__(self) -> None:
@@ -188,7 +188,7 @@ class End:
 
 
 @contextmanager
-def by_signals(end: End, patient: bool) -> Generator[None]:
+def by_signals(end: StopFlag, patient: bool) -> Generator[None]:
     """While it holds, signals ask for the end.
 
     Unless it is `patient`, a second Ctrl-C does what it does to any program. With a guard, which ends what does not

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import check_format, check_plain, from_toml, one_of, parameter, read_toml
+from swarmwire.comms.config import check_format, check_plain, did_you_mean, from_toml, parameter, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.keys import fault_of_name
@@ -145,7 +145,7 @@ def _check_names(settings: RobotSettings, where: str) -> None:
     if twice:
         raise BadInput(where, "robots", f"expected each robot once, got {twice} twice")
     if settings.robots and settings.name not in settings.robots:
-        raise BadInput(where, "name", f"expected {one_of(settings.robots, settings.name)}; got {settings.name!r}")
+        raise BadInput(where, "name", f"expected {did_you_mean(settings.robots, settings.name)}; got {settings.name!r}")
 
 
 def _absolute(settings: RobotSettings, beside: Path) -> RobotSettings:

@@ -109,7 +109,7 @@ def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_pay
 
 
 @dataclass(slots=True)
-class Link:
+class LinkStatistics:
     """From one sender to this robot.
 
     Attributes:
@@ -204,7 +204,7 @@ class ZenohRadio:
         self._sequence = 0
         self._far_too_large = 0  # refused by the network's thread
         self._counted = Counter[str]()
-        self.links: dict[int, Link] = {}
+        self.links: dict[int, LinkStatistics] = {}
         self.measures: tuple[str, ...] = MEASURES if tracker else ()
         self.needs: frozenset[str] = frozenset(NEEDS if tracker else ())
 
@@ -285,7 +285,9 @@ class ZenohRadio:
         except BadFrame as error:
             self._counted[f"packets_{error.fault}"] += 1
             return None
-        self.links.setdefault(sender, Link()).add(packet.header.sequence, packet.header.sent_utc_ns, packet.at_ns)
+        self.links.setdefault(sender, LinkStatistics()).add(
+            packet.header.sequence, packet.header.sent_utc_ns, packet.at_ns
+        )
         return packet
 
     def _given(self, packet: Arrived) -> tuple[float, float] | None:

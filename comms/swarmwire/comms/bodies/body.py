@@ -20,12 +20,12 @@ from swarmwire.comms.bodies.custom import (
     read_custom_sensor_spec,
 )
 from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
-from swarmwire.comms.bodies.sensor_specs import Compass, Odometry
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import CompassSpec, OdometrySpec
 from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import one_of, parameter
+from swarmwire.comms.config import did_you_mean, parameter
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ HERE = Path()
 MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that can fail as senses can: no sense is named so
 
 
-class NotFitted(AttributeError):
+class IncompatibleBody(AttributeError):
     """The body does not have what an agent asks it for: wheels, LEDs."""
 
 
@@ -106,34 +106,34 @@ class Body:
     actuators: dict[str, CustomActuatorSpec] = field(default_factory=dict[str, CustomActuatorSpec])  # of the user's own
 
     @cached_property
-    def proximity(self) -> Proximity | None:
+    def proximity(self) -> ProximitySpec | None:
         """The proximity sensor's sheet."""
-        return self._spec(Proximity)
+        return self._spec(ProximitySpec)
 
     @cached_property
-    def compass(self) -> Compass | None:
+    def compass(self) -> CompassSpec | None:
         """The compass's sheet."""
-        return self._spec(Compass)
+        return self._spec(CompassSpec)
 
     @cached_property
-    def odometry(self) -> Odometry | None:
+    def odometry(self) -> OdometrySpec | None:
         """The wheel encoders' sheet."""
-        return self._spec(Odometry)
+        return self._spec(OdometrySpec)
 
     @cached_property
-    def light(self) -> Light | None:
+    def light(self) -> LightSpec | None:
         """The photocells' sheet."""
-        return self._spec(Light)
+        return self._spec(LightSpec)
 
     @cached_property
-    def infrared(self) -> Infrared | None:
+    def infrared(self) -> InfraredSpec | None:
         """The passive infrared sensor's sheet."""
-        return self._spec(Infrared)
+        return self._spec(InfraredSpec)
 
     @cached_property
-    def scan(self) -> Scan | None:
+    def scan(self) -> ScanSpec | None:
         """The laser scanner's sheet."""
-        return self._spec(Scan)
+        return self._spec(ScanSpec)
 
     @cached_property
     def actuator_places(self) -> dict[str, slice]:
@@ -152,7 +152,7 @@ class Body:
     def wheels(self) -> Wheels | Twist:
         """The drive of a body with two wheels; NotFitted if it moves in another way."""
         if isinstance(self.drive, Holonomic):
-            raise NotFitted(f"the body {self.name} has no wheels: its drive is {self.drive.kind}")
+            raise IncompatibleBody(f"the body {self.name} has no wheels: its drive is {self.drive.kind}")
         return self.drive
 
     @property
@@ -264,7 +264,7 @@ def _sensor(name: str, table: object, where: str, beside: Path | None) -> Sensor
     if name in SENSOR_SPECS:
         return built(SENSOR_SPECS[name], table, where, key)
     if "kind" not in mapping_of(where, key, table) or not name.isidentifier():
-        expected = f'expected {one_of(SENSOR_SPECS, name)}, or a kind = "file.py:Class" of your own'
+        expected = f'expected {did_you_mean(SENSOR_SPECS, name)}, or a kind = "file.py:Class" of your own'
         raise BadInput(where, key, f"unknown sense; {expected}")
     return (
         read_custom_sensor_spec(table, where, key) if beside is None else custom_sensor_spec(table, where, key, beside)
@@ -299,5 +299,5 @@ def _drive(value: object, where: str) -> Drive:
 def _shipped(name: object, where: str, key: str) -> dict[str, Any]:
     """The sheet of a body that comes with swarmwire; BadInput names `where` and `key` if there is none."""
     if name not in body_names():
-        raise BadInput(where, key, f"expected {one_of(body_names(), name)}; got {name!r}")
+        raise BadInput(where, key, f"expected {did_you_mean(body_names(), name)}; got {name!r}")
     return tomllib.loads(files("swarmwire.comms.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))

@@ -18,7 +18,7 @@ def within_a_turn(angle_rad: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Ring(RangedSensorSpec):
+class RadialSpec(RangedSensorSpec):
     """Sensors around the body that look outwards."""
 
     angles_deg: tuple[float, ...] = parameter(help="where each sensor looks, counter-clockwise from ahead", unit="deg")
@@ -83,7 +83,7 @@ class ResponseCurve:
 
 
 @dataclass(frozen=True)
-class Rim(Ring):
+class RayArraySpec(RadialSpec):
     """Rays that start at the body's rim and answer to the nearest thing that they see."""
 
     range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
@@ -102,7 +102,7 @@ class Rim(Ring):
 
 
 @dataclass(frozen=True)
-class Proximity(Rim):
+class ProximitySpec(RayArraySpec):
     """Rays from the body's rim that answer to the nearest thing on them. Sense: value (n, rays), 0 to 1."""
 
 
@@ -110,7 +110,7 @@ class Proximity(Rim):
 
 
 @dataclass(frozen=True)
-class Infrared(Rim):
+class InfraredSpec(RayArraySpec):
     """Rays from the body's rim that answer to the nearest robot on them, unless an obstacle hides it; not to walls.
 
     Beside proximity, which sees both, it tells robots from walls. Sense: value (n, rays), 0 to 1.
@@ -121,7 +121,7 @@ class Infrared(Rim):
 
 
 @dataclass(frozen=True)
-class Light(Ring):
+class LightSpec(RadialSpec):
     """Photocells that answer to the arena's lights. Sense: value (n, sensors), 0 dark to 1."""
 
     noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
@@ -134,7 +134,7 @@ FULL_DEG = 360.0
 
 
 @dataclass(frozen=True)
-class Scan(RangedSensorSpec):
+class ScanSpec(RangedSensorSpec):
     """A laser scanner that turns at one height. Sense: range_m (n, rays), inf where nothing is within the range."""
 
     rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)

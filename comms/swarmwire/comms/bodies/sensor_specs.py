@@ -9,7 +9,7 @@ from swarmwire.comms.config import parameter
 
 
 @dataclass(frozen=True)
-class Battery(SensorSpec):
+class BatterySpec(SensorSpec):
     """What the robot runs on; when it is empty, the robot is dead. Sense: charge (n,), 0 to 1, and voltage_v (n,).
 
     It gives `idle_w`, `drive_w_per_mps` times the mean speed at which the wheels are told to run (of a body without
@@ -37,7 +37,7 @@ class Battery(SensorSpec):
 
 
 @dataclass(frozen=True)
-class Bumper(SensorSpec):
+class BumperSpec(SensorSpec):
     """A touch-sensitive rim. Sense: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
 
 
@@ -45,7 +45,7 @@ class Bumper(SensorSpec):
 
 
 @dataclass(frozen=True)
-class Camera(SensorSpec):
+class CameraSpec(SensorSpec):
     """A camera that looks down all around and tells the blobs of light that it sees, the nearest first.
 
     Sense: distance_m, bearing_rad, colour (n, most_blobs), nan where there is no further blob.
@@ -69,7 +69,7 @@ class Camera(SensorSpec):
 
 
 @dataclass(frozen=True)
-class Compass(RangedSensorSpec):
+class CompassSpec(RangedSensorSpec):
     """The heading in the arena's frame. Sense: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
 
     is_global: ClassVar[bool] = True
@@ -81,7 +81,7 @@ class Compass(RangedSensorSpec):
 
 
 @dataclass(frozen=True)
-class GroundColour(RangedSensorSpec):
+class GroundSpec(RangedSensorSpec):
     """Sensors that look down at the floor. Sense: shade (n, points), 0 black to 1 white."""
 
     points_m: tuple[tuple[float, float], ...] = parameter(
@@ -102,7 +102,7 @@ class GroundColour(RangedSensorSpec):
 
 
 @dataclass(frozen=True)
-class Imu(SensorSpec):
+class ImuSpec(SensorSpec):
     """Accelerometer and gyro, with white noise, a constant bias of each robot's own, and a bias that drifts.
 
     Sense: forward_mps2, left_mps2, turn_radps (n,), in the body's frame, means over the tick before.
@@ -132,7 +132,7 @@ class Imu(SensorSpec):
 
 
 @dataclass(frozen=True)
-class Odometry(SensorSpec):
+class OdometrySpec(SensorSpec):
     """Encoders on the two wheels. Sense: left_m, right_m (n,), travelled since the start, in whole encoder steps.
 
     Each wheel has an error of its own that stays (its diameter), and slips anew in each tick. What heading and place
@@ -150,7 +150,7 @@ class Odometry(SensorSpec):
 
 
 @dataclass(frozen=True)
-class Positioning(RangedSensorSpec):
+class PositioningSpec(RangedSensorSpec):
     """The position in the arena's frame, as a tracking camera tells it. Sense: x_m, y_m (n,)."""
 
     is_global: ClassVar[bool] = True

@@ -3,31 +3,31 @@
 A file per sense. A new one: its sheet in a file here, and its line in `SENSOR_SPECS`.
 """
 
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
 from swarmwire.comms.bodies.sensor_specs import (
-    Battery,
-    Bumper,
-    Camera,
-    Compass,
-    GroundColour,
-    Imu,
-    Odometry,
-    Positioning,
+    BatterySpec,
+    BumperSpec,
+    CameraSpec,
+    CompassSpec,
+    GroundSpec,
+    ImuSpec,
+    OdometrySpec,
+    PositioningSpec,
 )
 from swarmwire.comms.bodies.spec import SensorSpec
 
 # By the name that a sheet and an agent's `needs` have for the sense.
 SENSOR_SPECS: dict[str, type[SensorSpec]] = {
-    "proximity": Proximity,
-    "compass": Compass,
-    "odometry": Odometry,
-    "light": Light,
-    "bumper": Bumper,
-    "positioning": Positioning,
-    "infrared": Infrared,
-    "scan": Scan,
-    "ground": GroundColour,
-    "camera": Camera,
-    "imu": Imu,
-    "battery": Battery,
+    "proximity": ProximitySpec,
+    "compass": CompassSpec,
+    "odometry": OdometrySpec,
+    "light": LightSpec,
+    "bumper": BumperSpec,
+    "positioning": PositioningSpec,
+    "infrared": InfraredSpec,
+    "scan": ScanSpec,
+    "ground": GroundSpec,
+    "camera": CameraSpec,
+    "imu": ImuSpec,
+    "battery": BatterySpec,
 }

@@ -6,7 +6,7 @@ from math import isfinite
 from types import UnionType
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
-from swarmwire.comms.config import fault_of, limits_of, one_of
+from swarmwire.comms.config import bounds_of, did_you_mean, fault_of
 from swarmwire.comms.errors import BadInput
 
 GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
@@ -28,18 +28,18 @@ def built(kind: type[Any], value: object, where: str, key: str) -> Any:
     made: dict[str, Any] = {}
     for name in given:
         if name not in known:
-            raise BadInput(where, _join(key, name), f"unknown key; expected {one_of(known, name)}")
+            raise BadInput(where, _join(key, name), f"unknown key; expected {did_you_mean(known, name)}")
     for name, of in known.items():
         if name in given:
             made[name] = _value(hints[name], given[name], where, _join(key, name))
-            limits = limits_of(of)
+            limits = bounds_of(of)
             fault = fault_of(made[name], limits) if isinstance(made[name], float | int) else None
             if limits.choices and made[name] not in limits.choices:
-                fault = f"expected {one_of(limits.choices, made[name])}; got {made[name]!r}"
+                fault = f"expected {did_you_mean(limits.choices, made[name])}; got {made[name]!r}"
             if fault:
                 raise BadInput(where, _join(key, name), fault)
         elif of.default is MISSING and of.default_factory is MISSING:
-            raise BadInput(where, _join(key, name), ": ".join(filter(None, ("is missing", limits_of(of).help))))
+            raise BadInput(where, _join(key, name), ": ".join(filter(None, ("is missing", bounds_of(of).help))))
     return kind(**made)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.config.ramps import Slope, radio_at
+from swarmwire.comms.radio.config.ramps import ParameterRamp, radio_at
 from swarmwire.comms.radio.disruption import ALL, DROP, Disruption, Jammers
 
 BATTERY = "battery"  # the part without which a robot is dead
@@ -18,7 +18,7 @@ NEVER_NS = np.iinfo(np.int64).max
 HOUR_NS = 3600 * 10**9
 
 
-class Failing:
+class Failures:
     """A part of some robots that does not work.
 
     Attributes:
@@ -52,13 +52,13 @@ class Lifetimes:
     keys: KeyArray  # (arenas,)
     serial: int  # the event's place in the scenario
 
-    def begun(self, part: str, chosen: BoolArray, now_ns: int) -> Failing:
+    def begun(self, part: str, chosen: BoolArray, now_ns: int) -> Failures:
         """The robots chosen (rows,), all of them working."""
-        failing = Failing(part, np.zeros(len(chosen), np.bool_))
+        failing = Failures(part, np.zeros(len(chosen), np.bool_))
         self._live(failing, chosen, np.full(len(chosen), now_ns))
         return failing
 
-    def go_on(self, failing: Failing, now_ns: int) -> None:
+    def go_on(self, failing: Failures, now_ns: int) -> None:
         """Let fail and be mended whatever is due by now."""
         next_ns = failing.next_ns
         while (due := next_ns <= now_ns).any():
@@ -68,7 +68,7 @@ class Lifetimes:
             next_ns[falls] = NEVER_NS if self.lasts_ns is None else at_ns[falls] + self.lasts_ns
             self._live(failing, mended, at_ns)
 
-    def _live(self, failing: Failing, rows: BoolArray, from_ns: IntArray) -> None:
+    def _live(self, failing: Failures, rows: BoolArray, from_ns: IntArray) -> None:
         """Draw the next lifetime of these robots."""
         row = np.flatnonzero(rows)
         robots = len(rows) // len(self.keys)
@@ -81,7 +81,7 @@ class Lifetimes:
 # --- What events hold over robots and radios now, by the event that does.
 
 
-class Conditions:
+class ActiveEffects:
     """Each event holds what it holds until it ends, so those that overlap do not undo one another.
 
     A robot is dead while any kill holds it; a radio is off while any blackout does; two robots are apart while any
@@ -92,12 +92,12 @@ class Conditions:
         self.rows = rows  # robots of all arenas
         # All else is by event: what stands under its place in the scenario.
         self.kills: dict[int, BoolArray] = {}  # (rows,) robots held dead
-        self.failures: dict[int, Failing] = {}  # parts that do not work
+        self.failures: dict[int, Failures] = {}  # parts that do not work
         self.blackouts: dict[int, BoolArray] = {}  # (rows,) robots whose radios are held off
         self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
         self.gains: dict[int, FloatArray] = {}  # (2, rows) dB added to what robots send, and to what they hear
         self.jammers: dict[int, Jammers] = {}
-        self.slopes: dict[int, Slope] = {}  # in the order in which they began
+        self.slopes: dict[int, ParameterRamp] = {}  # in the order in which they began
         self.partitions: dict[int, IntArray] = {}  # (rows,) each robot's set, from 1; 0: in none
         self.one_way: dict[int, IntArray] = {}  # (rows,) the same, where the second does not hear the first
         self.impulses_mps: dict[

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.radio.config.radio import Radio
 
@@ -66,7 +66,7 @@ class Event(ABC):
         """Raise BadInput, with a key within the event's table, for what does not fit the groups' bodies, by group."""
 
     @abstractmethod
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
         """Change `conditions`; `serial` is the event's place in the scenario. Which robots it changed, (rows,)."""
 
     @property
@@ -74,7 +74,7 @@ class Event(ABC):
         """Whether `go_on` is to be called in every tick after `begin`."""
         return False
 
-    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: ActiveEffects) -> tuple[BoolArray, BoolArray]:
         """Change `conditions` as time passes; only called if it evolves.
 
         Returns:
@@ -82,7 +82,7 @@ class Event(ABC):
         """
         raise TypeError(f"{self.do} does not change by itself")
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
+    def end(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Undo what `begin` did; only called if the event lasts for a time. Which robots that changed, (rows,)."""
         raise TypeError(f"{self.do} lasts for ever: there is nothing to undo")
 
@@ -106,19 +106,19 @@ class LastingEvent(Event):
         return True
 
     @abstractmethod
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Put what it holds from now on into `conditions`, under `serial`: `end` takes out all that is there."""
 
     @abstractmethod
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """The robots that would be otherwise without what it holds now, (rows,)."""
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
         """Hold it."""
         self.hold(serial, swarm, conditions)
         return self.changed(serial, conditions)
 
-    def end(self, serial: int, conditions: Conditions) -> BoolArray:
+    def end(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Let go of it."""
         changed = self.changed(serial, conditions)
         conditions.let_go(serial)

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import LastingEvent, within
 from swarmwire.comms.events.selection import Groups, Swarm, members_of
 
@@ -142,15 +142,15 @@ class Partition(LastingEvent):
         if self.one_way and (self.isolate is not None or len(self.between or (1, 2)) != 2):
             raise BadInput("", "one_way", "expected two sets with it: the second does not hear the first")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Hold the sets apart."""
         self._held(conditions)[serial] = self._sides(swarm)
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """All robots in one of the sets."""
         return self._held(conditions)[serial] > 0
 
-    def _held(self, conditions: Conditions) -> dict[int, IntArray]:
+    def _held(self, conditions: ActiveEffects) -> dict[int, IntArray]:
         return conditions.one_way if self.one_way else conditions.partitions
 
     def _sides(self, swarm: Swarm) -> IntArray:

@@ -9,12 +9,12 @@ from swarmwire.comms.clock import to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.effects import Conditions, alone
+from swarmwire.comms.events.effects import ActiveEffects, alone
 from swarmwire.comms.events.event import LastingEvent
 from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.radio.config.radio import Radio, check_radio
-from swarmwire.comms.radio.config.ramps import Slope, check_number, radio_at
-from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOT, Jammers
+from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
+from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOTS, Jammers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,12 +34,12 @@ class Blackout(LastingEvent):
     )
     needs_radio = True
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Hold the radios off."""
         conditions.backlogs[serial] = BACKLOGS.index(self.backlog)
         conditions.blackouts[serial] = self.robots.rows(serial, swarm, conditions.alive)
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Those whose radios nothing else holds off."""
         return alone(serial, conditions.blackouts)
 
@@ -70,12 +70,12 @@ class Gain(LastingEvent):
         if self.send_db == 0.0 and self.receive_db == 0.0:
             raise BadInput("", "", "expected send_db or receive_db")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Change the antennas."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         conditions.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """All that were chosen."""
         return (conditions.gains[serial] != 0.0).any(axis=0)
 
@@ -120,17 +120,17 @@ class Jammer(LastingEvent):
         if radio.access_or_default.method == "none":
             raise BadInput("", "do", 'expected another radio.access.method than "none", with which nothing disturbs')
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Put them up."""
         if self.robots is None:
             arena = np.arange(len(swarm.keys))
-            carrier = np.full(len(arena), NO_ROBOT)
+            carrier = np.full(len(arena), NO_ROBOTS)
         else:
             carrier = np.flatnonzero(self.robots.rows(serial, swarm, conditions.alive))
             arena = carrier // swarm.robots
         conditions.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Those who carry one, or all robots."""
         changed = np.full(conditions.rows, self.robots is None)
         if self.robots is not None:
@@ -139,7 +139,7 @@ class Jammer(LastingEvent):
 
     def _jammers(self, serial: int, swarm: Swarm, arena: IntArray, carrier: IntArray) -> Jammers:
         k, period_ns = len(arena), to_ns(self.period_s)
-        index = np.where(carrier == NO_ROBOT, swarm.robots, carrier % swarm.robots)
+        index = np.where(carrier == NO_ROBOTS, swarm.robots, carrier % swarm.robots)
         u = uniform(swarm.keys[arena], index, serial, 0, PHASE)
         x_m, y_m = self.at or (0.0, 0.0)
         return Jammers(
@@ -186,13 +186,13 @@ class Ramp(LastingEvent):
             except BadInput as error:
                 raise BadInput("", key, f"{error.key}: {error.expected}") from None
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Let the number move; without it, it is at once what it was."""
         conditions.slopes[serial] = self._slope()
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """All robots."""
         return np.ones(conditions.rows, np.bool_)
 
-    def _slope(self) -> Slope:
-        return Slope(self.what, self.to, to_ns(self.at_s), to_ns(self.over_s))
+    def _slope(self) -> ParameterRamp:
+        return ParameterRamp(self.what, self.to, to_ns(self.at_s), to_ns(self.over_s))

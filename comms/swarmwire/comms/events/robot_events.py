@@ -12,7 +12,7 @@ from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.effects import BATTERY, Conditions, Failing, Lifetimes, alone
+from swarmwire.comms.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, alone
 from swarmwire.comms.events.event import Event, LastingEvent
 from swarmwire.comms.events.selection import Groups, Selection, Swarm
 
@@ -24,11 +24,11 @@ class Kill(LastingEvent):
     do: str = parameter("kill", help="robots stop where they stand", choices=("kill",))
     robots: Selection = parameter(help="which robots; share and count choose among those alive")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Hold the robots dead."""
         conditions.kills[serial] = self.robots.rows(serial, swarm, conditions.alive)
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Those that nothing else holds dead."""
         return alone(serial, conditions.kills)
 
@@ -46,7 +46,7 @@ class Revive(Event):
     do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
     robots: Selection = parameter(help="which robots; share and count choose among those dead")
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
         """Free the robots of every kill; changed are those that were dead."""
         dead = ~conditions.alive
         chosen = self.robots.rows(serial, swarm, dead)
@@ -101,22 +101,22 @@ class Fail(LastingEvent):
                     "", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}"
                 )
 
-    def hold(self, serial: int, swarm: Swarm, conditions: Conditions) -> None:
+    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
         """Let the part fail, now or at the rate."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         if self.per_hour is None:
-            failing = Failing(self.part, chosen)
+            failing = Failures(self.part, chosen)
         else:
             failing = self._lifetimes(serial, swarm).begun(self.part, chosen, to_ns(self.at_s))
         conditions.failures[serial] = failing
         if self.part == BATTERY:
             conditions.kills[serial] = failing.failed.copy()
 
-    def changed(self, serial: int, conditions: Conditions) -> BoolArray:
+    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
         """Those of which nothing else holds the part."""
         return alone(serial, conditions.failed_by_event(self.part))
 
-    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: Conditions) -> tuple[BoolArray, BoolArray]:
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: ActiveEffects) -> tuple[BoolArray, BoolArray]:
         """Let fail and be mended what is due by now; returns whose part failed, and whose works again, (rows,) each."""
         before = conditions.failed(self.part)
         self._lifetimes(serial, swarm).go_on(conditions.failures[serial], now_ns)
@@ -154,7 +154,7 @@ class Impulse(Event):
         at_most=7,
     )
 
-    def begin(self, serial: int, swarm: Swarm, conditions: Conditions) -> BoolArray:
+    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
         """Apply it; changed are all that were chosen, dead ones too."""
         chosen = self.robots.rows(serial, swarm, conditions.alive)
         by_mps = self.speed_mps * np.array([cos(self.direction_rad), sin(self.direction_rad)])

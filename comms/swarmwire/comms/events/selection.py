@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.config import one_of, parameter
+from swarmwire.comms.config import did_you_mean, parameter
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 
@@ -75,7 +75,7 @@ class Selection:
         elif (self.group, self.share, self.count) == (None, None, None):
             raise BadInput("", "", "expected group, names, share or count")
         elif self.group is not None and self.group not in groups:
-            raise BadInput("", "group", f"expected {one_of(groups, self.group)}; got {self.group!r}")
+            raise BadInput("", "group", f"expected {did_you_mean(groups, self.group)}; got {self.group!r}")
 
     def rows(self, serial: int, swarm: Swarm, eligible: BoolArray) -> BoolArray:
         """The robots chosen for the event with this place in the scenario, (rows,).

@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.geometry.obstacles import sides_of
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Boundary
 
 WHITE = Floor()
@@ -53,7 +53,7 @@ def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Bounda
     )
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def shade_at(ground, x, y):
     """The shade at a point of the arena in m, 0 black … 1 white; outside an arena that is no torus the rest's."""
     for k in range(len(ground.patch) - 1, -1, -1):

@@ -14,13 +14,13 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 
 CELLS_PER_OBSTACLE = 4
 MARGIN_M = 1e-9  # an obstacle that is left out is farther than any rounding
 
 
-class Things(NamedTuple):
+class ObstacleIndex(NamedTuple):
     """Obstacles of all arenas in one list; things with sides are polygons, those without circles."""
 
     shape: FloatArray  # (things, 4) x, y, radius of a circle around it, height of its top in m
@@ -29,9 +29,9 @@ class Things(NamedTuple):
     cells: Cells
 
 
-def things_within(
+def obstacles_within(
     obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool, images_m: float | None = None
-) -> Things:
+) -> ObstacleIndex:
     """The obstacles of arenas of this size by cell, for looking `reach_m` far.
 
     On a torus their images are among them that are within `images_m` of the arena, which is the reach if left out.
@@ -57,7 +57,7 @@ def things_within(
     start = np.concatenate([[0], np.cumsum(count)])
     item = np.empty(start[-1], np.int64)
     _list(start[:-1].copy(), item, *facts)
-    return Things(shape, side_start, side, cells._replace(start=start, item=item))
+    return ObstacleIndex(shape, side_start, side, cells._replace(start=start, item=item))
 
 
 def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
@@ -109,8 +109,8 @@ def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
     return True
 
 
-@borrowing(from_python=True)
-def near_things(found, things, arena, x, y, reach_m, bottom_m):
+@kernel(from_python=True)
+def obstacles_near(found, things, arena, x, y, reach_m, bottom_m):
     """Write into `found` the obstacles higher than `bottom_m` that may be within reach of a place; how many."""
     count = 0
     cells = things.cells
@@ -124,8 +124,8 @@ def near_things(found, things, arena, x, y, reach_m, bottom_m):
     return count
 
 
-@borrowing(from_python=True)
-def ray_to_thing(px, py, dx, dy, things, k):
+@kernel(from_python=True)
+def ray_to_obstacle(px, py, dx, dy, things, k):
     """Distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
     if things.side_start[k] == things.side_start[k + 1]:
         return ray_to_circle(px, py, dx, dy, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 
 MAX_CELLS_PER_SIDE = 512  # in each arena
 
@@ -105,21 +105,21 @@ def cells_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: i
     return Cells(nx, ny, nx / size_m[0], ny / size_m[1], start, np.zeros(items, np.int64))
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def column_of(cells, x):
     """The column of a place, 0 to nx - 1."""
     column = int(np.floor(x * cells.per_x + 0.5 * cells.nx))
     return column if 0 <= column < cells.nx else column % cells.nx
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def row_of(cells, y):
     """The row of a place, 0 to ny - 1."""
     row = int(np.floor(y * cells.per_y + 0.5 * cells.ny))
     return row if 0 <= row < cells.ny else row % cells.ny
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def sort(cells, state, running):
     """Put robots at x, y = state[arena, robot, :2] into their cells, rising; only of arenas that are `running`."""
     start, item = cells.start, cells.item

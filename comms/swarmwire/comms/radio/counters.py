@@ -9,10 +9,10 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.truth import Tally
+from swarmwire.comms.truth import PacketCounts
 
 
-class Accounts:
+class PacketCounters:
     """Counts by arena. Over a run, `end` of the medium included, the fates add up to the intended receivers.
 
     - `sent`, `intended`: when a packet is handed to the medium, refused packets included.
@@ -41,9 +41,9 @@ class Accounts:
         np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receivers)
         np.add.at(self._fates[:, Fate.IN_FLIGHT], queued.sender // self._robots, queued.intended)
 
-    def close(self, arenas: BoolArray | None = None) -> Tally:
+    def close(self, arenas: BoolArray | None = None) -> PacketCounts:
         """What was counted since the last report; of these arenas (arenas,) alone if they are given."""
-        tally = Tally(self._sent, self._intended, self._in_range, self._fates)
+        tally = PacketCounts(self._sent, self._intended, self._in_range, self._fates)
         self._open()
         if arenas is None:
             return tally
@@ -69,7 +69,7 @@ def _settle(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fa
 # --- Who was alive when a packet was sent: those are the receivers that a broadcast intends.
 
 
-class Lives:
+class LivenessHistory:
     """Robots alive by epoch; an epoch begins whenever a robot dies or is revived."""
 
     def __init__(self, rows: int) -> None:

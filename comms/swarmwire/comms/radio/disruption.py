@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
-NO_ROBOT = -1
+NO_ROBOTS = -1
 
 
 class Jammers(NamedTuple):
@@ -37,7 +37,7 @@ class Jammers(NamedTuple):
     def places(self, pose: FloatArray) -> FloatArray:
         """Where each is while robots stand at `pose` (rows, 3): x and y in m, (k, 2)."""
         own = np.stack([self.x_m, self.y_m], axis=1)
-        return np.where((self.carrier == NO_ROBOT)[:, None], own, pose[self.carrier, :2])
+        return np.where((self.carrier == NO_ROBOTS)[:, None], own, pose[self.carrier, :2])
 
     def is_on(self, at_ns: int) -> BoolArray:
         """Which are on at a time, and from it on, (k,)."""

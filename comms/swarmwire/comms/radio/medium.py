@@ -15,7 +15,7 @@ from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, Fate, Re
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
-from swarmwire.comms.radio.counters import Accounts, Lives
+from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.model import RadioModel
@@ -25,7 +25,7 @@ from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
-from swarmwire.comms.truth import Boundary, Tally
+from swarmwire.comms.truth import Boundary, PacketCounts
 
 
 def wait_for_earlier(links: Links, first: int, rows: int) -> None:
@@ -111,19 +111,19 @@ class RadioMedium:
         every = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, keys, every, rate_hz)
         self._way: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
-        self._accounts = Accounts(len(keys), robots)
-        self._lives = Lives(rows)
+        self._accounts = PacketCounters(len(keys), robots)
+        self._lives = LivenessHistory(rows)
         self._gone: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that left
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
-        self._within: list[results.Final] = []  # told in the tick under way
+        self._within: list[results.FinalFates] = []  # told in the tick under way
         self._on_air = Transmissions.none()  # packets of `_links`
         self._links = self._no_links = Links.none(len(radio.measures.columns))
         nothing = (
             ReceivedPackets.none(radio.measures.columns),
             *results.nothing_final(self._links, self._on_air, radio.is_phy),
         )
-        self._nothing = results.Final(*nothing, NO_TX_STATUSES)
+        self._nothing = results.FinalFates(*nothing, NO_TX_STATUSES)
 
     def hold(self, pose: FloatArray, alive: BoolArray) -> None:
         """Robots stand at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those alive (rows,) receive.
@@ -177,7 +177,7 @@ class RadioMedium:
             self._refuse(int(sent_at_ns[sent.sender].min()), sent)
             self._accept(sent_at_ns, sent)
 
-    def advance(self, until_ns: int) -> results.News:
+    def advance(self, until_ns: int) -> results.Results:
         """Let time pass to `until_ns`, with the poses held: what goes on air before it, what is final by it.
 
         What happens at a sender's radio at `until_ns` itself belongs to the poses held next, and so to the next call.
@@ -188,7 +188,7 @@ class RadioMedium:
             self._cut_off(until_ns)
         told = results.joined([*self._within, self._final(until_ns)])
         self._within = []
-        return results.News(told.received, told.finished, told.departed, self._accounts.close(), told.tx_status)
+        return results.Results(told.received, told.finished, told.departed, self._accounts.close(), told.tx_status)
 
     def advance_within(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """The same in the middle of a tick, where no event begins: in how many parts time passes changes nothing.
@@ -203,13 +203,13 @@ class RadioMedium:
                 self._within = [results.joined(self._within)]
         return told.received, told.tx_status
 
-    def end(self) -> Tally:
+    def end(self) -> PacketCounts:
         """The run is over: what is queued or on its way ends as IN_FLIGHT."""
         self._accounts.strand(self._links, self._of_here(self._way.drain()))
         self._keep(np.empty(0, np.int64))
         return self._accounts.close()
 
-    def leave(self, over: BoolArray) -> Tally:
+    def leave(self, over: BoolArray) -> PacketCounts:
         """The run is over in these arenas (arenas,); what `end` would have counted there.
 
         What is left at their radios still comes to its end, but nobody is told.
@@ -240,7 +240,7 @@ class RadioMedium:
         self._now_ns = until_ns
         self._take(*self._way.pass_time(until_ns, self._lives))
 
-    def _final(self, until_ns: int) -> results.Final:
+    def _final(self, until_ns: int) -> results.FinalFates:
         """What is final by `until_ns`; links that are not are kept."""
         self._lives.forget(self._way.queued.epoch)
         links, packets, robots = self._links, self._on_air, self._robots
@@ -248,7 +248,7 @@ class RadioMedium:
         if len(rows.open) == len(links.fate):
             return self._nothing._replace(tx_status=self._way.tx_status(self._coming.alive & ~self._gone))
         self._accounts.settle(links, until_ns)
-        told = results.Final(
+        told = results.FinalFates(
             results.received(
                 rows.received, links, packets, self.radio.measures.columns, robots, len(self._others_alive)
             ),

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import Lives
+from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
@@ -41,11 +41,11 @@ class RadioModel(ABC):
         """
 
     @abstractmethod
-    def pass_time(self, until_ns: int, lives: Lives) -> Decided:
+    def pass_time(self, until_ns: int, lives: LivenessHistory) -> Decided:
         """Let time pass to just before `until_ns`."""
 
     @abstractmethod
-    def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
+    def disrupt(self, at_ns: int, coming: Disruption, lives: LivenessHistory) -> Decided:
         """Robots that are dead from now on lose their queues, radios that are off what they receive.
 
         Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.

@@ -16,7 +16,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.truth import Departed, Finished, Tally
+from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRecords
 
 
 @njit(cache=True)
@@ -81,22 +81,22 @@ def _insertion_sort(order, receiver, at_ns):
 
 
 @dataclass(frozen=True, slots=True)
-class News:
+class Results:
     """What became final while time passed."""
 
     received: ReceivedPackets
-    finished: Finished
-    departed: Departed
-    tally: Tally
+    finished: ReceptionRecords
+    departed: TransmissionRecords
+    tally: PacketCounts
     tx_status: TxStatuses  # of packets whose senders ask and are alive
 
 
-class Final(NamedTuple):
+class FinalFates(NamedTuple):
     """What became final in a part of a tick."""
 
     received: ReceivedPackets
-    finished: Finished
-    departed: Departed
+    finished: ReceptionRecords
+    departed: TransmissionRecords
     tx_status: TxStatuses
 
     @property
@@ -104,22 +104,22 @@ class Final(NamedTuple):
         """Whether anything did."""
         return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.tx_status))
 
-    def of(self, arenas: BoolArray, robots: int) -> "Final":
+    def of(self, arenas: BoolArray, robots: int) -> "FinalFates":
         """What concerns these arenas (arenas,) of so many robots each."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
-        return Final(received, self.finished.of(arenas), self.departed.of(arenas), tx_status)
+        return FinalFates(received, self.finished.of(arenas), self.departed.of(arenas), tx_status)
 
 
-def joined(parts: list[Final]) -> Final:
+def joined(parts: list[FinalFates]) -> FinalFates:
     """What became final in all parts, one or more."""
     if len(parts) == 1:
         return parts[0]
     received, finished, departed, tx_status = (list(of) for of in zip(*parts, strict=True))
-    return Final(
+    return FinalFates(
         ReceivedPackets.joined(received),
-        Finished.joined(finished),
-        Departed.joined(departed),
+        ReceptionRecords.joined(finished),
+        TransmissionRecords.joined(departed),
         TxStatuses.joined(tx_status),
     )
 
@@ -170,7 +170,9 @@ def received(
     )
 
 
-def finished(index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool) -> Finished:
+def finished(
+    index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool
+) -> ReceptionRecords:
     """The fates of the links `index` are final, those of packets that never went on air among them."""
     arena, size_bytes = packets.sender // robots, packets.payloads.sizes
     of_link = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
@@ -178,7 +180,7 @@ def finished(index: IntArray, links: Links, packets: Transmissions, robots: int,
     of_packet = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
     *told, payload = _finished(index, of_link, of_packet, robots)
     rssi_dbm = links.rssi_dbm.take(index) if has_strength else None
-    return Finished(*told, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
+    return ReceptionRecords(*told, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
 
 
 @njit(cache=True)
@@ -199,7 +201,9 @@ def _finished(index, of_link, of_packet, robots):
     return told
 
 
-def nothing_final(links: Links, packets: Transmissions, has_strength: bool) -> tuple[Finished, Departed]:
+def nothing_final(
+    links: Links, packets: Transmissions, has_strength: bool
+) -> tuple[ReceptionRecords, TransmissionRecords]:
     """The tables of none, for a medium with these kinds of links and packets."""
     none = np.empty(0, np.int64)
     return finished(none, links, packets, 1, has_strength), departed(none, links, packets, 1)
@@ -210,11 +214,11 @@ def in_arena(row: IntArray, robots: int) -> IntArray:
     return row - row // robots * robots
 
 
-def departed(index: IntArray, links: Links, packets: Transmissions, robots: int) -> Departed:
+def departed(index: IntArray, links: Links, packets: Transmissions, robots: int) -> TransmissionRecords:
     """The packets of the links `index` left their sender's radio."""
     packet, row = links.packet.take(index), links.sender.take(index)
     arena = row // robots
-    return Departed(
+    return TransmissionRecords(
         arena=arena,
         sender=row - arena * robots,
         to=packets.to.take(packet),

@@ -74,7 +74,7 @@ def _taken(columns, index):
 # --- Intake: what agents sent becomes numbered packets at their radios.
 
 
-class Intake:
+class Admission:
     """Counts the packets that each radio was handed."""
 
     def __init__(self, rows: int) -> None:

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import msgpack
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.wire.frames import unpacked
 
@@ -29,14 +29,14 @@ DOES: dict[str, str | None] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ControlRequest:
     """One thing that is asked of a run."""
 
     do: str
     value: Any = None  # of its key: ticks, a factor (None: no limit), an event's table, an event's number
 
 
-def encode_request(request: Request) -> bytes:
+def encode_request(request: ControlRequest) -> bytes:
     """The bytes of a request; BadInput if its value cannot be told."""
     key = DOES[request.do]
     try:
@@ -46,7 +46,7 @@ def encode_request(request: Request) -> bytes:
         raise BadInput("", key or "", expected) from None
 
 
-def decode_request(data: bytes) -> Request:
+def decode_request(data: bytes) -> ControlRequest:
     """The request of these bytes; BadInput says in one line what was expected instead."""
     try:
         asked = _map_of(data, MAX_BYTES)
@@ -56,13 +56,13 @@ def decode_request(data: bytes) -> Request:
         raise BadInput("", "v", f"expected version {CONTROL_VERSION} of control, got {_shown(asked.get('v'))}")
     do = asked.get("do")
     if not isinstance(do, str) or do not in DOES:
-        raise BadInput("", "do", f"expected {one_of(DOES, do)}; got {_shown(do)}")
+        raise BadInput("", "do", f"expected {did_you_mean(DOES, do)}; got {_shown(do)}")
     key = DOES[do]
     for name in asked:
         if name not in ("v", "do", key):
             raise BadInput("", name, f"unknown key of {do!r}; expected {key or 'none'}")
     value = _value(do, asked.get(key, 1 if do == "step" else None)) if key else None
-    return Request(do, value)
+    return ControlRequest(do, value)
 
 
 def encode_reply(reply: Mapping[str, Any]) -> bytes:

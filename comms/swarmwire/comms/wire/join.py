@@ -17,7 +17,7 @@ from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, unpacked
 
 
 @dataclass(frozen=True)
-class Limits:
+class JoinLimits:
     """The limits of one endpoint.
 
     Attributes:
@@ -49,14 +49,14 @@ class Limits:
     join_s: float = 60.0
 
 
-LIMITS = Limits()  # of every world that is not told others
+LIMITS = JoinLimits()  # of every world that is not told others
 
 
 # --- What a world offers to runners before they join: msgpack, checked on arrival.
 
 
 @dataclass(frozen=True)
-class OfferedGroup:
+class GroupInfo:
     """A group of robots and the agent that is to decide for them."""
 
     name: str
@@ -67,7 +67,7 @@ class OfferedGroup:
 
 
 @dataclass(frozen=True)
-class Offer:
+class SessionInfo:
     """A run and what there is to play in it."""
 
     run: str
@@ -76,20 +76,20 @@ class Offer:
     swarmwire: str  # version of the world's package
     rate_hz: int
     real_time: float | None  # simulated seconds per second; None: as fast as the machines allow
-    groups: tuple[OfferedGroup, ...]
+    groups: tuple[GroupInfo, ...]
 
     def encode(self) -> bytes:
         """The offer as bytes."""
         return msgpack.packb({"v": frames.VERSION, **asdict(self)})
 
-    def with_free(self, free: Mapping[str, list[str]]) -> "Offer":
+    def with_free(self, free: Mapping[str, list[str]]) -> "SessionInfo":
         """The same, with these robots free, by group."""
         return replace(
             self, groups=tuple(replace(group, free=tuple(free.get(group.name, ()))) for group in self.groups)
         )
 
     @classmethod
-    def decode(cls, data: bytes) -> "Offer":
+    def decode(cls, data: bytes) -> "SessionInfo":
         """The offer of these bytes; BadFrame if they are none, "version" if they are of another version."""
         told = versioned(data, frames.MAX_BYTES)  # with the names of all robots
         try:
@@ -104,11 +104,11 @@ _OFFER: Mapping[str, type] = {"run": str, "scenario": str, "scenario_sha256": st
 _GROUP: Mapping[str, type] = {"name": str, "agent": str, "agent_sha256": str, "robots": int}
 
 
-def _group(told: Any) -> OfferedGroup:
+def _group(told: Any) -> GroupInfo:
     free: Any = told["free"]
     if type(free) is not list or not all(type(name) is str for name in cast("list[object]", free)):
         raise TypeError("free is no list of texts")
-    return OfferedGroup(**_typed(told, _GROUP), free=tuple(cast("list[str]", free)))
+    return GroupInfo(**_typed(told, _GROUP), free=tuple(cast("list[str]", free)))
 
 
 def _typed(told: Mapping[str, Any], of: Mapping[str, type]) -> dict[str, Any]:

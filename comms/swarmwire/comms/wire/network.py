@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")  # that zenoh's wheel speaks
@@ -48,7 +48,7 @@ class Network:
         known = [of.name for of in fields(cls)]
         for name in given:
             if name not in known:
-                raise BadInput(where, f"{key}.{name}", f"unknown; expected {one_of(known, name)}")
+                raise BadInput(where, f"{key}.{name}", f"unknown; expected {did_you_mean(known, name)}")
         values = {name: _typed(value, name, folder, where, f"{key}.{name}") for name, value in given.items()}
         network = cls(**values)
         network.check(where, key)

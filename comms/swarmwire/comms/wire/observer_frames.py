@@ -14,9 +14,9 @@ from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.geometry.floor import FloorImage
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.run_views import Glimpse, Scene
+from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import MAX_STATE, GroupReadings, Readings
-from swarmwire.comms.truth import Finished, Happened, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import EventRecord, Obstacle, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array
 
@@ -24,15 +24,15 @@ OBSERVED_VERSION = 1  # of the frames for observers
 _MAY_BE_INFINITE = ".height_m"  # of an obstacle
 
 
-def encode_scene(scene: Scene) -> bytes:
+def encode_scene(scene: ObservedRun) -> bytes:
     """A `scene` frame."""
     return frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": asdict(scene)})
 
 
-def decode_scene(frame: Frame) -> Scene:
+def decode_scene(frame: Frame) -> ObservedRun:
     """The scene of a `scene` frame; BadFrame if it holds none, or one that contradicts itself."""
     check_version(frame, "scene")
-    scene: Scene = _build(Scene, frame.values.get("scene"), "scene")
+    scene: ObservedRun = _build(ObservedRun, frame.values.get("scene"), "scene")
     _check(scene.static)
     if scene.selected not in scene.static.robot_names:
         raise BadFrame("malformed", "selected: expected one of the robots")
@@ -130,12 +130,12 @@ def _body(value: object, key: str) -> Body:
 # --- A glimpse of a run as a frame: the tick's arrays, and what was measured; checked on arrival.
 
 
-_FINISHED = tuple(of.name for of in fields(Finished) if of.name not in ("rssi_dbm", "payload", "payloads"))
+_FINISHED = tuple(of.name for of in fields(ReceptionRecords) if of.name not in ("rssi_dbm", "payload", "payloads"))
 _COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
 _EVENT = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
 
 
-def encode_truth(glimpse: Glimpse) -> bytes:
+def encode_truth(glimpse: ObservedTick) -> bytes:
     """A `truth` frame."""
     truth = glimpse.truth
     values: dict[str, Any] = {
@@ -151,7 +151,7 @@ def encode_truth(glimpse: Glimpse) -> bytes:
     return frames.encode("truth", truth.tick, _arrays(glimpse), values)
 
 
-def _arrays(glimpse: Glimpse) -> dict[str, AnyArray]:
+def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
     """The arrays that a tick has."""
     truth = glimpse.truth
     arrays: dict[str, AnyArray] = {
@@ -184,7 +184,7 @@ def _arrays(glimpse: Glimpse) -> dict[str, AnyArray]:
     return arrays
 
 
-def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
+def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
     """The glimpse of a `truth` frame of this scene's run; BadFrame if it holds none, or one that contradicts itself."""
     check_version(frame, "truth")
     static = scene.static
@@ -215,7 +215,7 @@ def decode_truth(frame: Frame, scene: Scene) -> Glimpse:
     )
     values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
     serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
-    return Glimpse(truth, serial, ticks, values)
+    return ObservedTick(truth, serial, ticks, values)
 
 
 def _least(value: object, least: int, name: str) -> int:
@@ -253,14 +253,14 @@ def _movable(frame: Frame, static: Static) -> AnyArray | None:
     return poses.reshape(static.arenas, static.movable, 3)
 
 
-def _tally(frame: Frame, arenas: int) -> Tally | None:
+def _tally(frame: Frame, arenas: int) -> PacketCounts | None:
     if "tally" not in frame.arrays:
         return None
     sent, intended, in_range = checked_array(frame, "tally", "<i8", (len(_COUNTED), arenas))
-    return Tally(sent, intended, in_range, checked_array(frame, "tally/fates", "<i8", (arenas, len(Fate))))
+    return PacketCounts(sent, intended, in_range, checked_array(frame, "tally/fates", "<i8", (arenas, len(Fate))))
 
 
-def _finished(frame: Frame, static: Static) -> Finished | None:
+def _finished(frame: Frame, static: Static) -> ReceptionRecords | None:
     if "finished" not in frame.arrays:
         return None
     columns = dict(zip(_FINISHED, checked_array(frame, "finished", "<i8", (len(_FINISHED), None)), strict=True))
@@ -272,10 +272,10 @@ def _finished(frame: Frame, static: Static) -> Finished | None:
     rssi_dbm = None
     if "finished/rssi_dbm" in frame.arrays:
         rssi_dbm = checked_array(frame, "finished/rssi_dbm", "<f8", (len(columns["arena"]),))
-    return Finished(**columns, rssi_dbm=rssi_dbm)
+    return ReceptionRecords(**columns, rssi_dbm=rssi_dbm)
 
 
-def _events(frame: Frame, n: int) -> tuple[Happened, ...]:
+def _events(frame: Frame, n: int) -> tuple[EventRecord, ...]:
     found: object = frame.values.get("events")
     if type(found) is not list:
         raise BadFrame("malformed", "events: expected a list")
@@ -286,10 +286,10 @@ def _events(frame: Frame, n: int) -> tuple[Happened, ...]:
     return tuple(_event(item, row) for item, row in zip(told, changed, strict=True))
 
 
-def _event(item: object, changed: AnyArray) -> Happened:
+def _event(item: object, changed: AnyArray) -> EventRecord:
     if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT:
         serial, at_s, do, ended, failed, singly = cast("tuple[int, float, str, bool, str, bool]", item)
-        return Happened(serial, at_s, do, ended, changed, failed, singly)
+        return EventRecord(serial, at_s, do, ended, changed, failed, singly)
     raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.wire.join import LIMITS, Limits
+from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network, protocol_of
 
 MAX_S = 12.0  # after ten seconds zenoh gives up
@@ -132,7 +132,7 @@ def open_world(
     runner_timeout_s: float,
     network: Network | None = None,
     access: Mapping[str, Any] | None = None,
-    limits: Limits = LIMITS,
+    limits: JoinLimits = LIMITS,
 ) -> zenoh.Session:
     """A router that listens at `endpoints`, for runners that may be silent so long.
 
@@ -147,7 +147,7 @@ def open_router(
     connect: Endpoints,
     network: Network | None = None,
     access: Mapping[str, Any] | None = None,
-    limits: Limits = LIMITS,
+    limits: JoinLimits = LIMITS,
 ) -> zenoh.Session:
     """A router between a world and its runners: it calls the endpoints in `connect` for ever. Errors as `open_world`.
 
@@ -193,7 +193,7 @@ def router_config(
     runner_timeout_s: float = 2 * BLOCK_S,
     network: Network | None = None,
     access: Mapping[str, Any] | None = None,
-    limits: Limits = LIMITS,
+    limits: JoinLimits = LIMITS,
 ) -> dict[str, Any]:
     """The configuration, as zenoh has it, of a router between a world and its runners, and of a world."""
     listened, called = _several(listen), _several(connect)
@@ -223,7 +223,7 @@ def _router(
     runner_timeout_s: float,
     network: Network | None,
     access: Mapping[str, Any] | None,
-    limits: Limits,
+    limits: JoinLimits,
 ) -> zenoh.Config:
     return _as_config(router_config(listen, connect, runner_timeout_s, network, access, limits))
 

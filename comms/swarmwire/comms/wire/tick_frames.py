@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,
-    UNTOLD,
+    NOT_MEASURED,
     Payloads,
     ReceivedPackets,
     SentPackets,
@@ -21,11 +21,11 @@ from swarmwire.comms.packets import (
 )
 from swarmwire.comms.tick_io import (
     MAX_STATES,
-    NO_ACTUATIONS,
+    NO_ACTUATOR_COMMANDS,
     NO_LED_CHANGES,
     NO_VALUES,
     Actions,
-    Actuations,
+    ActuatorCommands,
     GroupReadings,
     LedChanges,
     Notes,
@@ -192,7 +192,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
-    own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATIONS
+    own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATOR_COMMANDS
     told = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
 
@@ -213,7 +213,7 @@ def _tx_status_id(frame: Frame, to: IntArray) -> IntArray | None:
     if "sent/tx_status_id" not in frame.arrays:
         return None
     tx_status_id = checked_array(frame, "sent/tx_status_id", "<i8", (len(to),))
-    if (tx_status_id < UNTOLD).any() or ((tx_status_id != UNTOLD) & (to == BROADCAST)).any():
+    if (tx_status_id < NOT_MEASURED).any() or ((tx_status_id != NOT_MEASURED) & (to == BROADCAST)).any():
         raise BadFrame("malformed", "sent/tx_status_id: expected numbers from 0, or -1, as for every broadcast")
     return tx_status_id
 
@@ -241,12 +241,12 @@ def _leds(frame: Frame, rows: IntArray) -> LedChanges:
     return LedChanges(switched, which, rgb)
 
 
-def _actuations(frame: Frame, rows: IntArray) -> Actuations:
+def _actuations(frame: Frame, rows: IntArray) -> ActuatorCommands:
     actuated, place = checked_array(frame, "own", "<i8", (2, None))
     value = checked_array(frame, "own/value", "<f8", (len(actuated),))
     if not _own(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
         raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
-    return Actuations(actuated, place, value)
+    return ActuatorCommands(actuated, place, value)
 
 
 def _values(frame: Frame, rows: IntArray) -> Values:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import check_format, one_of, read_toml
+from swarmwire.comms.config import check_format, did_you_mean, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.arguments import SEEDS, seed_list
 from swarmwire.deploy.campaign.design import GRID
@@ -42,7 +42,7 @@ def campaign_table(path: Path) -> dict[str, Any] | None:
     check_format(table, FORMAT, where)
     for key, value in table.items():
         if key not in TYPES:
-            raise BadInput(where, key, f"unknown key; expected {one_of(TYPES, key)}")
+            raise BadInput(where, key, f"unknown key; expected {did_you_mean(TYPES, key)}")
         if type(value) not in TYPES[key]:
             raise BadInput(where, key, f"expected {' or '.join(WORDS[of] for of in TYPES[key])}, got {value!r}")
     if "scenario" not in table:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.vary import Range, Vary
@@ -30,7 +30,7 @@ def points_of(
     which argument is wrong.
     """
     if kind not in KINDS:
-        raise BadInput("--design", "", f"expected {one_of(KINDS, kind)}; got {kind!r}")
+        raise BadInput("--design", "", f"expected {did_you_mean(KINDS, kind)}; got {kind!r}")
     for place, vary in enumerate(varied):
         if vary.path in [other.path for other in varied[:place]]:
             raise vary.refused("expected each path once")

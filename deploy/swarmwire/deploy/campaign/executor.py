@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import entry_points_of
 from swarmwire.deploy.campaign.task import PieceResult, Task
@@ -76,7 +76,7 @@ def open_executor(on: str, workers: int | None, scenario: Path) -> Executor:
         return _open_dask(on, workers, scenario)
     others = {point.name: point for point in entry_points_of(GROUP)}
     if name not in others:
-        raise BadInput("--on", "", f"expected {one_of([LOCAL, DASK, *others], name)}; got {on!r}")
+        raise BadInput("--on", "", f"expected {did_you_mean([LOCAL, DASK, *others], name)}; got {on!r}")
     opener = cast("OpenExecutor", others[name].load())
     return opener(on, workers, scenario)
 

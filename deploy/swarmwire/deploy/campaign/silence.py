@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmwire.comms.clock import Clock, WallClock, to_ns
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 SAY_S = 5.0  # between two words of a worker whose ticks go on
 MAX_S = 300.0  # without one; no tick takes so long, nor does what comes before the first and after the last
@@ -59,6 +59,6 @@ class Alive:
             self._due_ns = now_ns + to_ns(SAY_S)
             self._say()
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing for the summary."""
         return {}

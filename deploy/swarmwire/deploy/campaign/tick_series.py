@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.part_files import PARQUET
 
@@ -30,7 +30,7 @@ class TickSeries:
         """Keep this tick."""
         self._ticks.append(self._metrics.values.astype(np.float32))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing for the summary."""
         return {}
 

@@ -9,7 +9,7 @@ from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Leds
 from swarmwire.comms.bodies.spec import RangedSensorSpec
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.units import unit_of
@@ -69,8 +69,8 @@ def _custom_sensor(name: str, sheet: CustomSensorSpec) -> ParameterTable:
 
 def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:
     """What `kind` leads to, the keys shared with others, and those of the class of the user's own."""
-    told = next(limits_of(of).help for of in fields(CustomSensorSpec) if of.name == "kind")
-    limits = {of.name: limits_of(of) for of in fields(made)}
+    told = next(bounds_of(of).help for of in fields(CustomSensorSpec) if of.name == "kind")
+    limits = {of.name: bounds_of(of) for of in fields(made)}
     keys = [Parameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()]
     return ParameterTable(title, (Parameter("kind", told, value=kind), *shared, *keys), "value")
 

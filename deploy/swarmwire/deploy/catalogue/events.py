@@ -3,7 +3,7 @@
 from dataclasses import fields
 from typing import Any
 
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.deploy.catalogue.docs import paragraphs
@@ -21,7 +21,7 @@ def _event(kind: type[Event]) -> Entry:
     return Entry(
         kind="event",
         name=do.default,
-        help=limits_of(do).help,
+        help=bounds_of(do).help,
         facts=(
             ("in a scenario", f'do = "{do.default}" in [[events]]'),
             ("needs a radio", "with signals" if kind.needs_signals else "yes" if kind.needs_radio else "no"),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.catalogue.behaviours import behaviour
 from swarmwire.deploy.catalogue.bodies import body_of
@@ -17,7 +17,7 @@ def kind_named(name: str) -> Kind:
     """The kind of this name, singular or plural; BadInput if there is none."""
     found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
     if found is None:
-        kinds = one_of((kind.name for kind in KINDS), name)
+        kinds = did_you_mean((kind.name for kind in KINDS), name)
         raise BadInput(name, "", f"expected {kinds}; swarmwire describe tells about a single thing")
     return found
 

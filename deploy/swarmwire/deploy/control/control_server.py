@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.wire.control_frames import Request, decode_request, encode_reply
+from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
@@ -53,7 +53,7 @@ class ControlServer:
         self._note(f"control: {done}")
         return {"done": done, "tick": self._status.tick, "event": number}
 
-    def do(self, request: Request) -> tuple[str, int | None]:
+    def do(self, request: ControlRequest) -> tuple[str, int | None]:
         """Do it: what was done in words, and the number of the event, if it is one; BadInput if it is refused."""
         controls, value = self._controls, request.value
         match request.do:

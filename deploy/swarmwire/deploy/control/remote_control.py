@@ -7,7 +7,7 @@ from typing import Any
 import zenoh
 
 from swarmwire.comms.errors import BadFrame, SwarmwireError
-from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_request
+from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_request
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_observer
@@ -64,7 +64,7 @@ class RemoteControl:
         return self._ask("end", number)
 
     def _ask(self, do: str, value: Any = None) -> dict[str, Any]:
-        return self._get(self._keys.control, encode_request(Request(do, value)))
+        return self._get(self._keys.control, encode_request(ControlRequest(do, value)))
 
     def _get(self, key: str, payload: bytes | None = None) -> dict[str, Any]:
         try:

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.config import from_json, one_of
+from swarmwire.comms.config import did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.live.live_file import goes_on, read_live
 from swarmwire.metrics.whole_file import write_whole
 
@@ -53,7 +53,7 @@ class Announced:
     def see(self, truth: Truth) -> None:
         """All is said."""
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """It is over."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
@@ -112,7 +112,7 @@ def find_run(named: str | None) -> FoundRun:
     listed = [f"{run.run} ({run.scenario}, {run.folder})" for run in runs]
     if meant or named is None:
         raise BadInput("", where, f"several runs go on; expected one of {', '.join(listed)}")
-    raise BadInput("", where, f"expected {one_of([run.run for run in runs], named)}, or a run's folder")
+    raise BadInput("", where, f"expected {did_you_mean([run.run for run in runs], named)}, or a run's folder")
 
 
 def _is_own(folder: Path) -> bool:

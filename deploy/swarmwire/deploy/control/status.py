@@ -8,7 +8,7 @@ from typing import Any
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import numbers_of
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.world.backends.registry import RunnerHealth
@@ -65,7 +65,7 @@ class Status:
             took_ns = self._clock.now_ns() - self._began_ns
             self._tick_ns = took_ns if self._tick_ns is None else (1 - SMOOTHING) * self._tick_ns + SMOOTHING * took_ns
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The run is over; nothing for the summary."""
         self._over = True
         return {}

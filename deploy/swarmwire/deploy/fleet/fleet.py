@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.certificates.revoked import revoked_in
 
@@ -80,4 +80,4 @@ def _known(option: str, given: Iterable[str], known: Iterable[str]) -> None:
     names = list(known)
     for name in given:
         if name not in names:
-            raise BadInput(option, "", f"expected {one_of(names, name)}; got {name!r}")
+            raise BadInput(option, "", f"expected {did_you_mean(names, name)}; got {name!r}")

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import check_format, one_of, read_toml
+from swarmwire.comms.config import check_format, did_you_mean, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot
@@ -69,7 +69,7 @@ def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -
         own = checked_table(given, OF_ROBOT, where, key)
         for group in own.get("groups", []):
             if group not in groups:
-                raise BadInput(where, f"{key}.groups", f"expected {one_of(groups, group)}; got {group!r}")
+                raise BadInput(where, f"{key}.groups", f"expected {did_you_mean(groups, group)}; got {group!r}")
         layers = [("defaults", defaults), *((f"groups.{of}", groups[of]) for of in own.get("groups", [])), (key, own)]
         robot = _robot(name, layers, where, folder, protocol, ports)
         host = hosts.setdefault(robot.host, robot.host)

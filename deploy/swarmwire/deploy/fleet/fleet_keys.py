@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any, cast
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 FORMAT = 1
@@ -61,7 +61,7 @@ def checked_table(value: object, known: Mapping[str, tuple[type, ...]], where: s
     for name, item in table.items():
         whole = f"{key}.{name}" if key else name
         if name not in here:
-            raise BadInput(where, whole, f"unknown key; expected {one_of(here, name)}")
+            raise BadInput(where, whole, f"unknown key; expected {did_you_mean(here, name)}")
         if type(item) not in known[name] or (list in known[name] and not _texts(item)):
             raise BadInput(where, whole, f"expected {WORDS[known[name][-1]]}, got {item!r}")
         if name in PORTS and not 1 <= item <= 65535:

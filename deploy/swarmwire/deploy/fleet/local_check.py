@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from swarmwire.agent.on_robot.plan import plan_of
+from swarmwire.agent.on_robot.plan import robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
@@ -25,7 +25,7 @@ def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> str:
             path.write_bytes(entry.data)
         file = Path(folder, SETTINGS_FILE)
         try:
-            return str(plan_of(read_settings(file, {}), str(file), WallClock()))
+            return str(robot_config(read_settings(file, {}), str(file), WallClock()))
         except BadInput as error:
             raise BadInput(*_place_in(fleet, robot, error, Path(folder))) from None
 

@@ -18,7 +18,7 @@ from swarmwire.deploy.gateways.robot_settings import RobotSettings, write_settin
 from swarmwire.deploy.gateways.served import Served, ServedRobot
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
-from swarmwire.world.gateways.tracker import Tracker
+from swarmwire.world.gateways.tracker import EmulatedTracker
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 
@@ -83,7 +83,7 @@ class Behind:
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
             bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, self._lent(static), access)))
             endpoints = bridge.open()
-            tracker = Tracker(bridge.session, keys, scaled)
+            tracker = EmulatedTracker(bridge.session, keys, scaled)
             tracker.begin(static)
             stack.callback(tracker.end)
             network, listens = gateways.network, listening_places(list(rows), gateways.network)

@@ -6,7 +6,7 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.tables import built
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.gateways.gateways import OTHERS, Gateways
@@ -34,7 +34,7 @@ def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Chosen]
     """By group: its gateway; BadInput for a group, kind or option that is not there, or a value that will not do."""
     for group in gateways.of:
         if group != OTHERS and group not in scenario.robots:
-            expected = f"expected a group of the scenario, {one_of(scenario.robots, group)}; got {group!r}"
+            expected = f"expected a group of the scenario, {did_you_mean(scenario.robots, group)}; got {group!r}"
             raise BadInput(WHERE, f"{group}={gateways.of[group]}", expected)
     fault = fault_of_name(gateways.swarm)
     if fault:
@@ -56,13 +56,15 @@ def _options(given: Mapping[str, Any], made: Mapping[str, type[Gateway]]) -> dic
     for name in sorted(given, key=lambda name: "." in name):
         group, _, option = name.rpartition(".")
         if group and group not in made:
-            expected = f"expected a group that has a gateway, {one_of(made, group)}; got {group!r}"
+            expected = f"expected a group that has a gateway, {did_you_mean(made, group)}; got {group!r}"
             raise BadInput(OPTION, name, expected)
         takers = [of for of in ([group] if group else made) if option in known[of]]
         if not takers:
             options = sorted(set[str]().union(*(known[of] for of in ([group] if group else made))))
             expected = (
-                f"unknown option; expected {one_of(options, option)}" if options else "expected none: it has no options"
+                f"unknown option; expected {did_you_mean(options, option)}"
+                if options
+                else "expected none: it has no options"
             )
             raise BadInput(OPTION, name, expected)
         for of in takers:

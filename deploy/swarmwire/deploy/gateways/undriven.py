@@ -5,7 +5,7 @@ from shlex import quote
 from typing import Any
 
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.gateways.served import Served, ServedRobot
 
 GRACE_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
@@ -29,7 +29,7 @@ class Undriven:
             self._told = True
             self._tell("nobody drives")
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Tell of those that nobody drove at all."""
         self._tell("nobody drove")
         return {}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.truth import Tally
+from swarmwire.comms.truth import PacketCounts
 
 
 class Evened:
@@ -12,10 +12,10 @@ class Evened:
     def __init__(self) -> None:
         self._owed: FloatArray | None = None
 
-    def per_tick(self, tally: Tally, ticks: int) -> Tally:
+    def per_tick(self, tally: PacketCounts, ticks: int) -> PacketCounts:
         """The tally of one of these ticks."""
         counts: IntArray = np.vstack([tally.sent, tally.intended, tally.in_range, tally.fates.T])
         owed = counts / ticks + (0.0 if self._owed is None else self._owed)
         whole = np.floor(owed + 1e-9).astype(np.int64)  # thirds add up to a little less than one
         self._owed = owed - whole
-        return Tally(whole[0], whole[1], whole[2], whole[3:].T)
+        return PacketCounts(whole[0], whole[1], whole[2], whole[3:].T)

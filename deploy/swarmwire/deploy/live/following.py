@@ -11,7 +11,7 @@ import zenoh
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadFrame, SwarmwireError
-from swarmwire.comms.run_views import Glimpse, Scene, Series
+from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
@@ -30,7 +30,9 @@ class RunGone(SwarmwireError):
 class Following:
     """What a run publishes: its scene, glimpses as they come, what its metrics measured, and its end."""
 
-    def __init__(self, scene: Scene, frames: "zenoh.Subscriber[Frames]", token: "zenoh.Subscriber[Frames]") -> None:
+    def __init__(
+        self, scene: ObservedRun, frames: "zenoh.Subscriber[Frames]", token: "zenoh.Subscriber[Frames]"
+    ) -> None:
         self.scene = scene
         self.latest: dict[str, FloatArray] = {}
         self.lost = self.bad = 0  # glimpses that did not arrive, or were none
@@ -40,11 +42,11 @@ class Following:
         self._gone = False
 
     @property
-    def metrics(self) -> tuple[Series, ...]:
+    def metrics(self) -> tuple[MetricSeries, ...]:
         """The metrics whose values come along."""
         return self.scene.series
 
-    def next(self) -> Glimpse | None:
+    def next(self) -> ObservedTick | None:
         """The next glimpse, None if there is none yet; looks also whether the run is over."""
         sample = self._frames.try_recv()
         if sample is None:
@@ -86,7 +88,7 @@ def following(live: Live, network: Network | None = None) -> Generator[Following
         yield Following(scene, frames, token)
 
 
-def _scene(session: zenoh.Session, keys: ObserverKeys) -> Scene:
+def _scene(session: zenoh.Session, keys: ObserverKeys) -> ObservedRun:
     for reply in session.get(keys.scene, timeout=ANSWER_S):
         if reply.ok is not None:
             return decode_scene(decode(reply.ok.payload.to_bytes()))

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
 
@@ -87,7 +87,7 @@ class LiveView:
     def see(self, truth: Truth) -> None:
         """Nothing: what is seen is published."""
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Leave the view open; it adds nothing to the summary."""
         return {}
 

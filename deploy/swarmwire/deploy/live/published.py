@@ -17,8 +17,8 @@ import zenoh
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.run_views import Glimpse, Scene, Series, static_of
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
@@ -27,7 +27,7 @@ from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
 from swarmwire.metrics.viewer.plotted import Measured
 from swarmwire.metrics.viewer.selected import selected_robot
-from swarmwire.world.backends.join_policy import Door
+from swarmwire.world.backends.join_policy import ListenSettings
 
 LEAVE_S = 2.0  # how long the last frame may take
 
@@ -55,14 +55,14 @@ class Published:
         arena: int = 0,
         selected: str | None = None,
         declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,
-        door: Door | None = None,
+        door: ListenSettings | None = None,
     ) -> None:
         """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
 
         `declare` declares what else is answered on the session, for as long as what it returns is kept. `door` is where
         observers from elsewhere meet it, too.
         """
-        self._door = door or Door(())
+        self._door = door or ListenSettings(())
         self._declare_more = declare
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
         self._arena, self._selected = arena, selected
@@ -95,7 +95,7 @@ class Published:
         self._watched = False
         self._newest: Truth | None = None
         self._fault: Exception | None = None
-        self._frames: queue.Queue[Glimpse | None] = queue.Queue(maxsize=1)
+        self._frames: queue.Queue[ObservedTick | None] = queue.Queue(maxsize=1)
         if self._met is None:
             self.open()
         assert self._met is not None
@@ -149,7 +149,7 @@ class Published:
             except Exception as error:  # noqa: BLE001 - raised by `see`, which is guarded
                 self._fault = error
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Show how it ended and close the endpoint; whoever looks on learns that the run is over."""
         if self._watched and self._since.ticks and self._fault is None:
             self._put(self._clock.now_ns())
@@ -183,10 +183,10 @@ class Published:
         status: Any = self._publisher.matching_status  # an object, where zenoh's stub promises a bool
         return status.matching
 
-    def _scene(self, static: Static) -> Scene:
+    def _scene(self, static: Static) -> ObservedRun:
         metrics = self._metrics.metrics
-        series = tuple(Series(metric.name, metric.unit, _finite(*metric.bounds)) for metric in metrics)
-        return Scene(static_of(static, self._arena), series, self._selected or "")
+        series = tuple(MetricSeries(metric.name, metric.unit, _finite(*metric.bounds)) for metric in metrics)
+        return ObservedRun(static_of(static, self._arena), series, self._selected or "")
 
     def _declare(self, session: zenoh.Session, scene: bytes) -> None:
         keys = ObserverKeys(self._run_id)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.run_views import Glimpse, readings_within, truth_of
+from swarmwire.comms.run_views import ObservedTick, readings_within, truth_of
 from swarmwire.comms.truth import Static, Truth
 
 FRAMES_PER_S = 30
@@ -70,7 +70,7 @@ class Sampling:
         self._links = Rate(LINKS_PER_S)
         self._selected = static.robot_names.index(selected)
 
-    def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> Glimpse:
+    def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> ObservedTick:
         """What is shown of a tick; `values` (series, arenas) were measured in it."""
         static = self._static
         links = static.robots <= FEW or self._links.due(now_ns)
@@ -80,4 +80,4 @@ class Sampling:
         if static.robots > SMALL:
             shown = replace(shown, readings=readings_within(shown.readings, slice(self._selected, self._selected + 1)))
         self._serial += 1
-        return Glimpse(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
+        return ObservedTick(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.run_views import Glimpse
+from swarmwire.comms.run_views import ObservedTick
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live
@@ -71,7 +71,7 @@ class Drawer(threading.Thread):
     """
 
     def __init__(
-        self, run: Following, url: str, way: RadioModel, page: Callable[[Glimpse], None] | None = None
+        self, run: Following, url: str, way: RadioModel, page: Callable[[ObservedTick], None] | None = None
     ) -> None:
         """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
         super().__init__(name="drawer", daemon=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.console import Console
 
-from swarmwire.comms.truth import Static, Tally
+from swarmwire.comms.truth import PacketCounts, Static
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.simulation import Simulation
 
@@ -30,7 +30,7 @@ class PageBeside(LiveView):
             controls.set_speed(SPEED)
         super().begin(static)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The run is over; the page stays."""
         self._over = True
         return super().end(last)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.run_views import Glimpse
-from swarmwire.comms.truth import Happened, Static
+from swarmwire.comms.run_views import ObservedTick
+from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.metrics.event_log import names
 
 NAMED = 5  # robots of an event, at most
@@ -27,7 +27,7 @@ class Seen:
         self._who: dict[str, str] = {}
         self.numbers: dict[str, Any] = {"centre": None, "places": [], "pdr": None, "who": {}}
 
-    def see(self, glimpse: Glimpse) -> None:
+    def see(self, glimpse: ObservedTick) -> None:
         """Take one more."""
         truth = glimpse.truth
         places, alive = np.asarray(truth.pose)[:, :2], np.asarray(truth.alive)
@@ -43,14 +43,14 @@ class Seen:
             "who": self._whom(truth.events),
         }
 
-    def _whom(self, events: Sequence[Happened]) -> dict[str, str]:
+    def _whom(self, events: Sequence[EventRecord]) -> dict[str, str]:
         """Whom each event changed when it began, by its number."""
         begun = {str(event.serial): whom(event, self._static) for event in events if not event.ended}
         if begun:  # of those that began before, the newest, as the status tells of no others
             self._who = dict([*self._who.items(), *begun.items()][-MAX_WHO:])
         return self._who
 
-    def _pdr(self, glimpse: Glimpse) -> float | None:
+    def _pdr(self, glimpse: ObservedTick) -> float | None:
         """Received over in range in the last simulated second; None if none was in range."""
         truth = glimpse.truth
         if truth.tally is not None:
@@ -62,7 +62,7 @@ class Seen:
         return sum(received for _, received, _ in self._second) / reached if reached else None
 
 
-def whom(event: Happened, static: Static) -> str:
+def whom(event: EventRecord, static: Static) -> str:
     """The robots that an event changed, in words."""
     changed = names(event, static)[0]
     if not changed:

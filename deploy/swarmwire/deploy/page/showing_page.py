@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from swarmwire.comms.run_views import Scene
+from swarmwire.comms.run_views import ObservedRun
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import following
@@ -56,7 +56,7 @@ def _first_tick(control: RemoteControl) -> None:
         control.step()
 
 
-def facts(scene: Scene) -> Mapping[str, Any]:
+def facts(scene: ObservedRun) -> Mapping[str, Any]:
     """What does not change during the run, as the page is told of it."""
     static = scene.static
     return {

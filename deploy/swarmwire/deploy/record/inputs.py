@@ -19,7 +19,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.interfaces import AgentBackend, Put, SubtickMedium, TimedBackend
+from swarmwire.comms.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
@@ -145,7 +145,7 @@ class RecordedInputs:
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
-    def puts(self, tick: int, robots: int) -> list[Put]:
+    def puts(self, tick: int, robots: int) -> list[SubtickPackets]:
         """Packets that came in the middle of a recorded tick, in order; BadInput if the file does not say."""
         frame = self._frame(tick - self.first_tick)
         if WITHIN not in frame.arrays:
@@ -161,7 +161,7 @@ class RecordedInputs:
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
         return [
-            Put(
+            SubtickPackets(
                 int(at_ns[i]),
                 None if of_tick[i] == AT_ONCE else int(of_tick[i]),
                 sent.select(np.arange(int(end[i] - count[i]), int(end[i]))),
@@ -211,17 +211,17 @@ class _Noted:
 
     def __init__(self, medium: SubtickMedium) -> None:
         self._medium = medium
-        self.puts: list[Put] = []
+        self.puts: list[SubtickPackets] = []
         self.advance = medium.advance
 
-    def send(self, put: Put) -> None:
+    def send(self, put: SubtickPackets) -> None:
         """Take packets."""
         self._medium.send(put)
         if len(put.sent):
             self.puts.append(put)
 
 
-def _puts_arrays(puts: Sequence[Put]) -> dict[str, AnyArray]:
+def _puts_arrays(puts: Sequence[SubtickPackets]) -> dict[str, AnyArray]:
     """What was put on air within a tick, as arrays of its frame."""
     if not puts:
         return {}

@@ -17,7 +17,7 @@ from typing import Any, cast
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.record.names import INTERVENTIONS
-from swarmwire.world.live_events import Intervention
+from swarmwire.world.live_events import LiveEvent
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class InterventionsLog:
         self._path = folder / INTERVENTIONS
         self._sha256, self._lines, self._broken = hashlib.sha256(), 0, False
 
-    def keep(self, intervention: Intervention) -> None:
+    def keep(self, intervention: LiveEvent) -> None:
         """Write its line; OSError if that fails, and from then on: half a line may be there, which ends the record."""
         if self._broken:
             raise OSError(f"{self._path} could not be written before")
@@ -56,7 +56,7 @@ class InterventionsLog:
         return InterventionsRecord(INTERVENTIONS, self._sha256.hexdigest(), self._lines) if self._lines else None
 
 
-def read_interventions(folder: Path) -> tuple[tuple[Intervention, ...], str | None]:
+def read_interventions(folder: Path) -> tuple[tuple[LiveEvent, ...], str | None]:
     """What was done to the run of this folder, and the sha256 of its lines, None if there are none.
 
     BadInput names the line that is none of ours.
@@ -73,7 +73,7 @@ def read_interventions(folder: Path) -> tuple[tuple[Intervention, ...], str | No
     return found, hashlib.sha256(data).hexdigest() if found else None
 
 
-def _of_line(line: bytes, key: str, path: Path) -> Intervention:
+def _of_line(line: bytes, key: str, path: Path) -> LiveEvent:
     try:
         said: Any = from_json(line)
         tick, number = said["tick"], said["number"]
@@ -81,5 +81,5 @@ def _of_line(line: bytes, key: str, path: Path) -> Intervention:
     except (ValueError, KeyError, TypeError, AttributeError):
         tick = number = table = None
     if type(tick) is int and type(number) is int and (table is None or isinstance(table, dict)):
-        return Intervention(tick, number, cast("Mapping[str, Any] | None", table))
+        return LiveEvent(tick, number, cast("Mapping[str, Any] | None", table))
     raise BadInput(str(path), key, "expected tick, number, and event or end, as a run writes them")

@@ -26,8 +26,8 @@ from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog
 from swarmwire.metrics.viewer.recording import RerunRecording
-from swarmwire.world.backends.join_policy import Door
-from swarmwire.world.live_events import Intervention
+from swarmwire.world.backends.join_policy import ListenSettings
+from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -57,7 +57,7 @@ class RunRecord:
         control: ControlServer,
         *,
         may_drop: bool,
-        door: Door | None = None,
+        door: ListenSettings | None = None,
     ) -> Sequence[Observer]:
         """Those that fill the folder, and let others look on and control it; `metrics` must see each tick before.
 
@@ -142,7 +142,7 @@ class RunRecord:
         """What was recorded of the backend; None if nothing."""
         return self._recorded.record() if self._recorded else None
 
-    def keep(self, intervention: Intervention) -> None:
+    def keep(self, intervention: LiveEvent) -> None:
         """Record what somebody does to the run, before it takes effect; OSError if it cannot be recorded."""
         if self._interventions is None:
             return

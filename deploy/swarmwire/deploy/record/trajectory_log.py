@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
 
 Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
@@ -32,7 +32,7 @@ class TrajectoryLog:
         if self._file is not None:
             self._file.write(_digest(self._hashes))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Close the file."""
         if self._file is not None:
             self._file.close()
@@ -65,7 +65,7 @@ class TrajectoryCheck:
         if self.first_difference is None and _digest(self._hashes) != expected:
             self.first_difference = truth.tick
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing for the summary."""
         return {}
 

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.metrics import Metrics
 
@@ -117,7 +117,7 @@ class Figures:
         self._marks: deque[tuple[int, int]] = deque([(self._clock.now_ns(), self.done)], maxlen=MARKS)
 
 
-def _words(event: Happened, time_ns: int, static: Static) -> str:
+def _words(event: EventRecord, time_ns: int, static: Static) -> str:
     robots = [name for own in names(event, static) for name in own]
     if static.arenas > 1:
         who = f"{len(robots)} robots"

@@ -8,9 +8,9 @@ from rich.markup import escape
 from rich.status import Status
 
 from swarmwire.comms.assignment import robots_text
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.network import Network, is_local
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 
 
 class Gathering:
@@ -40,7 +40,7 @@ class Gathering:
             self._status.start()
         self._tell(self._robots)
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """Say who is missing."""
         if change.tick < 0:
             self._tell(free)
@@ -55,7 +55,7 @@ class Gathering:
     def see(self, truth: Truth) -> None:
         """All is said."""
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """All is said."""
         return {}
 

@@ -8,7 +8,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.live import Live
 
 from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.bindings import press
 from swarmwire.deploy.terminal.figures import Figures
@@ -63,7 +63,7 @@ class Panel:
             cost_ns = self._draw()
             self._next_ns += min(max(COST * cost_ns, REDRAW_NS), SELDOM_NS) - REDRAW_NS
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Take it away."""
         self._controls.on_wait = lambda: None
         try:

@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 
 from swarmwire.comms.clock import Clock, to_s
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.metrics.metrics import Metrics
 
@@ -43,7 +43,7 @@ class ProgressLines:
                 f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"
             )
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing is left to say."""
         return {}
 

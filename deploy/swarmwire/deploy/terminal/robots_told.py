@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.console import Console
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.gateways.served import ServedRobot
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.rows import aligned
@@ -30,7 +30,7 @@ class RobotsTold:
     def see(self, truth: Truth) -> None:
         """All is said."""
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """All is said."""
         return {}
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.design import LIST
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
@@ -74,7 +74,7 @@ def _check_numbers(asked: TuningAsked) -> None:
     if not 0 < asked.batch <= MAX_AT_ONCE:
         raise BadInput("--batch", "", f"expected 1 to {MAX_AT_ONCE}, got {asked.batch}")
     if asked.sampler not in SAMPLERS:
-        raise BadInput("--sampler", "", f"expected {one_of(SAMPLERS, asked.sampler)}; got {asked.sampler!r}")
+        raise BadInput("--sampler", "", f"expected {did_you_mean(SAMPLERS, asked.sampler)}; got {asked.sampler!r}")
     if asked.sampler_seed < 0:
         raise BadInput("--sampler-seed", "", f"expected a whole number of at least 0, got {asked.sampler_seed}")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import check_format, from_json, one_of
+from swarmwire.comms.config import check_format, did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.formats import CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.outcome import KINDS, Outcome
@@ -86,7 +86,7 @@ class _Fields:
     def one_of(self, name: str, known: tuple[str, ...]) -> Any:
         value = self.text(name)
         if value not in known:
-            raise BadInput(self.where, f"{self.key}{name}", f"expected {one_of(known, value)}, got {value!r}")
+            raise BadInput(self.where, f"{self.key}{name}", f"expected {did_you_mean(known, value)}, got {value!r}")
         return value
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import Point
 from swarmwire.metrics.campaign.outcome import Outcome
@@ -72,8 +72,8 @@ def _outcomes(first: Selection, second: Selection, names: Sequence[str]) -> list
     kinds = {outcome.column: outcome.kind for outcome in second.campaign.outcomes}
     common = [outcome for outcome in first.campaign.outcomes if kinds.get(outcome.column) == outcome.kind]
     if not common:
-        having = one_of(outcome.column for outcome in first.campaign.outcomes)
-        expected = f"expected outcomes in common: the first has {having}; the second {one_of(kinds)}"
+        having = did_you_mean(outcome.column for outcome in first.campaign.outcomes)
+        expected = f"expected outcomes in common: the first has {having}; the second {did_you_mean(kinds)}"
         raise BadInput(f"{first.text}, {second.text}", "", expected)
     if names:
         return [find_outcome(name, common) for name in names]

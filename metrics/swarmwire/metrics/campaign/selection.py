@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.point_values import same_value, value_from, value_text
@@ -29,7 +29,9 @@ def select(text: str) -> Selection:
     for setting in settings:
         path, chosen = _setting(setting, text)
         if path not in campaign.parameters:
-            raise BadInput(text, path, f"expected a parameter that was varied: {one_of(campaign.parameters, path)}")
+            raise BadInput(
+                text, path, f"expected a parameter that was varied: {did_you_mean(campaign.parameters, path)}"
+            )
         points = points_at(campaign, points, path, chosen, text)
         paths.append(path)
     return Selection(text, campaign, tuple(points), frozenset(paths))
@@ -44,7 +46,7 @@ def at(selections: Sequence[Selection], settings: Sequence[str]) -> tuple[Select
         path, chosen = _setting(setting, "--at")
         known = sorted({path for of in selections for path in of.campaign.parameters})
         if path not in known:
-            raise BadInput("--at", path, f"expected a parameter that was varied: {one_of(known, path)}")
+            raise BadInput("--at", path, f"expected a parameter that was varied: {did_you_mean(known, path)}")
         selections = [
             Selection(of.text, of.campaign, tuple(points_at(of.campaign, of.points, path, chosen, of.text)), of.pinned)
             if path in of.campaign.parameters
@@ -60,7 +62,7 @@ def points_at(campaign: CampaignFolder, points: Sequence[int], path: str, text: 
     found = [point for point in points if same_value(campaign.points[point][path], value)]
     if not found:
         known = dict.fromkeys(value_text(campaign.points[point][path]) for point in points)
-        raise BadInput(where, path, f"expected {one_of(known)}, got {text}")
+        raise BadInput(where, path, f"expected {did_you_mean(known)}, got {text}")
     return found
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Literal, NamedTuple, get_args
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.outcome import FINAL, Outcome
 
@@ -29,7 +29,7 @@ def find_outcome(name: str, outcomes: Iterable[Outcome], where: str = "--outcome
     known = {outcome.column: outcome for outcome in outcomes}
     found = known.get(name) or known.get(name + FINAL)
     if found is None:
-        raise BadInput(where, name, f"expected {one_of(known, name)}")
+        raise BadInput(where, name, f"expected {did_you_mean(known, name)}")
     return found
 
 

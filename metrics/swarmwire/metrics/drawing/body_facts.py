@@ -5,16 +5,16 @@ import math
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.bodies.ranging_specs import Light, Rim, Scan
+from swarmwire.comms.bodies.ranging_specs import LightSpec, RayArraySpec, ScanSpec
 from swarmwire.comms.bodies.sensor_specs import (
-    Battery,
-    Bumper,
-    Camera,
-    Compass,
-    GroundColour,
-    Imu,
-    Odometry,
-    Positioning,
+    BatterySpec,
+    BumperSpec,
+    CameraSpec,
+    CompassSpec,
+    GroundSpec,
+    ImuSpec,
+    OdometrySpec,
+    PositioningSpec,
 )
 from swarmwire.comms.bodies.spec import SensorSpec
 
@@ -42,31 +42,31 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
 
 def _told(sheet: SensorSpec, altitude_m: float) -> list[str]:
     match sheet:
-        case Rim():
+        case RayArraySpec():
             return [f"{len(sheet.angles_deg)} rays of {_length(sheet.range_m)}", *_noise(sheet.noise)]
-        case Scan():
+        case ScanSpec():
             return [
                 f"{_count(sheet.rays, 'ray')} of {_length(sheet.range_m)}",
                 _error(_length(sheet.noise_m), sheet.noise_m),
             ]
-        case GroundColour():
+        case GroundSpec():
             return [f"{len(sheet.points_m)} points under the body", *_noise(sheet.noise)]
-        case Camera():
+        case CameraSpec():
             return [f"LEDs within {_length(sheet.reach_m(altitude_m))}"]
-        case Light():
+        case LightSpec():
             return [_count(len(sheet.angles_deg), "photocell"), *_noise(sheet.noise)]
-        case Compass():
+        case CompassSpec():
             return [_error(f"{math.degrees(sheet.noise_rad):.2g} degrees", sheet.noise_rad)]
-        case Odometry():
+        case OdometrySpec():
             step = f", step {sheet.step_m * 1000:.2g} mm" if sheet.step_m else ""
             return [f"slip {100 * sheet.slip:.2g} %{step}"]
-        case Positioning():
+        case PositioningSpec():
             return [_error(_length(sheet.noise_m), sheet.noise_m)]
-        case Bumper():
+        case BumperSpec():
             return ["the whole rim"]
-        case Imu():
+        case ImuSpec():
             return [f"noise {sheet.noise_mps2:.2g} m/s²", f"{math.degrees(sheet.noise_radps):.2g} degrees/s"]
-        case Battery():
+        case BatterySpec():
             return [f"{sheet.capacity_wh:g} Wh, {sheet.full_v:g} V"]
         case CustomSensorSpec():
             return [_own(sheet.kind)]

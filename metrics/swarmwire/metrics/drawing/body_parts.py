@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Rim, Scan
-from swarmwire.comms.bodies.sensor_specs import Bumper, GroundColour
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, RayArraySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import BumperSpec, GroundSpec
 from swarmwire.metrics.drawing.looks import INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, PAPER, SMALL_PT, Look
 
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
@@ -21,20 +21,20 @@ def draw_parts(axes: Any, body: Body) -> None:
     """Draw the senses that have a place on the body, and its LEDs, into axes whose limits are set."""
     for sheet in body.sensors.values():
         match sheet:
-            case Proximity():
+            case ProximitySpec():
                 _draw_rays(axes, body.radius_m, sheet, "proximity ray", _RAY, "-")
                 _number_rays(axes, body.radius_m, sheet)
-            case Infrared():
+            case InfraredSpec():
                 _draw_rays(axes, body.radius_m, sheet, "passive infrared", _PASSIVE, (0, (2.0, 4.0)))
-            case Scan():
+            case ScanSpec():
                 _draw_scan(axes, sheet)
-            case Light():
+            case LightSpec():
                 _draw_photocells(axes, body.radius_m, sheet)
-            case GroundColour():
+            case GroundSpec():
                 x, y = _turned(*np.array(sheet.points_m).T)
                 look: Look = {"markerfacecolor": PAPER, "markeredgecolor": INK, "markeredgewidth": 0.7}
                 axes.plot(x, y, "v", markersize=3.6, zorder=6, label="ground sensor", **look)
-            case Bumper():
+            case BumperSpec():
                 x, y = _around(np.linspace(0.0, 2.0 * np.pi, 181), body.radius_m)
                 axes.plot(x, y, color=OBSTACLE_EDGE, lw=3.4, zorder=2.5, label="bumper")
             case _:
@@ -44,7 +44,7 @@ def draw_parts(axes: Any, body: Body) -> None:
         axes.plot(x, y, "o", color=_LED, markersize=2.8, zorder=6.5, label="LED")
 
 
-def _draw_rays(axes: Any, radius_m: float, sheet: Rim, label: str, color: str, line: Any) -> None:
+def _draw_rays(axes: Any, radius_m: float, sheet: RayArraySpec, label: str, color: str, line: Any) -> None:
     from matplotlib.collections import LineCollection
 
     start, end = (np.stack(_around(sheet.angle_rad, at), axis=1) for at in (radius_m, radius_m + sheet.range_m))
@@ -53,14 +53,14 @@ def _draw_rays(axes: Any, radius_m: float, sheet: Rim, label: str, color: str, l
     axes.plot(start[:, 0], start[:, 1], "o", color=color, markersize=2.4, zorder=6)
 
 
-def _number_rays(axes: Any, radius_m: float, sheet: Rim) -> None:
+def _number_rays(axes: Any, radius_m: float, sheet: RayArraySpec) -> None:
     """As an agent has them."""
     at_m = radius_m + sheet.range_m + _NUMBER_AT * axes.get_xlim()[1]
     for i, (x, y) in enumerate(np.stack(_around(sheet.angle_rad, at_m), axis=1)):
         axes.text(x, y, str(i), fontsize=SMALL_PT, color=_RAY, ha="center", va="center")
 
 
-def _draw_scan(axes: Any, sheet: Scan) -> None:
+def _draw_scan(axes: Any, sheet: ScanSpec) -> None:
     """Rays that end in the view, or fade where they would leave it."""
     from matplotlib.collections import LineCollection
 
@@ -79,7 +79,7 @@ def _draw_scan(axes: Any, sheet: Scan) -> None:
         axes.add_collection(LineCollection(list(points[:, part : part + 2]), **look, **named))
 
 
-def _draw_photocells(axes: Any, radius_m: float, sheet: Light) -> None:
+def _draw_photocells(axes: Any, radius_m: float, sheet: LightSpec) -> None:
     x, y = _around(sheet.angle_rad, 0.86 * radius_m)
     look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markeredgewidth": 0.7}
     axes.plot(x, y, "s", markersize=3.6, zorder=6, label="photocell", **look)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import Proximity
+from swarmwire.comms.bodies.ranging_specs import ProximitySpec
 from swarmwire.metrics.drawing.body_facts import facts_of
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, TITLE_PT
@@ -51,7 +51,7 @@ def draw_body(body: Body, to: Path, size_px: int) -> None:
     save(figure, to)
 
 
-def _draw_response(axes: Any, proximity: Proximity) -> None:
+def _draw_response(axes: Any, proximity: ProximitySpec) -> None:
     """What a ray answers to the distance of what it meets."""
     distance_m = np.linspace(0.0, proximity.range_m, 400)
     axes.plot(100.0 * distance_m, proximity.response.value(distance_m), color=CURVE, lw=1.4)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.layout import Layout
@@ -30,7 +30,7 @@ def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> l
         return [name for name in PREFERRED if name in metrics and np.isfinite(metrics[name]).any()][:USUAL_PLOTS]
     for name in wanted:
         if name not in metrics:
-            raise BadInput("--metric", name, f"was not recorded; expected {one_of(metrics, name)}")
+            raise BadInput("--metric", name, f"was not recorded; expected {did_you_mean(metrics, name)}")
     if len(wanted) > MAX_PLOTS:
         raise BadInput("--metric", "", f"expected {MAX_PLOTS} at most, got {len(wanted)}")
     return list(wanted)

@@ -4,7 +4,7 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
-from swarmwire.comms.bodies.ranging_specs import Rim
+from swarmwire.comms.bodies.ranging_specs import RayArraySpec
 from swarmwire.metrics.drawing.body_parts import draw_parts
 from swarmwire.metrics.drawing.looks import (
     CURVE,
@@ -30,7 +30,7 @@ def draw_from_above(axes: Any, body: Body) -> None:
 
     A data sheet has no size of the wheels: theirs is for show, the distance between them is not.
     """
-    rims = [sheet.range_m for sheet in body.sensors.values() if isinstance(sheet, Rim)]
+    rims = [sheet.range_m for sheet in body.sensors.values() if isinstance(sheet, RayArraySpec)]
     reach_m = body.radius_m + max(rims, default=0.0)
     half_m = _ROOM * max(reach_m, _MIN_RADII * body.radius_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal")

@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Finished, Static
+from swarmwire.comms.truth import ReceptionRecords, Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
 
@@ -69,7 +69,7 @@ class Newest:
         self._pairs: IntArray = np.zeros(arenas, np.int64)
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
 
-    def see(self, ended: Finished, alive: BoolArray) -> None:
+    def see(self, ended: ReceptionRecords, alive: BoolArray) -> None:
         """Take in what was received; `alive` (arenas, robots) are the robots that count from now on."""
         gained_ns = np.zeros(len(self._pairs), np.int64)
         links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, Fate
-from swarmwire.comms.truth import Departed, Finished, Static, Truth
+from swarmwire.comms.truth import ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S, geometry_tick
 
 BINS_WITHIN_RANGE = 20  # at least
@@ -63,7 +63,7 @@ class DistanceCounts:
             self._add_intended(truth.departed)
             self._add_received(truth.finished)
 
-    def _add_intended(self, departed: Departed) -> None:
+    def _add_intended(self, departed: TransmissionRecords) -> None:
         rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == Fate.RECEIVED))
         ticks = geometry_tick(departed.on_air_at_ns[rows], self._static.rate_hz)
         everyone = np.arange(self._static.robots)
@@ -75,7 +75,7 @@ class DistanceCounts:
             meant = np.where(to == BROADCAST, at.alive[arena[:, 0]], everyone == to) & (everyone != sender)
             self._count(self.intended, arena, at.apart_m(arena, sender, everyone), meant)
 
-    def _add_received(self, finished: Finished) -> None:
+    def _add_received(self, finished: ReceptionRecords) -> None:
         rows = np.flatnonzero(self._taken(finished.sender, finished.sequence) & (finished.fate == Fate.RECEIVED))
         ticks = geometry_tick(finished.on_air_at_ns[rows], self._static.rate_hz)
         for tick in np.unique(ticks).tolist():

@@ -8,7 +8,7 @@ from numba import njit
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Finished, Static
+from swarmwire.comms.truth import ReceptionRecords, Static
 
 RECEIVED = int(Fate.RECEIVED)
 
@@ -23,7 +23,7 @@ class Latencies:
     def __init__(self, static: Static) -> None:
         self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
 
-    def of(self, finished: Finished, tick: int) -> tuple[IntArray, IntArray, IntArray]:
+    def of(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
         """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
         acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
         ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns

@@ -4,7 +4,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.packets import FATE_NAMES
-from swarmwire.comms.truth import NOBODY, Finished, Static
+from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static
 
 FATES = len(FATE_NAMES)
 WAITING_ROWS = 250_000  # before they are added up
@@ -20,9 +20,9 @@ class LinkCounts:
         self._waiting: list[IntArray] = []
         self._rows = 0
 
-    def see(self, finished: Finished) -> None:
+    def see(self, finished: ReceptionRecords) -> None:
         """Add the links that ended in a tick."""
-        rows = np.flatnonzero(finished.receiver != NOBODY)
+        rows = np.flatnonzero(finished.receiver != NO_ROBOT)
         link = (finished.arena[rows] * self._robots + finished.sender[rows]) * self._robots + finished.receiver[rows]
         self._waiting.append(link * FATES + finished.fate[rows])
         self._rows += len(rows)

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Finished, Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
 from swarmwire.metrics.network.latencies import Latencies
 from swarmwire.metrics.plain import plain
@@ -42,20 +42,20 @@ class RadioTally:
         if truth.finished is not None:
             self._time(truth.finished, truth.tick)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The account; with `last`, in which what is still in flight has its fate, the fates add up to intended."""
         if last is not None:
             self._add(last)
         return {"radio": [self._arena(arena) for arena in range(len(self._sent))]} if self._has_radio else {}
 
-    def _add(self, tally: Tally) -> None:
+    def _add(self, tally: PacketCounts) -> None:
         self._has_radio = True
         self._sent += tally.sent
         self._intended += tally.intended
         self._in_range += tally.in_range
         self._fates += tally.fates
 
-    def _time(self, finished: Finished, tick: int) -> None:
+    def _time(self, finished: ReceptionRecords, tick: int) -> None:
         arena, air_ns, agent_ns = self._latencies.of(finished, tick)
         self._air.add(arena, air_ns)
         self._agent.add(arena, agent_ns)

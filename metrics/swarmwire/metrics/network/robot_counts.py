@@ -4,7 +4,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import NOBODY, Departed, Finished, Static
+from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords
 
 FATES = len(FATE_NAMES)
 
@@ -29,7 +29,7 @@ class RobotCounts:
         self.as_sender: IntArray = np.zeros((self._rows, FATES), np.int64)
         self.as_receiver: IntArray = np.zeros((self._rows, FATES), np.int64)
 
-    def see(self, departed: Departed, finished: Finished) -> None:
+    def see(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
         """Add what a tick brought."""
         self._add_departed(departed)
         sender = finished.arena * self._robots + finished.sender
@@ -39,7 +39,7 @@ class RobotCounts:
             finished.fate,
             finished.size_bytes,
         )
-        linked = finished.receiver != NOBODY
+        linked = finished.receiver != NO_ROBOT
         if not linked.all():
             receiver, fate, size_bytes = receiver[linked], fate[linked], size_bytes[linked]
         _add(self.as_receiver, receiver * FATES + fate)
@@ -50,7 +50,7 @@ class RobotCounts:
         """Receivers of packets that left the radio for whom nothing is final yet, (rows,)."""
         return self.intended - self.as_sender.sum(axis=1)
 
-    def _add_departed(self, departed: Departed) -> None:
+    def _add_departed(self, departed: TransmissionRecords) -> None:
         sender = departed.arena * self._robots + departed.sender
         _add(self.packets, sender)
         _add(self.packets_on_air, sender[departed.fate == Fate.RECEIVED])

@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import NOBODY, Finished, Tally
+from swarmwire.comms.truth import NO_ROBOT, PacketCounts, ReceptionRecords
 from swarmwire.metrics.real_log.link_packets import (
     EVERYBODY,
     LinkPackets,
@@ -29,8 +29,8 @@ AFTER_ALL_NS = 2**62
 class RadioTruth:
     """What the radio did by each tick. Packets count that were sent after the first tick began."""
 
-    tallies: tuple[Tally, ...]  # one per tick
-    finished: tuple[Finished, ...]  # one per tick
+    tallies: tuple[PacketCounts, ...]  # one per tick
+    finished: tuple[ReceptionRecords, ...]  # one per tick
 
 
 def radio_truth(logs: RealLogs, base: TimeBase) -> RadioTruth:
@@ -48,15 +48,15 @@ def radio_truth(logs: RealLogs, base: TimeBase) -> RadioTruth:
     return RadioTruth(tallies, finished)
 
 
-def under_way(tallies: Sequence[Tally]) -> Tally:
+def under_way(tallies: Sequence[PacketCounts]) -> PacketCounts:
     """What was sent in these ticks, from the first on, and has no fate in them."""
     fates = np.zeros((1, len(FATE_NAMES)), np.int64)
     fates[0, Fate.IN_FLIGHT] = sum(int(tally.intended.sum() - tally.fates.sum()) for tally in tallies)
     none = np.zeros(1, np.int64)
-    return Tally(none, none, none, fates)
+    return PacketCounts(none, none, none, fates)
 
 
-def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: TimeBase) -> Finished:
+def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: TimeBase) -> ReceptionRecords:
     """All that was sent in time, a row per packet and receiver; of one that was too large one for all."""
     received = np.isfinite(links.received_s)
     large = [(sender, of, np.flatnonzero(of.too_large & _within(of.sent_s, base))) for sender, of in enumerate(own)]
@@ -73,10 +73,10 @@ def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: Ti
     late = ~received & (links.sent_s > base.end_s - usual_latency_s(links))
     final_ns[late] = AFTER_ALL_NS
     everybody = [np.where(of.to[rows] == EVERYBODY, robots - 1, of.to[rows] >= 0) for _, of, rows in large]
-    return Finished(
+    return ReceptionRecords(
         arena=np.zeros(len(to), np.int64),
         sender=with_large(links.sender, [np.full(len(rows), sender) for sender, _, rows in large]),
-        receiver=with_large(links.receiver, [zeros + NOBODY]),
+        receiver=with_large(links.receiver, [zeros + NO_ROBOT]),
         receivers=with_large(np.ones(len(received), np.int64), everybody),
         to=to,
         sequence=with_large(links.sequence, [of.sequence[rows] for _, of, rows in large]),
@@ -90,15 +90,15 @@ def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: Ti
 
 
 def _tallies(
-    rows: Finished, sent: IntArray, sent_tick: IntArray, final_tick: IntArray, ticks: int
-) -> tuple[Tally, ...]:
+    rows: ReceptionRecords, sent: IntArray, sent_tick: IntArray, final_tick: IntArray, ticks: int
+) -> tuple[PacketCounts, ...]:
     intended = np.bincount(sent_tick, rows.receivers, minlength=ticks + 1).astype(np.int64)
     fates = np.zeros((ticks + 1, len(FATE_NAMES)), np.int64)
     np.add.at(fates, (np.minimum(final_tick, ticks), rows.fate), rows.receivers)
     # A real network knows no range: all that a packet on air was meant for count as within it.
     in_range = fates[:, Fate.RECEIVED] + fates[:, Fate.LOST]
     return tuple(
-        Tally(sent[t : t + 1], intended[t : t + 1], in_range[t : t + 1], fates[t : t + 1]) for t in range(ticks)
+        PacketCounts(sent[t : t + 1], intended[t : t + 1], in_range[t : t + 1], fates[t : t + 1]) for t in range(ticks)
     )
 
 
@@ -109,10 +109,10 @@ def _sent_ticks(own: tuple[OwnPackets, ...], base: TimeBase) -> IntArray:
     return np.bincount(tick, minlength=base.ticks)[: base.ticks]
 
 
-def _picked(rows: Finished, at: IntArray) -> Finished:
+def _picked(rows: ReceptionRecords, at: IntArray) -> ReceptionRecords:
     columns: dict[str, Any] = {of.name: getattr(rows, of.name) for of in fields(rows)}
     picked: dict[str, Any] = {name: None if column is None else column[at] for name, column in columns.items()}
-    return Finished(**picked)
+    return ReceptionRecords(**picked)
 
 
 def _within(time_s: FloatArray, base: TimeBase) -> BoolArray:

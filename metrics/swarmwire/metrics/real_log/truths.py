@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.truth import Boundary, Group, Static, Tally, Truth
+from swarmwire.comms.truth import Boundary, Group, PacketCounts, Static, Truth
 from swarmwire.metrics.real_log.clock_offsets import in_step
 from swarmwire.metrics.real_log.poses import poses_at
 from swarmwire.metrics.real_log.radio_truth import RadioTruth, radio_truth, under_way
@@ -65,7 +65,7 @@ class RealRun:
                 value=None if motion.value is None else motion.value[tick],
             )
 
-    def under_way(self, ticks: int) -> Tally:
+    def under_way(self, ticks: int) -> PacketCounts:
         """What was under way as the last of the first so many ticks began."""
         return under_way(self._radio.tallies[:ticks])
 

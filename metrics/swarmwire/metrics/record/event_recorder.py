@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
 
@@ -51,7 +51,7 @@ class EventRecorder:
         ]
         self._writer.put(Chunk(len(rows), partial(_frame, rows)))
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Join the parts."""
         self._writer.close()
         return {"record_events": {"rows": self._writer.rows, "dropped": self._writer.dropped}}

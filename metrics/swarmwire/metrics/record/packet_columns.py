@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.packets import BROADCAST, FATE_NAMES
-from swarmwire.comms.truth import NOBODY, Finished, Static
+from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static
 from swarmwire.metrics.network.geometry_tick import geometry_tick
 from swarmwire.metrics.torus import shortest
 
@@ -49,7 +49,7 @@ class PacketSample:
         self._share = share
         self._keys: KeyArray = np.array([derive_key("recorded packets", seed) for seed in seeds], np.uint64)
 
-    def __call__(self, finished: Finished) -> BoolArray:
+    def __call__(self, finished: ReceptionRecords) -> BoolArray:
         """Whether to keep each row, (k,)."""
         if self._share >= 1.0:
             return np.ones(len(finished.sender), np.bool_)
@@ -67,16 +67,16 @@ class PacketColumns:
     topics: Mapping[int, str]  # name of a message's class by its tag
     first_tick: int  # of `poses`
     poses: list[FloatArray]  # of each tick since, (rows, 3)
-    parts: list[Finished] = field(default_factory=list[Finished])
+    parts: list[ReceptionRecords] = field(default_factory=list[ReceptionRecords])
 
     def frame(self) -> "pl.DataFrame":
         """The rows of the packets in the sample, as they ended."""
         import polars as pl
 
         keep = [self.sample(part) for part in self.parts]
-        taken = {name: self._joined(name, keep) for name in Finished.__slots__ if name not in OTHERWISE}
+        taken = {name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
-        has_receiver, is_addressed = pl.Series(taken["receiver"] != NOBODY), pl.Series(taken["to"] != BROADCAST)
+        has_receiver, is_addressed = pl.Series(taken["receiver"] != NO_ROBOT), pl.Series(taken["to"] != BROADCAST)
         columns: dict[str, Any] = {
             **taken,
             "fate": pl.Series(FATE_NAMES).gather(fate),
@@ -111,7 +111,7 @@ class PacketColumns:
     def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
         """Between sender and receiver when the packet went on air, (k,); NaN without a receiver or the tick's poses."""
         tick = geometry_tick(links["on_air_at_ns"], self.static.rate_hz) - self.first_tick
-        known = np.flatnonzero((links["receiver"] != NOBODY) & (tick >= 0) & (tick < len(self.poses)))
+        known = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.poses)))
         distance_m = np.full(len(tick), np.nan)
         if len(known):
             place = np.stack([pose[:, :2] for pose in self.poses])
@@ -122,7 +122,7 @@ class PacketColumns:
         return distance_m
 
 
-def _payload(part: Finished, keep: BoolArray) -> "pl.Series":
+def _payload(part: ReceptionRecords, keep: BoolArray) -> "pl.Series":
     """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
     import polars as pl
 

@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Finished, Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.packet_columns import PacketColumns, PacketSample, packet_schema
@@ -44,7 +44,7 @@ class PacketRecorder:
         self._sample = PacketSample(self._share, static.seeds)
         self._writer = TableWriter(self._folder, "packets", packet_schema(), self._may_drop)
         self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
-        self._parts: list[Finished] = []
+        self._parts: list[ReceptionRecords] = []
         self._rows, self._first_tick = 0, 0
         self._poses: list[FloatArray] = []  # of the chunk's ticks and some before
 
@@ -59,7 +59,7 @@ class PacketRecorder:
         if self._limit.reached(self._rows):
             self._hand_over()
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Write what is left and join the parts."""
         try:
             self._hand_over()

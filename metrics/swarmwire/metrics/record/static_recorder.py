@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.record.names import STATIC
 from swarmwire.metrics.record.static_file import write_static
 
@@ -21,6 +21,6 @@ class StaticRecorder:
     def see(self, truth: Truth) -> None:
         """Nothing: what is static does not change."""
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Nothing to add."""
         return {}

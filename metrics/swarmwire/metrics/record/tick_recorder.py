@@ -5,7 +5,7 @@ from typing import Any
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
@@ -58,7 +58,7 @@ class TickRecorder:
         if self._limit.reached(self._columns.ticks):
             self._hand_over()
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Write what is left and join the parts."""
         try:
             if self._columns.ticks:

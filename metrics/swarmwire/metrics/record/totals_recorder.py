@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swarmwire.comms.errors import RecordFailed
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.record.part_files import table_file, write_file
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class TotalsRecorder(ABC):
             self._has_radio = True
         self.add(truth)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Write the table."""
         if not self._has_radio:
             return {}

@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -102,7 +102,7 @@ def smallest_gap_m(
     return gap_m
 
 
-@borrowing()
+@kernel()
 def _pass_not(span_m, i, j):
     """Whether two robots are not wholly above one another."""
     return span_m[i, 0] < span_m[j, 1] and span_m[j, 0] < span_m[i, 1]

@@ -7,7 +7,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.swarm.strips import along_m, fill, first_order, room_for
@@ -67,7 +67,7 @@ def _with_room(pairs, most):
     return pairs if most <= len(pairs) else np.concatenate((pairs, np.empty((most, 2), np.int64)))
 
 
-@borrowing()
+@kernel()
 def _scan(strips, a, low, size, first, last, far_m, half_m, reach_m, wrap_m, rows, pairs, k):
     """Put place a with those of a strip's places first to last - 1 that are near it behind the first k `pairs`.
 

@@ -9,7 +9,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -70,7 +70,7 @@ def _mean_nearest_m(pose, alive, order, strips, wrap_m):
     return mean_m
 
 
-@borrowing()
+@kernel()
 def _nearest_square(strips, a, s, nearest, wrap_m):
     """The least of `nearest` and the squared distances from place a to the others of strip s: either way along x."""
     low, size = strips.start[s], strips.start[s + 1] - strips.start[s]
@@ -88,7 +88,7 @@ def _nearest_square(strips, a, s, nearest, wrap_m):
     return nearest
 
 
-@borrowing()
+@kernel()
 def _first_from(x, low, high, least):
     """The first of the places low to high - 1, sorted by x, that is not left of `least`; high if all are."""
     while low < high:

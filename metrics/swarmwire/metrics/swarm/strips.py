@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Static
 
 SLACK = 1.0 + 1e-9  # two robots at just the height may be rounded apart
@@ -40,7 +40,7 @@ def first_order(static: Static) -> IntArray:
     return np.tile(np.arange(static.robots), (static.arenas, 1))
 
 
-@borrowing()
+@kernel()
 def sort_by_x(order, pose):
     """Sort indices by x, equal ones by index; by insertion: what is nearly in order costs next to nothing."""
     for k in range(1, len(order)):
@@ -55,7 +55,7 @@ def sort_by_x(order, pose):
         order[place] = moved
 
 
-@borrowing()
+@kernel()
 def fill(strips, order, pose, alive, height_m, most, side_y_m):
     """Sort the robots alive of an arena into strips: returns how many, the y of the lowest side, and the height, in m.
 
@@ -92,18 +92,18 @@ def fill(strips, order, pose, alive, height_m, most, side_y_m):
     return count, low_m, span_m / count
 
 
-@borrowing()
+@kernel()
 def _strip_of(y, low_m, per_m, count):
     return min(max(int((y - low_m) * per_m), 0), count - 1)
 
 
-@borrowing()
+@kernel()
 def place_at(low, size, v):
     """The v-th place of the strip that begins at `low`; on a torus -1 is its last, and `size` its first again."""
     return low + (v + size if v < 0 else v - size if v >= size else v)
 
 
-@borrowing()
+@kernel()
 def along_m(strips, a, low, size, v, side_x_m):
     """How far along x the v-th place of a strip is from place a, a turn of the torus on or back as v has it."""
     turn_m = -side_x_m if v < 0 else side_x_m if v >= size else 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Finished
+from swarmwire.comms.truth import ReceptionRecords
 from swarmwire.metrics.viewer.colors import FATES, packed
 from swarmwire.metrics.viewer.rows import RerunRows
 
@@ -27,7 +27,7 @@ def begin_lost(rec: Any) -> None:
     rec.log("world/lost_packets", look, static=True)
 
 
-def add_lost(rows: RerunRows, finished: Finished, arena: int, position_m: FloatArray) -> None:
+def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m: FloatArray) -> None:
     """Add the packets of an arena that ended unheard since the last tick, as lines between its robots' positions.
 
     position_m (robots, 2) is where they are now, which is not quite where they were when the packet went on air. A

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.palette import Color
 from swarmwire.metrics.registry import DELIVERY
 from swarmwire.metrics.viewer.colors import FATES, MARK
@@ -62,7 +62,7 @@ class RerunPlots:
         if any(self._concerns(event) for event in truth.events):
             rows.add("plots/shares/event", rr.Scalars.columns, scalars=[_EVENT_MARK])
 
-    def _concerns(self, event: Happened) -> bool:
+    def _concerns(self, event: EventRecord) -> bool:
         own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)
         return not event.singly or bool(event.changed[own].any())
 

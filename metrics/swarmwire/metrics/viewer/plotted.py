@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.run_views import Series
+from swarmwire.comms.run_views import MetricSeries
 from swarmwire.metrics.metric import Metric
 
-Plotted = Metric | Series  # a name, a unit and bounds
+Plotted = Metric | MetricSeries  # a name, a unit and bounds
 
 
 class Measured(Protocol):

@@ -5,7 +5,7 @@ from typing import Any
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.viewer.about import about
@@ -112,7 +112,7 @@ class RerunRecording:
             raise
         self._rec.save(self._path, default_blueprint=layout)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Close the file, whatever fails. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
         try:
             self._rows.send()

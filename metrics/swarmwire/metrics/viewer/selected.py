@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import Light, Proximity
+from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.viewer.colors import LIGHT, MARK, packed
@@ -119,7 +119,7 @@ class RerunSelected:
             if at < len(readings.rows) and readings.rows[at] == self._row:
                 self._sensed = {name: readings.fields[name][at].copy() for name in _DRAWN if name in readings.fields}
 
-    def _bars(self, sheet: Proximity | Light, length_m: FloatArray, heading_rad: float) -> FloatArray:
+    def _bars(self, sheet: ProximitySpec | LightSpec, length_m: FloatArray, heading_rad: float) -> FloatArray:
         """Lines of these lengths outwards from the rim, (sensors, 2, 2) from the robot's centre."""
         angle, rim_m = sheet.angle_rad + heading_rad, self._group.body.radius_m
         lines = np.empty((len(angle), 2, 2))
@@ -128,7 +128,7 @@ class RerunSelected:
         lines[:, 1] *= (rim_m + length_m)[:, None]
         return lines
 
-    def _hits(self, truth: Truth, sheet: Proximity, rays: FloatArray) -> NDArray[np.uint32]:
+    def _hits(self, truth: Truth, sheet: ProximitySpec, rays: FloatArray) -> NDArray[np.uint32]:
         """The colour of each ray, (rays,), by what it meets."""
         seen = self._sensed["proximity.value"] > sheet.noise
         if not seen.any():

@@ -9,7 +9,7 @@ from swarmwire.deploy.certificates.folder_access import access_in, network_in
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 from tests.integration.deploy.machines.test_three_machines import lab
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import Joiners, Watcher
@@ -50,7 +50,7 @@ class BehindRouter(Joiners):
     def kill_router(self) -> None:
         self.routers[-1].process.send_signal(signal.SIGKILL)
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """Once all are lost, the router is started again, and they after it."""
         super().changed(change, free)
         if change.what != "lost":

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.lanes import Span
@@ -160,7 +160,7 @@ def test_a_damaged_table_costs_its_figure_and_is_named(tmp_path):
 
 def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
     of = static(3)
-    kill = Happened(0, 0.1, "kill", False, np.array([False, True, True]))
+    kill = EventRecord(0, 0.1, "kill", False, np.array([False, True, True]))
     seen = [replace(one, events=(kill,) if one.tick == 1 else ()) for one in wandering(of, 6)]
     report = run_report(run_folder(tmp_path, of, seen))
     assert table(report, "All events") == {"0.1": ("kill", "flock-1, flock-2")}

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
@@ -27,7 +27,7 @@ DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 
 def seen_ticks(of):
-    kill = Happened(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
+    kill = EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
     ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED])
     counted = tally({Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.RECEIVED: 1})
     yield from wandering(of, TICKS, events=(kill,), finished=ended, tally=counted)

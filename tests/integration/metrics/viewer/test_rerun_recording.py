@@ -7,7 +7,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Finished, Group, Happened, Light, Obstacle
+from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.recording_check import check_recording
@@ -156,7 +156,7 @@ def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_a
 
 def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
     of = static(3, arenas=2)
-    own = Finished(
+    own = ReceptionRecords(
         arena=np.array([1, 1, 1, 0, 1]),
         sender=np.array([0, 1, 2, 0, 0]),
         receiver=np.array([1, 2, 0, 1, -1]),
@@ -177,9 +177,9 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
 
 def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
     of = static(2, arenas=2)
-    kill = Happened(0, 0.15, "kill", False, np.array([True, False, True, True]))
+    kill = EventRecord(0, 0.15, "kill", False, np.array([True, False, True, True]))
     elsewhere, here = (
-        Happened(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+        EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
         for changed in ([True, True, False, False], [False, False, True, False])
     )
     happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))

@@ -28,7 +28,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.registry import RunnerHealth
-from swarmwire.world.backends.zenoh_backend import LockstepBackend, Surroundings
+from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
 from tests.support.waiting import TIMEOUT_S
 
@@ -250,7 +250,7 @@ def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
 
 def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
     backend = LockstepBackend(
-        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), Surroundings(lambda: "its process ended")
+        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), BackendHooks(lambda: "its process ended")
     )
     try:
         with pytest.raises(RunnerLost, match="its process ended"):
@@ -327,7 +327,7 @@ def kill_one(agent_host: "subprocess.Popen[bytes]") -> None:
 
 def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
     with ExitStack() as later, processes(endpoint, ["a", "b"]) as agent_host:
-        around = Surroundings(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        around = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
         backend = LockstepBackend(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
         later.callback(backend.close)
         backend.start()
@@ -344,7 +344,7 @@ def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
 def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
     with processes(endpoint, ["a", "b"]) as agent_host:
         asked: list[bool] = []
-        around = Surroundings(stopped=lambda: bool(asked))
+        around = BackendHooks(stopped=lambda: bool(asked))
         backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
         try:
             backend.start()
@@ -393,7 +393,7 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
                 child.resume()
             return False
 
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, Surroundings(stopped=frozen))
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, BackendHooks(stopped=frozen))
         with closing(backend):
             backend.start()
             child = psutil.Process(agent_host.pid).children()[0]

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
-from swarmwire.world.gateways.tracker import Tracker
+from swarmwire.world.gateways.tracker import EmulatedTracker
 from tests.support.clocks import FakeClock
 from tests.support.metrics.truths import static
 from tests.support.swarms import KEYS, peers
@@ -30,7 +30,7 @@ def seen(of, robots):
         listens = RobotsTracker(robot, KEYS, robots)
         listens.open()
         clock = DatedClock()
-        tells = Tracker(world, KEYS, clock)
+        tells = EmulatedTracker(world, KEYS, clock)
         tells.begin(of)
         yield tells, listens, clock, world
         tells.end()

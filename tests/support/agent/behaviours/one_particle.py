@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.agent.behaviours import PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, GroupReadings
@@ -23,7 +23,7 @@ class One:
         self.tick, self.place = 0, HERE
         self.wheels_m, self.heading_rad, self.brightness = [5.0, 6.0], 0.0, 0.1
         self.rays = np.zeros(8)
-        self._host = hosted(group("", [0], body="epuck-gps", params=dict(params)), kind)
+        self._host = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
 
     def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
         k = len(bests)

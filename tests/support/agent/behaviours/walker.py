@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.messages import Message
 from swarmwire.comms.packets import Payloads, ReceivedPackets
@@ -18,7 +18,7 @@ class Walker:
     """An e-puck at 10 Hz; `n` of them differ in their draws alone."""
 
     def __init__(self, kind: type[VectorAgent[Any]], word: type[Message] | None = None, n: int = 1, **params: Any):
-        self._host = hosted(group("", list(range(n)), body="epuck", params=params), kind)
+        self._host = agent_group(group("", list(range(n)), body="epuck", params=params), kind)
         self._word, self._n, self._tick = word, n, 0
 
     @property

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
-from swarmwire.agent.on_robot.controller import Mind, RobotSensors, group_of
+from swarmwire.agent.on_robot.controller import Controller, RobotSensors, group_of
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.safety import End, Motors, Watchdog
+from swarmwire.agent.on_robot.safety import Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
@@ -141,7 +141,7 @@ class ScriptedRadio:
 class Onlooking:
     """Keeps the rows and lines that it is told; after `ends_after` steps it asks for the end."""
 
-    def __init__(self, end: End) -> None:
+    def __init__(self, end: StopFlag) -> None:
         self._end = end
         self.rows: list[TickRow] = []
         self.lines: list[str] = []
@@ -177,12 +177,12 @@ class Rig:
         needs: tuple[str, ...] = (),
         watchdog_s: float = 0.5,
     ) -> None:
-        self.clock, self.end = DatedFakeClock(), End()
+        self.clock, self.end = DatedFakeClock(), StopFlag()
         self.driver = ScriptedDriver(self.clock, measures, body)
         self.radio = radio or ScriptedRadio()
         self.pose: Pose | None = None
         group = group_of("robot-0", 0, f"{PLAYERS}:{agent}", params or {}, self.driver.body, seed=5)
-        mind = Mind(group, RATE_HZ, (), limits or limits_for(self.driver.body, None, None, ""))
+        mind = Controller(group, RATE_HZ, (), limits or limits_for(self.driver.body, None, None, ""))
         readings = RobotSensors(self.driver, frozenset(needs), frozenset(tracked), lambda: self.pose)
         self.motors = Motors(self.driver)
         self.watchdog = Watchdog(watchdog_s, self.motors.stop, self.clock)

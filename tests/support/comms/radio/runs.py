@@ -12,9 +12,9 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.radio.results import News
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.traces import LinkTraces
-from swarmwire.comms.truth import Obstacle, Tally
+from swarmwire.comms.truth import Obstacle, PacketCounts
 
 RATE_HZ = 10
 TICK_NS = tick_start_ns(1, RATE_HZ)
@@ -26,17 +26,17 @@ class Run:
     """What a medium told over a run, tick by tick."""
 
     medium: RadioMedium
-    news: list[News] = field(default_factory=list)
-    last: Tally | None = None
+    news: list[Results] = field(default_factory=list)
+    last: PacketCounts | None = None
     edges: IntArray = field(
         default_factory=lambda: np.empty((0, 2), np.int64)
     )  # of the radio graph, if it was asked for
 
     @property
-    def tally(self) -> Tally:
+    def tally(self) -> PacketCounts:
         """All tallies added up."""
         tallies = [one.tally for one in self.news] + ([self.last] if self.last else [])
-        return Tally(*(np.sum([getattr(t, f.name) for t in tallies], axis=0) for f in fields(Tally)))
+        return PacketCounts(*(np.sum([getattr(t, f.name) for t in tallies], axis=0) for f in fields(PacketCounts)))
 
     def fates(self) -> dict[str, int]:
         """Receivers by fate, those with none left out."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.agent.on_robot.assembly import run_robot
-from swarmwire.agent.on_robot.plan import plan_of
-from swarmwire.agent.on_robot.safety import End
+from swarmwire.agent.on_robot.plan import robot_config
+from swarmwire.agent.on_robot.safety import StopFlag
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import ScaledClock, WallClock
 from swarmwire.comms.interfaces import Observer
@@ -27,7 +27,7 @@ class DrivenRobots:
 
     def __init__(self, simulation: Simulation, radio: str | None, broken: bool) -> None:
         assert simulation.served is not None
-        self._end, self._broken = End(), broken
+        self._end, self._broken = StopFlag(), broken
         chosen = {} if radio is None else {"radio.kind": radio}
         self._robots = {robot.file: chosen for robot in simulation.served.robots if robot.file}
         self._together = threading.Barrier(len(self._robots) + 1, timeout=20.0)
@@ -50,7 +50,7 @@ class DrivenRobots:
     def _drive(self, file: Path, given: dict[str, Any]) -> None:
         settings = read_settings(file, {key: ("test", value) for key, value in given.items()})
         clock = ScaledClock(WallClock(), settings.pace)
-        plan = plan_of(settings, str(file), clock)
+        plan = robot_config(settings, str(file), clock)
         driver = plan.driver
         driver.open = partial(self._open, driver, driver.open)
         if self._broken:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import ArenaResult
 
 METRICS = {
@@ -33,7 +33,7 @@ class Speeds:
         self.moved += np.stack([np.hypot(of[..., 0], of[..., 1]).mean(1), np.abs(of[..., 2]).mean(1)])
         self.ticks += 1
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
     def of(self, arena: int) -> dict[str, float]:

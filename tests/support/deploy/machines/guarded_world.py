@@ -11,7 +11,7 @@ import zenoh
 
 from swarmwire.agent import runner
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, open_runner
@@ -21,7 +21,7 @@ from swarmwire.deploy.certificates.folder_access import access_in, network_in
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 from tests.support.deploy.commands import LOSSY
 
 SHORT = ["duration_s=2"]
@@ -83,7 +83,7 @@ class GuardedWorld:
             self._threads.append(threading.Thread(target=self._play, args=(name, robots)))
             self._threads[-1].start()
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """Runners come and go."""
 
     def refused(self, name: str, why: str) -> None:
@@ -100,10 +100,10 @@ class GuardedWorld:
         except BaseException as error:  # noqa: BLE001 - an observer that fails is left out, but this one is the test
             self._fault = error
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
         asked = runner.Asked(JoinRequest(names=robots))
         with self.session_of(name) as session:
-            runner.play(session, self.keys, name, runner.Inbox(), lambda: asked)
+            runner.play(session, self.keys, name, runner.TickInbox(), lambda: asked)

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Static, Tally, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 BEGAN_S = 1_767_225_600.0
 TICKS = "tick,t_s,late,x_m,y_m,heading_rad,drive,linear_mps,angular_radps,state,value,charge"
@@ -26,7 +26,7 @@ class Watched:
     def see(self, truth: Truth) -> None:
         self.truths.append(truth)
 
-    def end(self, last: Tally | None) -> dict[str, Any]:
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
         return {}
 
 

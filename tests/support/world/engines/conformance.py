@@ -10,11 +10,11 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Boundary, Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
-from swarmwire.world.engines.engine import Engine, Motors, Setting
+from swarmwire.world.engines.engine import Engine, EngineConfig, Motors
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
-Make = Callable[[Setting, FloatArray], Engine]
+Make = Callable[[EngineConfig, FloatArray], Engine]
 FLOOR: tuple[Make, ...] = (PymunkEngine, DiscsEngine)
 EVERY: tuple[Make, ...] = (*FLOOR, KinematicEngine)
 TICK_S = 0.1
@@ -47,7 +47,7 @@ def made(
     standing = (tuple(obstacles),) * arenas
     low = np.zeros(n)
     of = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
-    return make(Setting(*of, TICK_S, steps), at)
+    return make(EngineConfig(*of, TICK_S, steps), at)
 
 
 def asked(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mps: Any = 0.0) -> FloatArray:

@@ -7,21 +7,21 @@ from hypothesis.strategies import DrawFn
 from pydantic import TypeAdapter, ValidationError
 
 from swarmwire.agent.agent import NoAgent
-from swarmwire.agent.host import Host
+from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.runner import given_robots
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
-from swarmwire.comms.wire.control_frames import Request, decode_reply, encode_reply, encode_request
-from swarmwire.comms.wire.join import JoinRequest, Offer, OfferedGroup
+from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request
+from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.page.app import MAX_BYTES
 from swarmwire.deploy.page.orders import Order
-from swarmwire.world.backends.join_policy import Refused, Terms
+from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.live_events import Interventions
+from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.scenario.file import scenario_from
 from tests.tools.fuzz.mutations import JSON, TEXTS, one_in, pick
 from tests.tools.fuzz.small_run import SCENARIO, small_run
@@ -53,16 +53,16 @@ class Join(DocumentTarget):
 
     name = "join"
     quick = 150
-    refusals = (BadFrame, Refused)
+    refusals = (BadFrame, JoinRefused)
 
     def make_samples(self) -> list[bytes]:
         self.run = small_run()
         groups = tuple(
-            OfferedGroup(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
+            GroupInfo(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
             for group in self.run.whole.groups
         )
-        offer = Offer("small-1", "small", SHA256, "0.1.0", 10, None, groups)
-        self.terms = Terms(offer=offer, open=True, memory=self.run.layouts)
+        offer = SessionInfo("small-1", "small", SHA256, "0.1.0", 10, None, groups)
+        self.terms = JoinPolicy(offer=offer, open=True, memory=self.run.layouts)
         agents = {group.name: SHA256 for group in groups}
         return [
             JoinRequest().encode(),
@@ -81,7 +81,7 @@ class Join(DocumentTarget):
         try:
             roster.offer(data)
             assignment, _ = given_robots(roster.join(runner, data))
-        except Refused:
+        except JoinRefused:
             if roster.missing_robots != free or roster._by_runner:
                 raise AssertionError("refused, and yet robots are allocated") from None
             raise
@@ -95,13 +95,13 @@ class Offers(DocumentTarget):
     name = "offer"
 
     def make_samples(self) -> list[bytes]:
-        groups = tuple(OfferedGroup(name, "a.b:C", SHA256, 3, (f"{name}-0", f"{name}-2")) for name in ("a", "b"))
-        offer = Offer("run-1", "small", SHA256, "0.1.0", 10, None, groups)
-        return [offer.encode(), Offer("run-2", "other", "", "0.1.0", 10, 2.5, ()).encode()]
+        groups = tuple(GroupInfo(name, "a.b:C", SHA256, 3, (f"{name}-0", f"{name}-2")) for name in ("a", "b"))
+        offer = SessionInfo("run-1", "small", SHA256, "0.1.0", 10, None, groups)
+        return [offer.encode(), SessionInfo("run-2", "other", "", "0.1.0", 10, 2.5, ()).encode()]
 
     def feed(self, case: bytes) -> None:
-        offer = Offer.decode(case)
-        if Offer.decode(offer.encode()) != offer and offer.real_time == offer.real_time:
+        offer = SessionInfo.decode(case)
+        if SessionInfo.decode(offer.encode()) != offer and offer.real_time == offer.real_time:
             raise AssertionError("an offer that is not what was read")
 
 
@@ -114,12 +114,12 @@ class Assignments(DocumentTarget):
 
     def make_samples(self) -> list[bytes]:
         run = small_run()
-        memory = Host(run.parts[0]).memory([group.name for group in run.parts[0].groups])
+        memory = AgentExecutor(run.parts[0]).memory([group.name for group in run.parts[0].groups])
         memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.whole, encode_memory({})))
         return [msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one}) for part, one in memories]
 
     def feed(self, case: bytes) -> None:
-        Host(*given_robots(case))
+        AgentExecutor(*given_robots(case))
 
 
 class Control(DocumentTarget):
@@ -130,11 +130,17 @@ class Control(DocumentTarget):
     refusals = (BadInput,)
 
     def make_samples(self) -> list[bytes]:
-        requests = [Request("pause"), Request("resume"), Request("step", 3), Request("speed", 2.5), Request("speed")]
+        requests = [
+            ControlRequest("pause"),
+            ControlRequest("resume"),
+            ControlRequest("step", 3),
+            ControlRequest("speed", 2.5),
+            ControlRequest("speed"),
+        ]
         self.scenario = scenario_from(SCENARIO, "small.toml")
         self.bodies = {group.name: group.body for group in small_run().world.static.groups}
         self._start()
-        return [encode_request(of) for of in (*requests, *(Request("event", event) for event in EVENTS))]
+        return [encode_request(of) for of in (*requests, *(ControlRequest("event", event) for event in EVENTS))]
 
     def feed(self, case: bytes) -> None:
         if self.taken > MAX_EVENTS:
@@ -151,7 +157,7 @@ class Control(DocumentTarget):
 
     def _start(self) -> None:
         self.taken, clock = 0, WallClock()
-        self.interventions = Interventions(self.scenario, self.bodies)
+        self.interventions = LiveEvents(self.scenario, self.bodies)
 
         class Now:
             tick = 0
@@ -178,7 +184,7 @@ class AnyRequest:
 
     def __getattr__(self, do: str) -> Any:
         def request(*value: Any) -> int:
-            msgpack.unpackb(encode_request(Request(do, *value)))
+            msgpack.unpackb(encode_request(ControlRequest(do, *value)))
             return 0
 
         return request

@@ -8,12 +8,12 @@ from hypothesis.strategies import DrawFn
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
-from swarmwire.agent.drivers.epuck2.link import Link
+from swarmwire.agent.drivers.epuck2.link import RobotLink
 from swarmwire.agent.drivers.ros2.feed import Feed
 from swarmwire.agent.drivers.ros2.topics import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
-from swarmwire.comms.robots.epuck2.packets import Request, Settings
+from swarmwire.comms.robots.epuck2.packets import PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
 from swarmwire.comms.robots.ros2.links import Inlet
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
@@ -64,8 +64,10 @@ class Epuck2Commands(ByteTarget):
     name = "epuck2-robot"
 
     def make_samples(self) -> list[bytes]:
-        one, two = (RobotCommand(100, -200, request=of).encoded() for of in (Request.NOTHING, Request.SENSORS))
-        steps = RobotCommand(3, 4, request=Request.SENSORS, settings=Settings.SET_STEPS).encoded()
+        one, two = (
+            RobotCommand(100, -200, request=of).encoded() for of in (PacketRequest.NOTHING, PacketRequest.SENSORS)
+        )
+        steps = RobotCommand(3, 4, request=PacketRequest.SENSORS, settings=RobotSettingsBits.SET_STEPS).encoded()
         return [one, two, steps, one + two + one + two]
 
     def feed(self, case: bytes) -> str | None:
@@ -128,7 +130,7 @@ def link_of(arriving: list[bytes]) -> Any:
         def poll(self, _timeout_ms: float) -> bool:
             return bool(arriving)
 
-    link: Any = object.__new__(Link)
+    link: Any = object.__new__(RobotLink)
     link._counts, link._answers, link.sent, link.answered, link.newest = Counter(), Answers(), 1, 0, None
     link._socket = link._arriving = Socket()
     return link

@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from hypothesis.strategies import DrawFn
 
-from swarmwire.agent.host import Host
-from swarmwire.agent.runner import Inbox
+from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.runner import TickInbox
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
-from swarmwire.comms.run_views import Glimpse, Scene, Series
+from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
-from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import Roster
+from swarmwire.world.backends.registry import RunnerRegistry
 from tests.support.agent.hosts import PLAYERS
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.small_run import RUNNERS, joined, readings_of, small_run
@@ -47,7 +47,7 @@ class WorldFrames(FrameTarget):
     def make_samples(self) -> list[bytes]:
         self.run = small_run()
         self.valid = {name: answers[-1] for name, answers in self.run.answers.items()}
-        self.rosters: dict[str, Roster[Any]] = {}
+        self.rosters: dict[str, RunnerRegistry[Any]] = {}
         rows = np.sort(np.concatenate([group.rows for group in self.run.parts[0].groups]))
         sent = decode_actions(frames.decode(self.valid["one"]), rows).sent
         return [
@@ -103,7 +103,7 @@ class WorldFrames(FrameTarget):
 
     def _roster(self, stage: str) -> Any:
         if stage not in self.rosters:
-            parts, terms = list(self.run.parts), Terms(memory=self.run.layouts)
+            parts, terms = list(self.run.parts), JoinPolicy(memory=self.run.layouts)
             made: Any = RealTime(parts, 0.5, 30.0, "stop", terms, subtick=True) if stage == "real time" else None
             roster = joined(made or Lockstep(parts, terms=terms), ready=stage != "building")
             if stage != "building":
@@ -167,7 +167,7 @@ class RunnerFrames(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         self.run = run = small_run()
-        self.host: Host | None = None
+        self.host: AgentExecutor | None = None
         decoded = decode_tick(
             frames.decode(run.frames["one"][-1]), run.whole.measures or (), readings_of(run.parts, "one")
         )
@@ -177,9 +177,9 @@ class RunnerFrames(FrameTarget):
         return [*run.frames["one"][-3:], between, end]
 
     def feed(self, case: bytes) -> str | None:
-        inbox, part, refused = Inbox(), self.run.parts[0], None
+        inbox, part, refused = TickInbox(), self.run.parts[0], None
         inbox._arrived = Arrivals(case)
-        host = self.host = self.host or Host(part)
+        host = self.host = self.host or AgentExecutor(part)
         try:
             for inputs in inbox.ticks(part, host.receive):
                 self.host = None  # its agents may now remember what no world sends
@@ -188,7 +188,7 @@ class RunnerFrames(FrameTarget):
             return "dropped" if inbox.dropped else refused
         return inbox.ended.how
 
-    def _act(self, host: Host, inputs: Any) -> str | None:
+    def _act(self, host: AgentExecutor, inputs: Any) -> str | None:
         """Only the agents' own code may fail, or all that misses a reading that the world does not give."""
         try:
             host.on_receive(*inputs) if len(inputs) == 2 else host.act(*inputs)
@@ -226,13 +226,13 @@ class Truths(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         self.scene, truths = _scene(), small_run().truths
-        glimpses = [Glimpse(truth, at, len(truths), np.array([[0.5]])) for at, truth in enumerate(truths)]
+        glimpses = [ObservedTick(truth, at, len(truths), np.array([[0.5]])) for at, truth in enumerate(truths)]
         return list(map(encode_truth, glimpses[-3:]))
 
     def feed(self, case: bytes) -> None:
         encode_truth(decode_truth(frames.decode(case), self.scene))
 
 
-def _scene() -> Scene:
+def _scene() -> ObservedRun:
     static = small_run().world.static
-    return Scene(static, (Series("order", "", (0.0, 1.0)),), static.robot_names[0])
+    return ObservedRun(static, (MetricSeries("order", "", (0.0, 1.0)),), static.robot_names[0])

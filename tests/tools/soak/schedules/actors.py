@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.world.backends.registry import Change
+from swarmwire.world.backends.registry import RunnerEvent
 from tests.support.deploy.watching import WATCHER
 from tests.tools.soak.agenda import Agenda, Steps
 from tests.tools.soak.invariants import Broken
@@ -57,7 +57,7 @@ class Actors(threading.Thread):
         """The world listens."""
         self._world = endpoints[0]
 
-    def changed(self, change: Change, free: tuple[str, ...]) -> None:
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """A runner came or went."""
 
     def refused(self, runner: str, why: str) -> None:

@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours import BeaconAvoidance
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon, Traffic
 from swarmwire.agent.behaviours.neighbour_table import NOBODY, SLOTS, Remembered, forget, remember
 from swarmwire.agent.fields import Vectors
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.packets import Payloads, ReceivedPackets
@@ -26,7 +26,7 @@ class One:
 
     def __init__(self, heading_rad: float = 0.0, **params: float) -> None:
         self.tick, self.heading_rad = 0, heading_rad
-        self._host = hosted(group("", [0], params=dict(params)), BeaconAvoidance)
+        self._host = agent_group(group("", [0], params=dict(params)), BeaconAvoidance)
 
     def step(self, *beacons: tuple[float, float, float, float], late_ns: int = 0) -> tuple[float, float]:
         """Forward speed and turn rate; packets were received `late_ns` before the step."""

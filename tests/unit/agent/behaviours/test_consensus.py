@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.behaviours import Consensus
 from swarmwire.agent.behaviours.consensus import Value
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings
@@ -23,7 +23,7 @@ def told(*others: float, **params: float) -> float:
     zeros = np.zeros(len(others), np.int64)
     payloads = Payloads.of([Value(value=other).encode() for other in others])
     received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
-    host = hosted(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
+    host = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
     actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
     (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
     (value,) = actions.values.value.tolist()

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.behaviours import LennardJonesFlocking
 from swarmwire.agent.behaviours.lennard_jones_flocking import Here
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings
@@ -23,7 +23,7 @@ class One:
 
     def __init__(self, **params: float) -> None:
         self._tick = 0
-        self._host = hosted(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
+        self._host = agent_group(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
 
     def step(self, *neighbours: tuple[float, float], light_ray: int | None = None) -> tuple[float, float]:
         k = len(neighbours)

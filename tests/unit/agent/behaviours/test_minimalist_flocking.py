@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.behaviours import MinimalistFlocking
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import ReceivedPackets
@@ -31,7 +31,7 @@ class One:
 
     def __init__(self, **params: float) -> None:
         self._tick = 0
-        self._host = hosted(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
+        self._host = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
 
     def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
         fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}

@@ -11,7 +11,7 @@ from swarmwire.agent.behaviours import (
     ThresholdRule,
     ThresholdRuleProximity,
 )
-from swarmwire.agent.host import hosted
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
@@ -32,7 +32,7 @@ class One:
 
     def __init__(self, kind: type[VectorAgent], **params: float) -> None:
         self.body = "turtlebot3-burger" if "scan" in kind.needs else "footbot"
-        self._tick, self._host = 0, hosted(group("", [0], body=self.body, params=dict(params)), kind)
+        self._tick, self._host = 0, agent_group(group("", [0], body=self.body, params=dict(params)), kind)
 
     def step(self, **readings: FloatArray) -> tuple[float, float]:
         fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in readings.items()}

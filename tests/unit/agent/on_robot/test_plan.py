@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import GROUP, Command, Driver, driver_names, load_driver
-from swarmwire.agent.on_robot.controller import Mind, group_of
+from swarmwire.agent.on_robot.controller import Controller, group_of
 from swarmwire.agent.on_robot.plan import (
     OF_POSES,
-    Offer,
-    Plan,
+    Capabilities,
+    RobotConfig,
     SpeedLimits,
     agent_sha256,
     check_needs,
     limits_for,
-    plan_of,
+    robot_config,
     tracked,
 )
 from swarmwire.agent.on_robot.settings import read_settings
@@ -30,7 +30,7 @@ from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 
 
-def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> Plan:
+def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> RobotConfig:
     """The plan of an e-puck2; nothing is connected."""
     flags = {"agent": f"{PLAYERS}:{agent}", "driver.name": "epuck2", "driver.address": "10.0.0.1", **more}
     file = None
@@ -38,7 +38,7 @@ def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> Pl
         file = beside / "robot.toml"
         file.write_text("format = 1\n")
     settings = read_settings(file, {key: (key, value) for key, value in flags.items()})
-    return plan_of(settings, "robot.toml", DatedFakeClock())
+    return robot_config(settings, "robot.toml", DatedFakeClock())
 
 
 SWARM = {"robots": ["flock-0", "flock-1", "flock-2"], "name": "flock-1"}
@@ -49,7 +49,7 @@ def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
     assert plan.params == {"lane": 4}
     settings = plan.settings
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, seed=1)
-    mind = Mind(group, 10, None, plan.limits)
+    mind = Controller(group, 10, None, plan.limits)
     assert mind.step(0, {}, ReceivedPackets.none(), NO_TX_STATUSES).command.linear_mps == pytest.approx(0.04)
 
 
@@ -113,9 +113,11 @@ BODY = load_body("epuck2")  # it has a compass, and no positioning
 FOOTBOT = load_body("footbot")
 
 
-def _offer(driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY) -> Offer:
+def _offer(
+    driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY
+) -> Capabilities:
     tells = frozenset(OF_POSES) if radio == "zenoh" and tracker else frozenset[str]()
-    return Offer(body, "epuck2", frozenset(driver), radio, tells, tracker)
+    return Capabilities(body, "epuck2", frozenset(driver), radio, tells, tracker)
 
 
 MET = {

@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.on_robot.log import TickRow, new_log
-from swarmwire.agent.on_robot.network_check import Presence
-from swarmwire.agent.on_robot.reporting import NOT_YET, Onlookers, StatusFile, Terminal, short, status_path
+from swarmwire.agent.on_robot.network_check import LivenessWatch
+from swarmwire.agent.on_robot.reporting import NOT_YET, RobotObservers, StatusFile, Terminal, short, status_path
 from swarmwire.agent.on_robot.safety import Control
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.wire.radio_bridge import Pose
@@ -36,7 +36,7 @@ class _Set:
         self.file = folder / "status.json"
         self.control = Control(lambda: None)
         self.status = {**NOT_YET, "state": "running", "counts": {"clipped_commands": 3}}
-        self.onlookers = Onlookers(
+        self.onlookers = RobotObservers(
             self.clock, pace, _Watched(), StatusFile(self.file), self.control, {"name": "robot-0"}, self.log
         )
         self.onlookers.attach(lambda: self.status)
@@ -235,7 +235,9 @@ class _Swarm:
         self.clock, self.said, self.received = FakeClock(), list[str](), set[str]()
         self.pose: Pose | None = None
         others = ("k-1", "k-2")
-        self.presence = Presence(self.clock, self.said.append, others, lambda: self.received, lambda: self.pose, pace)
+        self.presence = LivenessWatch(
+            self.clock, self.said.append, others, lambda: self.received, lambda: self.pose, pace
+        )
 
     def seconds(self, n: int) -> list[str]:
         """What it says in so many seconds."""

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
-from swarmwire.agent.on_robot.controller import Mind, group_of
+from swarmwire.agent.on_robot.controller import Controller, group_of
 from swarmwire.agent.on_robot.loop import LOST, RUNNING, Pacer
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED
@@ -313,7 +313,7 @@ def test_ticks_of_a_pause_that_was_meant_are_neither_late_nor_skipped():
 def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_moves_them():
     body = replace(load_body("epuck2"), actuators={"arm": CustomActuatorSpec("a:Arm", {}, 3)})
     group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
-    mind = Mind(group, RATE_HZ, None, limits_for(body, None, None, ""))
+    mind = Controller(group, RATE_HZ, None, limits_for(body, None, None, ""))
     for tick in range(2):
         mind.step(tick, {}, ReceivedPackets.none(()), NO_TX_STATUSES)
     assert mind.actuations == 6

@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command, DriverLost
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
-from swarmwire.agent.on_robot.safety import SIGNALS, End, Heartbeats, Motors, Watchdog, by_signals
+from swarmwire.agent.on_robot.safety import SIGNALS, Heartbeats, Motors, StopFlag, Watchdog, by_signals
 from swarmwire.comms.clock import WallClock
 from tests.support.agent.on_robot.scripted import Rig
 from tests.support.clocks import MS, FakeClock
@@ -145,7 +145,7 @@ def test_a_stop_that_was_taken_by_a_robot_that_was_given_up_is_not_believed_eith
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_asks_for_the_end_and_the_first_reason_stays(number):
-    end = End()
+    end = StopFlag()
     with by_signals(end, patient=True):
         assert not end
         signal.raise_signal(number)
@@ -154,7 +154,7 @@ def test_a_signal_asks_for_the_end_and_the_first_reason_stays(number):
 
 
 def test_a_second_interrupt_interrupts_an_agent_without_a_guard():
-    end = End()
+    end = StopFlag()
     with by_signals(end, patient=False):
         signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
@@ -163,7 +163,7 @@ def test_a_second_interrupt_interrupts_an_agent_without_a_guard():
 
 def test_signals_do_what_they_did_before_once_it_is_over():
     before = [signal.getsignal(number) for number in SIGNALS]
-    with by_signals(End(), patient=False):
+    with by_signals(StopFlag(), patient=False):
         pass
     assert [signal.getsignal(number) for number in SIGNALS] == before
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from swarmwire.agent.on_robot.network_check import check_proof
+from swarmwire.agent.on_robot.network_check import check_certificates
 from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
@@ -173,7 +173,7 @@ def folders(tmp_path_factory) -> tuple[Path, Path]:
 
 
 def _check(ca: Path, certificate: Path, key: Path) -> None:
-    check_proof(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
+    check_certificates(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
 
 
 def test_what_goes_together_is_taken(folders):

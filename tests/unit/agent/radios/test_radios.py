@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, Link, PacketHeader
+from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
 from swarmwire.comms.errors import BadFrame
 
 
-def link(*packets: tuple[int, int]) -> Link:
+def link(*packets: tuple[int, int]) -> LinkStatistics:
     """A link over which packets with these numbers and times of sending came."""
-    made = Link()
+    made = LinkStatistics()
     for at, (sequence, sent_ns) in enumerate(packets):
         made.add(sequence, sent_ns, at)
     return made
@@ -36,7 +36,7 @@ def test_a_sender_that_began_anew_has_lost_nothing():
 
 
 def test_nobody_received_is_no_share():
-    assert math.isnan(Link().delivery)
+    assert math.isnan(LinkStatistics().delivery)
 
 
 headers = st.builds(

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body, merged
-from swarmwire.comms.bodies.ranging_specs import Proximity
-from swarmwire.comms.bodies.sensor_specs import Positioning
+from swarmwire.comms.bodies.ranging_specs import ProximitySpec
+from swarmwire.comms.bodies.sensor_specs import PositioningSpec
 from swarmwire.comms.errors import BadInput
 
 WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
 
 
-def proximity_of(name: str) -> Proximity:
+def proximity_of(name: str) -> ProximitySpec:
     spec = load_body(name).proximity
     assert spec is not None
     return spec
@@ -217,7 +217,7 @@ def test_a_body_like_another_differs_only_in_what_it_says() -> None:
         **epuck.as_mapping(),
         "sensors": None,
     }
-    assert gps.sensors == {**epuck.sensors, "positioning": Positioning(0.01)}
+    assert gps.sensors == {**epuck.sensors, "positioning": PositioningSpec(0.01)}
     mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
     assert (mine.wheels.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
     assert (mine.name, mine.sensors) == ("mine", gps.sensors)

@@ -6,7 +6,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from swarmwire.comms.bodies.body import Body, NotFitted, body_from, load_body
+from swarmwire.comms.bodies.body import Body, IncompatibleBody, body_from, load_body
 from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels
 from swarmwire.comms.errors import BadInput
 
@@ -92,7 +92,7 @@ def test_a_body_like_another_with_another_kind_of_drive_has_nothing_of_its_drive
 
 def test_only_a_body_with_wheels_tells_of_them() -> None:
     assert driven(TWIST).wheels.wheel_base_m == 0.16
-    with pytest.raises(NotFitted, match="the body mine has no wheels: its drive is holonomic"):
+    with pytest.raises(IncompatibleBody, match="the body mine has no wheels: its drive is holonomic"):
         _ = driven(HOLONOMIC).wheels
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.partition import Partition, Region
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
@@ -23,14 +23,14 @@ def partition(**keys: Any) -> Partition:
     return Partition(at_s=0.0, **keys)
 
 
-def held(event: Partition, swarm: Swarm = SWARM) -> Conditions:
-    conditions = Conditions(swarm.rows)
+def held(event: Partition, swarm: Swarm = SWARM) -> ActiveEffects:
+    conditions = ActiveEffects(swarm.rows)
     event.check(swarm.groups)
     event.begin(0, swarm, conditions)
     return conditions
 
 
-def broadcasts(conditions: Conditions, pose: FloatArray = POSE) -> Run:
+def broadcasts(conditions: ActiveEffects, pose: FloatArray = POSE) -> Run:
     """Everybody broadcasts once under these conditions."""
     medium = make_medium(Radio(9.0, send_offset="tick"), len(pose))
     told = Run(medium)

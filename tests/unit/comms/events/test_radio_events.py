@@ -8,14 +8,14 @@ import pytest
 
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
-from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOT, Jammers
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
 from tests.support.comms.radio.phy.radios import WIFI_B
 
 SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))
@@ -26,7 +26,7 @@ def blackout(backlog: str, *names: str) -> Blackout:
 
 
 def test_the_strictest_backlog_counts_as_long_as_its_blackout_lasts():
-    conditions = Conditions(3)
+    conditions = ActiveEffects(3)
     events = [blackout("all", "a-0", "a-1"), blackout("newest", "a-1", "a-2"), blackout("drop", "a-2")]
     for serial, event in enumerate(events):
         event.begin(serial, SWARM, conditions)
@@ -50,7 +50,7 @@ def gain(*names: str, **keys: Any) -> Gain:
 
 
 def test_gains_add_up_each_way_in_every_arena():
-    conditions, events = Conditions(6), [gain("a-0", "a-1", send_db=-6.0), gain("a-1", send_db=2.0, receive_db=-3.0)]
+    conditions, events = ActiveEffects(6), [gain("a-0", "a-1", send_db=-6.0), gain("a-1", send_db=2.0, receive_db=-3.0)]
     changed = [event.begin(serial, TWO_ARENAS, conditions).tolist() for serial, event in enumerate(events)]
     assert changed == [[True, True, False] * 2, [False, True, False] * 2]
     now = conditions.disruption()
@@ -72,7 +72,7 @@ def jammer(**keys: Any) -> Jammer:
 
 
 def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
-    conditions = Conditions(swarm.rows)
+    conditions = ActiveEffects(swarm.rows)
     event.begin(serial, swarm, conditions)
     return conditions.disruption().jammers
 
@@ -80,7 +80,7 @@ def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
 def test_one_stands_at_its_place_in_every_arena():
     found = put_up(jammer(at=(1.0, -2.0)))
     assert found.arena.tolist() == [0, 1]
-    assert found.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
+    assert found.carrier.tolist() == [NO_ROBOTS, NO_ROBOTS]
     assert found.places(APART.pose).tolist() == [[1.0, -2.0]] * 2
 
 
@@ -92,7 +92,7 @@ def test_one_that_is_carried_is_where_its_robot_is():
 
 
 def test_those_of_several_events_add_up_and_go_one_by_one():
-    conditions = Conditions(6)
+    conditions = ActiveEffects(6)
     standing, carried = jammer(at=(0.0, 0.0)), jammer(robots=Selection(count=2))
     assert standing.begin(0, APART, conditions).all()
     chosen = carried.begin(1, APART, conditions)
@@ -150,15 +150,15 @@ RADIO = Radio(2.0, loss=0.1, bursts=Bursts(), measures=Measures(range=RangeMeasu
 PAIR = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
 
 
-def under(*ramps: Ramp) -> Conditions:
-    conditions = Conditions(2)
+def under(*ramps: Ramp) -> ActiveEffects:
+    conditions = ActiveEffects(2)
     for serial, ramp in enumerate(ramps):
         ramp.check_radio(RADIO)
         assert ramp.begin(serial, PAIR, conditions).all()
     return conditions
 
 
-def numbers(conditions: Conditions, key: str, *at_s: float) -> list[float]:
+def numbers(conditions: ActiveEffects, key: str, *at_s: float) -> list[float]:
     return [number_of(conditions.radio_at(RADIO, to_ns(one)), key) for one in at_s]
 
 

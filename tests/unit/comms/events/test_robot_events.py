@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.clock import to_ns
-from swarmwire.comms.events.effects import Conditions
+from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import as_toml
 from swarmwire.comms.events.radio_events import Ramp
 from swarmwire.comms.events.robot_events import Fail, Revive
@@ -24,7 +24,7 @@ def fail(part: str, *, per_hour: float | None = None, for_s: float | None = None
 
 def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
     """Whose part does not work at these times."""
-    conditions, found = Conditions(of.rows), []
+    conditions, found = ActiveEffects(of.rows), []
     event.begin(0, of, conditions)
     for at in at_s:
         event.go_on(0, to_ns(at), of, conditions)
@@ -33,7 +33,7 @@ def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
 
 
 def test_a_share_fails_at_once_and_works_again():
-    conditions, of, event = Conditions(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
+    conditions, of, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
     assert event.lasts_s == 5.0
     changed = event.begin(0, of, conditions)
     assert changed.sum() == 3
@@ -44,7 +44,7 @@ def test_a_share_fails_at_once_and_works_again():
 
 
 def test_what_two_events_hold_works_only_after_both():
-    conditions, of, event = Conditions(4), swarm(7, robots=4), fail("motors")
+    conditions, of, event = ActiveEffects(4), swarm(7, robots=4), fail("motors")
     event.begin(0, of, conditions)
     assert not event.begin(1, of, conditions).any(), "they had failed already"
     assert not event.end(0, conditions).any()
@@ -77,7 +77,7 @@ def test_neither_ticks_nor_other_arenas_matter():
 
 
 def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
-    conditions, of, event = Conditions(6), swarm(7, robots=6), fail("battery", count=4)
+    conditions, of, event = ActiveEffects(6), swarm(7, robots=6), fail("battery", count=4)
     event.begin(0, of, conditions)
     assert conditions.alive.sum() == 2
     Revive(at_s=11.0, robots=Selection(names=("a-0", "a-1", "a-2", "a-3", "a-4", "a-5"))).begin(1, of, conditions)
@@ -88,7 +88,7 @@ def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
 
 @pytest.mark.parametrize("part", ["battery", "motors"])
 def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
-    conditions, of = Conditions(ROBOTS), swarm(7)
+    conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event = fail(part, per_hour=1000.0)
     assert event.lasts_s is None
     assert not event.begin(0, of, conditions).any()
@@ -99,7 +99,7 @@ def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
 
 
 def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_revived():
-    conditions, of = Conditions(ROBOTS), swarm(7)
+    conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
     event.begin(0, of, conditions)
     first, _ = event.go_on(0, to_ns(20.0), of, conditions)
@@ -113,7 +113,7 @@ def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_reviv
 
 
 def test_a_robot_that_is_revived_has_a_battery_whose_gauge_works():
-    conditions, of = Conditions(4), swarm(7, robots=4)
+    conditions, of = ActiveEffects(4), swarm(7, robots=4)
     fail("battery").begin(0, of, conditions)
     Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, of, conditions)
     assert conditions.failed("battery").tolist() == [True, False, True, True]
@@ -125,9 +125,9 @@ SWARM = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
 def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> None:
     revive = Revive(at_s=1.0, robots=Selection(group="a"))
     with pytest.raises(TypeError, match="revive lasts for ever: there is nothing to undo"):
-        revive.end(0, Conditions(2))
+        revive.end(0, ActiveEffects(2))
     with pytest.raises(TypeError, match="ramp does not change by itself"):
-        Ramp(at_s=1.0, what="radio.loss", to=0.5).go_on(0, 0, SWARM, Conditions(2))
+        Ramp(at_s=1.0, what="radio.loss", to=0.5).go_on(0, 0, SWARM, ActiveEffects(2))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacle_index import near_things, ray_to_thing, things_within
+from swarmwire.comms.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.truth import Obstacle
 
@@ -233,13 +233,13 @@ def place_of(of: Obstacle) -> tuple[float, float]:
 @pytest.mark.parametrize("torus", [False, True])
 def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: float, torus: bool) -> None:
     arenas = obstacles(1, 24), (), obstacles(2, 8)
-    things = things_within(obstacle_arrays(arenas), SIZE_M, reach_m, torus)
+    things = obstacles_within(obstacle_arrays(arenas), SIZE_M, reach_m, torus)
     found, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
     shifts = [(i * SIZE_M[0], j * SIZE_M[1]) for i in (-1, 0, 1) for j in (-1, 0, 1)] if torus else [(0.0, 0.0)]
     spread = 0.5 if torus else 0.8  # in the open, robots leave the arena
     for x, y in (random.uniform(-spread, spread, (8 if torus else 60, 2)) * SIZE_M).tolist():
         for arena, own in enumerate(arenas):
-            count = near_things(found, things, arena, x, y, reach_m, 0.0)
+            count = obstacles_near(found, things, arena, x, y, reach_m, 0.0)
             listed = {(round(a, 9), round(b, 9)) for a, b in things.shape[found[:count], :2].tolist()}
             assert len(listed) == count
             for of in own:
@@ -250,26 +250,26 @@ def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: fl
 
 
 def test_obstacles_below_are_not_looked_at() -> None:
-    things = things_within(obstacle_arrays((obstacles(4, 24),)), SIZE_M, 9.0, False)
+    things = obstacles_within(obstacle_arrays((obstacles(4, 24),)), SIZE_M, 9.0, False)
     found = np.empty(24, np.int64)
-    counts = [near_things(found, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
+    counts = [obstacles_near(found, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
     assert counts == [24, 18, 18, 12, 12]
 
 
 def test_rays_meet_what_they_meet_in_the_arrays() -> None:
     arrays = obstacle_arrays((obstacles(5, 12),))
-    things, random = things_within(arrays, SIZE_M, 1.0, False), np.random.default_rng(6)
+    things, random = obstacles_within(arrays, SIZE_M, 1.0, False), np.random.default_rng(6)
     for x, y, angle in random.uniform(-3, 3, (50, 3)).tolist():
         ray = x, y, cos(angle), sin(angle)
         circles = [ray_to_circle(*ray, *circle) for circle in arrays.circle.tolist()]
         expected = [*circles, *(ray_to_polygon(*ray, arrays, k) for k in range(len(arrays.polygon)))]
-        assert [ray_to_thing(*ray, things, k) for k in range(12)] == expected
+        assert [ray_to_obstacle(*ray, things, k) for k in range(12)] == expected
         assert inf in expected
 
 
 def test_a_robot_in_a_large_map_reads_a_short_list() -> None:
     side = np.arange(-19, 20) * 0.5
     boxes = tuple(Obstacle("box", x, y, size_m=(0.3, 0.3)) for x in side.tolist() for y in side.tolist())
-    cells = things_within(obstacle_arrays((boxes,)), (20.0, 20.0), 0.2, False).cells
+    cells = obstacles_within(obstacle_arrays((boxes,)), (20.0, 20.0), 0.2, False).cells
     assert len(boxes) == 1521
     assert np.diff(cells.start).max() <= 4

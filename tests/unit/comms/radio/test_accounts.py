@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import Accounts, Lives
+from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.radio.transmissions import Intake, Transmissions
+from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from tests.support.comms.radio.phy.radios import METHODS, with_access
 from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, RADIOS, random_traffic
@@ -77,9 +77,9 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight():
 
 def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
     def handed_over(rows: list[int]) -> Transmissions:
-        return Intake(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
+        return Admission(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
 
-    accounts = Accounts(arenas=3, robots=2)
+    accounts = PacketCounters(arenas=3, robots=2)
     accounts.take_up(handed_over([0, 2, 3, 4, 5, 5]))
     closed = accounts.close(np.array([True, False, True]))
     assert (closed.sent.tolist(), closed.intended.tolist()) == ([1, 0, 3], [1, 0, 3])
@@ -144,7 +144,7 @@ BOTH, FIRST, NONE = np.array([True, True]), np.array([True, False]), np.zeros(0,
 
 
 def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
-    lives = Lives(2)
+    lives = LivenessHistory(2)
     lives.now(BOTH)
     assert (lives.epoch, lives.any_dead) == (0, False)
     lives.now(FIRST)
@@ -153,7 +153,7 @@ def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
 
 
 def test_a_death_is_forgotten_when_all_live_again_and_nothing_of_that_time_waits() -> None:
-    lives = Lives(2)
+    lives = LivenessHistory(2)
     for alive in (FIRST, BOTH):
         lives.now(alive)
     lives.forget(queued=np.array([1, 2]))

@@ -16,7 +16,7 @@ from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Mea
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.radio.results import News
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import METHODS, with_access
 from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_medium, packets, run, scattered
@@ -125,7 +125,7 @@ SIX, TICKS = 6, 5
 SIGNALS = st.sampled_from(METHODS).map(with_access)
 
 
-def told(news: list[News]) -> list[Any]:
+def told(news: list[Results]) -> list[Any]:
     """All that was told, whenever that was: as plain values, sorted."""
     out = []
     for one in news:
@@ -149,7 +149,7 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
     """
     rng = np.random.default_rng(seed)
     pose, alive = scattered(SIX, seed), np.ones(SIX, np.bool_)
-    news, within = list[News](), list[ReceivedPackets]()
+    news, within = list[Results](), list[ReceivedPackets]()
     for tick in range(TICKS):
         start_ns = tick_start_ns(tick, RATE_HZ)
         if out is not None and tick in (1, 3):

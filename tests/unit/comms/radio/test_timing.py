@@ -13,7 +13,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
-from swarmwire.comms.radio.stages.delays import MAX_NS, delay_law, varying_delay_ns
+from swarmwire.comms.radio.stages.delays import MAX_NS, delay_distribution, varying_delay_ns
 from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
     IEEE_802_11A,
@@ -147,7 +147,7 @@ UNITS = st.floats(0.0, LAST_DRAW)
 def law_of(distribution: str, mean_s: float = 0.02, deviation_s: float = 0.008):
     delays = Delays(distribution, mean_s, deviation_s)
     refuse_negative(delays, "a.toml", "radio.delay")
-    return delay_law(delays)
+    return delay_distribution(delays)
 
 
 def reference(distribution: str, mean_s: float, deviation_s: float):

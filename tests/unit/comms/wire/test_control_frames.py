@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.wire.control_frames import (
     MAX_BYTES,
-    Request,
+    ControlRequest,
     decode_reply,
     decode_request,
     encode_reply,
@@ -22,14 +22,14 @@ KILL = {"do": "kill", "robots": {"names": ["flock-1"]}}
 @pytest.mark.parametrize(
     "request_",
     [
-        Request("pause"),
-        Request("resume"),
-        Request("stop"),
-        Request("step", 3),
-        Request("speed", 0.5),
-        Request("speed", None),
-        Request("event", KILL),
-        Request("end", 4),
+        ControlRequest("pause"),
+        ControlRequest("resume"),
+        ControlRequest("stop"),
+        ControlRequest("step", 3),
+        ControlRequest("speed", 0.5),
+        ControlRequest("speed", None),
+        ControlRequest("event", KILL),
+        ControlRequest("end", 4),
     ],
     ids=lambda request: f"{request.do} {request.value}",
 )
@@ -38,20 +38,20 @@ def test_a_request_arrives_as_it_was_sent(request_):
 
 
 def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
-    assert decode_request(msgpack.packb({"v": 1, "do": "step"})) == Request("step", 1)
-    assert decode_request(msgpack.packb({"v": 1, "do": "speed", "factor": 2})) == Request("speed", 2.0)
-    assert decode_request(msgpack.packb({"v": 1, "do": "speed"})) == Request("speed", None)
+    assert decode_request(msgpack.packb({"v": 1, "do": "step"})) == ControlRequest("step", 1)
+    assert decode_request(msgpack.packb({"v": 1, "do": "speed", "factor": 2})) == ControlRequest("speed", 2.0)
+    assert decode_request(msgpack.packb({"v": 1, "do": "speed"})) == ControlRequest("speed", None)
 
 
 def test_a_request_cannot_be_changed_on_its_way():
     with pytest.raises(AttributeError):
-        Request("pause").do = "stop"
+        ControlRequest("pause").do = "stop"
 
 
 def test_a_million_ticks_may_be_asked_for_and_no_more():
-    assert decode_request(encode_request(Request("step", 10**6))).value == 10**6
+    assert decode_request(encode_request(ControlRequest("step", 10**6))).value == 10**6
     with pytest.raises(BadInput, match="from 1 to 1000000, got 1000001"):
-        decode_request(encode_request(Request("step", 10**6 + 1)))
+        decode_request(encode_request(ControlRequest("step", 10**6 + 1)))
 
 
 def of_bytes(count):
@@ -129,7 +129,7 @@ def test_an_answer_of_another_version_or_none_is_a_bad_frame():
 )
 def test_what_no_message_can_carry_is_refused_by_whoever_asks(value):
     with pytest.raises(BadInput, match="event: expected texts, numbers of at most 64 bits, lists and tables alone"):
-        encode_request(Request("event", value))
+        encode_request(ControlRequest("event", value))
 
 
 def test_what_waits_comes_once_in_order_and_what_has_no_room_is_counted():

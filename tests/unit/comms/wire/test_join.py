@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.frames import VERSION
-from swarmwire.comms.wire.join import MAX_JOIN_BYTES, JoinRequest, Offer, OfferedGroup, versioned
+from swarmwire.comms.wire.join import MAX_JOIN_BYTES, GroupInfo, JoinRequest, SessionInfo, versioned
 
 HASH = "0123456789abcdef" * 4
 
@@ -81,15 +81,15 @@ def test_a_request_may_have_a_megabyte_and_no_more() -> None:
 
 def test_an_offer_of_very_many_robots_comes_over_whole() -> None:
     free = tuple(f"flock-{at}" for at in range(100_000))
-    group = OfferedGroup("flock", "mine.py:Mine", "a" * 64, len(free), free)
-    offer = Offer("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
+    group = GroupInfo("flock", "mine.py:Mine", "a" * 64, len(free), free)
+    offer = SessionInfo("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
     data = offer.encode()
     assert len(data) > MAX_JOIN_BYTES
-    assert Offer.decode(data) == offer
+    assert SessionInfo.decode(data) == offer
 
 
-GROUP = OfferedGroup("flock", "mine.py:Mine", "a" * 64, 3, ("flock-0", "flock-2"))
-OFFER = Offer("RUN", "some", "d" * 64, "1.2.3", 10, None, (GROUP, replace(GROUP, name="scouts", free=())))
+GROUP = GroupInfo("flock", "mine.py:Mine", "a" * 64, 3, ("flock-0", "flock-2"))
+OFFER = SessionInfo("RUN", "some", "d" * 64, "1.2.3", 10, None, (GROUP, replace(GROUP, name="scouts", free=())))
 
 
 def told(**changed: Any) -> bytes:
@@ -100,7 +100,7 @@ def told(**changed: Any) -> bytes:
 
 @pytest.mark.parametrize("factor", [None, 1.0, 0.5, 2])
 def test_an_offer_comes_over_whole(factor: float | None) -> None:
-    got = Offer.decode(replace(OFFER, real_time=factor).encode())
+    got = SessionInfo.decode(replace(OFFER, real_time=factor).encode())
     assert got == replace(OFFER, real_time=factor)
     assert factor is None or type(got.real_time) is float
 
@@ -136,13 +136,13 @@ def test_robots_become_free_by_group() -> None:
 )
 def test_what_is_no_offer_is_refused(changed: dict[str, Any], named: str) -> None:
     with pytest.raises(BadFrame, match=f"expected an offer: .*{named}") as caught:
-        Offer.decode(told(**changed))
+        SessionInfo.decode(told(**changed))
     assert caught.value.fault == "malformed"
 
 
 def test_an_offer_of_another_version_is_named() -> None:
     with pytest.raises(BadFrame, match="version") as caught:
-        Offer.decode(told(v=VERSION + 1))
+        SessionInfo.decode(told(v=VERSION + 1))
     assert caught.value.fault == "version"
 
 

@@ -14,14 +14,14 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,
-    UNTOLD,
+    NOT_MEASURED,
     Payloads,
     ReceivedPackets,
     SentPackets,
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import Actions, Actuations, GroupReadings, LedChanges, Notes, Readings, Values
+from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Readings, Values
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 
@@ -199,7 +199,9 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     sender = np.array(data.draw(st.lists(st.sampled_from(ROWS.tolist()), min_size=k, max_size=k)), np.int64)
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
     drive = data.draw(npst.arrays(np.bool_, 3))
-    ids = np.where(to == BROADCAST, UNTOLD, data.draw(npst.arrays(np.int64, k, elements=st.integers(UNTOLD, I64.max))))
+    ids = np.where(
+        to == BROADCAST, NOT_MEASURED, data.draw(npst.arrays(np.int64, k, elements=st.integers(NOT_MEASURED, I64.max)))
+    )
     sent = SentPackets(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
     actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
@@ -219,7 +221,7 @@ def sound(**more: Any) -> Actions:
     return replace(Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent), **more)
 
 
-ACTUATED = Actuations(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+ACTUATED = ActuatorCommands(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
 LEDS = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
 
 

@@ -13,9 +13,19 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch, packed_image
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.run_views import Glimpse, Scene, Series, static_of, truth_of
+from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of, truth_of
 from swarmwire.comms.tick_io import GroupReadings
-from swarmwire.comms.truth import Departed, Finished, Group, Happened, Light, Obstacle, Static, Tally, Truth
+from swarmwire.comms.truth import (
+    EventRecord,
+    Group,
+    Light,
+    Obstacle,
+    PacketCounts,
+    ReceptionRecords,
+    Static,
+    TransmissionRecords,
+    Truth,
+)
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import (
     OBSERVED_VERSION,
@@ -47,7 +57,9 @@ STATIC = Static(
     lights=((Light(0.5, 0.5, 2.0),), ()),
     floor=FLOOR,
 )
-SCENE = Scene(STATIC, (Series("order", "", (0.0, 1.0)), Series("min_gap", "m", (None, None))), STATIC.robot_names[1])
+SCENE = ObservedRun(
+    STATIC, (MetricSeries("order", "", (0.0, 1.0)), MetricSeries("min_gap", "m", (None, None))), STATIC.robot_names[1]
+)
 I64 = np.iinfo(np.int64)
 
 
@@ -60,7 +72,7 @@ def floats(*shape: int) -> st.SearchStrategy[Any]:
 
 
 @st.composite
-def finished_(draw: st.DrawFn) -> Finished:
+def finished_(draw: st.DrawFn) -> ReceptionRecords:
     k = draw(st.integers(0, 4))
     bounds = {
         "arena": (0, ARENAS),
@@ -73,20 +85,20 @@ def finished_(draw: st.DrawFn) -> Finished:
         of.name: draw(ints(k, least=bounds[of.name][0], most=bounds[of.name][1] - 1))
         if of.name in bounds
         else draw(ints(k))
-        for of in fields(Finished)
+        for of in fields(ReceptionRecords)
         if of.name not in NOT_SENT
     }
-    return Finished(**columns, rssi_dbm=draw(st.none() | floats(k)))
+    return ReceptionRecords(**columns, rssi_dbm=draw(st.none() | floats(k)))
 
 
 @st.composite
-def glimpses(draw: st.DrawFn) -> Glimpse:
+def glimpses(draw: st.DrawFn) -> ObservedTick:
     states = ("", *draw(st.lists(st.text(max_size=64), max_size=3)))
     rows = np.array(draw(st.lists(st.integers(0, ROWS - 1), unique=True)), np.int64)
     readings = {"a": GroupReadings(np.sort(rows), {"compass.heading_rad": draw(floats(len(rows)))})}
     flags = npst.arrays(np.bool_, ROWS)
     happened = st.builds(
-        Happened,
+        EventRecord,
         st.integers(0, 99),
         st.floats(0, 1e9),
         st.text(max_size=9),
@@ -109,11 +121,11 @@ def glimpses(draw: st.DrawFn) -> Glimpse:
         readings=draw(st.sampled_from([{}, readings])),
         contact_onsets=draw(ints(ARENAS, 2)),
         edges=draw(st.none() | ints(draw(st.integers(0, 5)), 2, least=0, most=ROWS - 1)),
-        tally=draw(st.none() | st.builds(Tally, ints(2), ints(2), ints(2), ints(2, len(Fate)))),
+        tally=draw(st.none() | st.builds(PacketCounts, ints(2), ints(2), ints(2), ints(2, len(Fate)))),
         finished=draw(st.none() | finished_()),
         events=tuple(draw(st.lists(happened, max_size=3))),
     )
-    return Glimpse(truth, draw(st.integers(0, 2**40)), draw(st.integers(1, 2**40)), draw(floats(2, ARENAS)))
+    return ObservedTick(truth, draw(st.integers(0, 2**40)), draw(st.integers(1, 2**40)), draw(floats(2, ARENAS)))
 
 
 def equal(a: Any, b: Any) -> bool:
@@ -153,7 +165,7 @@ def test_a_scene_comes_over_whole_and_is_of_no_tick():
     assert (frame.kind, frame.tick) == ("scene", -1)
 
 
-def quiet(**given: Any) -> Glimpse:
+def quiet(**given: Any) -> ObservedTick:
     truth = Truth(
         tick=1,
         time_ns=0,
@@ -171,12 +183,12 @@ def quiet(**given: Any) -> Glimpse:
         tally=None,
         finished=None,
     )
-    return Glimpse(replace(truth, **given), 0, 1, np.zeros((2, ARENAS)))
+    return ObservedTick(replace(truth, **given), 0, 1, np.zeros((2, ARENAS)))
 
 
-def one_finished(**given: int) -> Finished:
-    names = [of.name for of in fields(Finished) if of.name not in NOT_SENT]
-    return Finished(**{name: np.array([given.get(name, 0)]) for name in names})
+def one_finished(**given: int) -> ReceptionRecords:
+    names = [of.name for of in fields(ReceptionRecords) if of.name not in NOT_SENT]
+    return ReceptionRecords(**{name: np.array([given.get(name, 0)]) for name in names})
 
 
 @pytest.mark.parametrize(
@@ -196,12 +208,12 @@ def one_finished(**given: int) -> Finished:
         ("edges", {"edges": np.array([[-1, 0]])}),
         ("tick", {"tick": -1}),
         ("time_ns", {"time_ns": -1}),
-        ("tally/fates", {"tally": Tally(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
+        ("tally/fates", {"tally": PacketCounts(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
         ("finished.fate", {"finished": one_finished(fate=len(Fate))}),
         ("finished.receiver", {"finished": one_finished(receiver=-2)}),
         ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
         ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
-        ("events", {"events": (Happened(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
+        ("events", {"events": (EventRecord(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
         ("groups of this run", {"senses": {"c": GroupReadings(np.zeros(1, np.int64), {})}}),
         ("sense/a/rows", {"senses": {"a": GroupReadings(np.array([ROWS]), {"x": np.zeros(1)})}}),
         ("sense/a", {"senses": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
@@ -218,7 +230,7 @@ WRONG_EVENTS = [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 
 
 @pytest.mark.parametrize("events", [None, {}, "kill", *([wrong] for wrong in WRONG_EVENTS)], ids=str)
 def test_events_that_are_none_are_refused(events):
-    frame = frames.decode(encode_truth(quiet(events=(Happened(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
+    frame = frames.decode(encode_truth(quiet(events=(EventRecord(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
     assert frame.values["events"] == [EVENT]
     with pytest.raises(BadFrame, match="events: expected"):
         decode_truth(replace(frame, values={**frame.values, "events": events}), SCENE)
@@ -338,7 +350,7 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     if truth.edges is not None:  # no edge joins robots of different arenas
         truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
     one = truth_of(truth, STATIC, arena)
-    scene = Scene(static_of(STATIC, arena), SCENE.series, SCENE.selected)
+    scene = ObservedRun(static_of(STATIC, arena), SCENE.series, SCENE.selected)
     values = glimpse.values[:, arena : arena + 1]
     decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=one, values=values))), scene)
     assert equal(decoded.truth.pose, truth.pose[rows])
@@ -353,8 +365,8 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
 
 
 def test_packets_that_left_are_of_one_arena():
-    numbers = {of.name: np.arange(4) for of in fields(Departed)}
-    left = Departed(**{**numbers, "arena": np.array([1, 0, 1, 0])})
+    numbers = {of.name: np.arange(4) for of in fields(TransmissionRecords)}
+    left = TransmissionRecords(**{**numbers, "arena": np.array([1, 0, 1, 0])})
     one = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
     assert one is not None
     assert one.sender.tolist() == [0, 2]

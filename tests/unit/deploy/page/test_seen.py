@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.run_views import Glimpse
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.run_views import ObservedTick
+from swarmwire.comms.truth import EventRecord
 from swarmwire.deploy.page.seen import MAX_PLACES, MAX_WHO, Seen
 from tests.support.metrics.truths import static, tally, truth
 
@@ -15,13 +15,13 @@ OF = static(robots=4)
 
 
 def glimpse(tick=0, of=OF, **given):
-    return Glimpse(truth(of, tick, **given), serial=tick, ticks=1, values=np.zeros((0, 1)))
+    return ObservedTick(truth(of, tick, **given), serial=tick, ticks=1, values=np.zeros((0, 1)))
 
 
 def happened(robots, ended=False):
     changed = np.zeros(4, np.bool_)
     changed[list(robots)] = True
-    return Happened(2, 0.0, "kill", ended, changed)
+    return EventRecord(2, 0.0, "kill", ended, changed)
 
 
 def test_the_centre_is_that_of_the_robots_alive():

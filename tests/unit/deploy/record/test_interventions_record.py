@@ -10,11 +10,11 @@ from swarmwire.deploy import Simulation, repeat
 from swarmwire.deploy.record.interventions import InterventionsLog, read_interventions
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.metrics.record.names import INTERVENTIONS
-from swarmwire.world.live_events import Intervention
+from swarmwire.world.live_events import LiveEvent
 from tests.support.deploy.commands import LOSSY
 
 KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}
-DONE = (Intervention(3, 0, KILL), Intervention(9, 0, None))
+DONE = (LiveEvent(3, 0, KILL), LiveEvent(9, 0, None))
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import Happened, Static, Truth
+from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel
@@ -34,7 +34,7 @@ def seen(of: Static, ticks: int, clock: FakeClock, tick_ms: int = 20) -> Figures
     counts = tally(*[{fate: 1 + int(fate) for fate in Fate}] * of.arenas)
     rows = of.arenas * of.robots
     for tick in range(ticks):
-        event = Happened(0, 1.0, "blackout", bool(tick % 2), np.ones(rows, np.bool_))
+        event = EventRecord(0, 1.0, "blackout", bool(tick % 2), np.ones(rows, np.bool_))
         radio = {"tally": counts, "edges": edges((0, 1))} if of.range_m else {}
         moment = truth(of, tick, pose=poses([0.1 * tick * row for row in range(rows)]), events=(event,), **radio)
         metrics.see(moment)

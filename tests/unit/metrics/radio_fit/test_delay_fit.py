@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.radio.config.impairments import Delays
-from swarmwire.comms.radio.stages.delays import delay_law, varying_delay_ns
+from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
 from swarmwire.metrics.radio_fit.delay_fit import fit_delays
 from swarmwire.metrics.radio_fit.latency_fit import LatencyFit, fit_latency
 
@@ -14,7 +14,7 @@ PACKETS = 20_000
 
 def made(delays: Delays, constant_s: float = 0.0) -> np.ndarray:
     """Latencies as the emulator's radio draws them."""
-    law, draws = delay_law(delays), np.random.default_rng(5).uniform(0.0, 1.0, PACKETS)
+    law, draws = delay_distribution(delays), np.random.default_rng(5).uniform(0.0, 1.0, PACKETS)
     return constant_s + np.array([varying_delay_ns(law, u) for u in draws]) / NS_PER_S
 
 

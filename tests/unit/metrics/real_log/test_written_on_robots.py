@@ -7,7 +7,7 @@ from swarmwire.agent.behaviours import Flocking
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.on_robot.assembly import robot_facts
 from swarmwire.agent.on_robot.log import TickRow, new_log
-from swarmwire.agent.on_robot.plan import Plan, SpeedLimits
+from swarmwire.agent.on_robot.plan import RobotConfig, SpeedLimits
 from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S, to_ns
@@ -43,7 +43,7 @@ def by_robots(folder):
         )
         log = new_log(folder, static.robot_names, name, "20261121T120000Z", "robot.toml")
         body = static.groups[0].body
-        plan = Plan(settings, "robot.toml", Flocking, {}, body, ScriptedDriver(clock), SpeedLimits(0.1, 2.0))
+        plan = RobotConfig(settings, "robot.toml", Flocking, {}, body, ScriptedDriver(clock), SpeedLimits(0.1, 2.0))
         log.begin(robot_facts(plan, clock))
         for truth in flock().truths:
             x_m, y_m, heading_rad = truth.pose[robot].tolist()

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate, Payloads
-from swarmwire.comms.truth import Happened
+from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.record import packet_recorder
 from swarmwire.metrics.record.event_recorder import EventRecorder
@@ -107,8 +107,8 @@ def test_packets_are_off_unless_asked_for(tmp_path):
 
 def test_an_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
     of = static(2, arenas=2)
-    kill = Happened(0, 0.35, "kill", False, np.array([True, False, True, True]))
-    over = Happened(0, 0.35, "kill", True, np.zeros(4, np.bool_))
+    kill = EventRecord(0, 0.35, "kill", False, np.array([True, False, True, True]))
+    over = EventRecord(0, 0.35, "kill", True, np.zeros(4, np.bool_))
     seen = [truth(of, 0), truth(of, 4, events=(kill,)), truth(of, 6, events=(over,))]
     assert record(tmp_path, of, seen)["events"] == {"rows": 4, "dropped": 0}
     assert pl.read_parquet(tmp_path / "events.parquet").rows() == [
@@ -119,8 +119,8 @@ def test_an_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
     ]
 
 
-def kill(*changed: bool, ended: bool = False) -> Happened:
-    return Happened(0, 0.15, "kill", ended, np.array(changed))
+def kill(*changed: bool, ended: bool = False) -> EventRecord:
+    return EventRecord(0, 0.15, "kill", ended, np.array(changed))
 
 
 def test_the_summary_names_the_robots_of_each_arena():
@@ -135,8 +135,8 @@ def test_the_summary_names_the_robots_of_each_arena():
     assert (second["ended"], second["robots"]) == (True, [["flock-1"], []])
 
 
-def broken(*changed: bool) -> Happened:
-    return Happened(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+def broken(*changed: bool) -> EventRecord:
+    return EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
 
 
 def test_what_failed_is_told_with_its_part():

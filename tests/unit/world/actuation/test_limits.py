@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.actuators import limits_of, take_commands
+from swarmwire.world.actuation.actuators import drive_limits_of, take_commands
 
 FORCES = {"max_force_n": 1.0, "max_torque_nm": 2.0}
 DRIVES: dict[str, dict[str, Any]] = {
@@ -30,7 +30,7 @@ def taken(kind: str, linear_mps: float, angular_radps: float, lateral_mps: float
     command = np.full((1, 3), 9.0)
     asked = (np.array([speed]) for speed in (linear_mps, angular_radps, lateral_mps))
     alive, rows, drive = np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.bool_)
-    clipped, not_finite = take_commands(limits_of([group(kind)]), alive, rows, drive, *asked, command)
+    clipped, not_finite = take_commands(drive_limits_of([group(kind)]), alive, rows, drive, *asked, command)
     assert not_finite.tolist() == [0]
     return command[0].tolist(), int(clipped[0])
 
@@ -80,7 +80,7 @@ def test_the_full_speed_of_the_sheet_is_not_clipped(kind: str) -> None:
 
 
 def test_each_robot_has_the_limits_of_its_own_drive_in_every_arena() -> None:
-    limits = limits_of([group("wheels"), group("holonomic", 1, 2)])
+    limits = drive_limits_of([group("wheels"), group("holonomic", 1, 2)])
     command, rows, full = np.zeros((6, 3)), np.array([5, 3, 0, 1]), np.full(4, 1.0)
     every = np.ones(6, np.bool_)
     clipped, _ = take_commands(limits, every, rows, np.ones(4, np.bool_), full, 0.0 * full, full, command)
@@ -91,7 +91,7 @@ def test_each_robot_has_the_limits_of_its_own_drive_in_every_arena() -> None:
 
 
 def test_no_command_a_dead_robot_and_what_is_not_finite_change_nothing() -> None:
-    limits = limits_of([group("holonomic", 0, 4)])
+    limits = drive_limits_of([group("holonomic", 0, 4)])
     command, rows = np.full((4, 3), 0.1), np.arange(4)
     alive, drive = np.array([True, False, True, True]), np.array([False, True, True, True])
     lateral = np.array([np.nan, np.nan, np.inf, 0.2])

@@ -7,7 +7,7 @@ import pytest
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
-from swarmwire.world.backends.join_policy import Refused
+from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group
@@ -58,7 +58,7 @@ def test_an_assignment_comes_over_whole() -> None:
 def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes, why: str) -> None:
     joined(roster, "a")
     before = state(roster)
-    with pytest.raises(Refused, match=why):
+    with pytest.raises(JoinRefused, match=why):
         roster.join("b", bad)
     assert state(roster) == before
     assert roster.counts() == {"bad_join": 1}
@@ -70,7 +70,7 @@ def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad:
 def test_a_bad_name_is_refused_counted_and_changes_nothing(roster: Made, name: str) -> None:
     joined(roster, "a")
     before = state(roster)
-    with pytest.raises(Refused, match="expected a name"):
+    with pytest.raises(JoinRefused, match="expected a name"):
         roster.join(name, request())
     assert state(roster) == before
     assert roster.counts() == {"bad_join": 1}
@@ -79,7 +79,7 @@ def test_a_bad_name_is_refused_counted_and_changes_nothing(roster: Made, name: s
 def test_a_name_in_use_is_refused(roster: Made) -> None:
     joined(roster, "a")
     before = state(roster)
-    with pytest.raises(Refused, match="in use"):
+    with pytest.raises(JoinRefused, match="in use"):
         roster.join("a", request())
     assert state(roster) == before
     assert roster.counts() == {"refused_join": 1}
@@ -88,7 +88,7 @@ def test_a_name_in_use_is_refused(roster: Made) -> None:
 def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
     joined(roster, "a", "b")
     before = state(roster)
-    with pytest.raises(Refused, match="all robots are taken"):
+    with pytest.raises(JoinRefused, match="all robots are taken"):
         roster.join("c", request())
     assert state(roster) == before
     assert roster.counts() == {"refused_join": 1}
@@ -120,7 +120,7 @@ def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str
 
 @pytest.mark.parametrize("asked", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
 def test_an_offer_is_not_told_to_who_asks_in_another_version(roster: Made, asked: bytes) -> None:
-    with pytest.raises(Refused):
+    with pytest.raises(JoinRefused):
         roster.offer(asked)
     assert roster.counts() == {"bad_join": 1}
 

@@ -8,7 +8,7 @@ from swarmwire.comms.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import encode_actions
-from swarmwire.world.backends.join_policy import Refused
+from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from tests.support.agent.hosts import MEASURES, plain
 from tests.support.world.locksteps import actions, all_readings, joined, ready, request, state, two, two_parts
@@ -61,7 +61,7 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
         assert [name for name, _ in out] == ["a"]
     assert [loss.runner for loss in lockstep.losses] == ["b"]
     assert lockstep.counts() == {"runners_lost": 1}
-    with pytest.raises(Refused, match="all robots are taken"):
+    with pytest.raises(JoinRefused, match="all robots are taken"):
         lockstep.join("c", request())
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.interfaces import Put
+from swarmwire.comms.interfaces import SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
@@ -35,10 +35,10 @@ class RadioMedium:
 
     due_ns: list[int] = field(default_factory=list[int])
     payload: bytes = b"\0\0"
-    puts: list[Put] = field(default_factory=list[Put])
+    puts: list[SubtickPackets] = field(default_factory=list[SubtickPackets])
     times_ns: list[int] = field(default_factory=list[int])
 
-    def send(self, put: Put) -> None:
+    def send(self, put: SubtickPackets) -> None:
         assert put.at_ns >= (self.times_ns or [0])[-1]
         self.puts.append(put)
 
@@ -58,10 +58,10 @@ class Exchange:
     work_ns: int = 0  # that handing over takes
     handed: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
 
-    def take_in(self) -> Sequence[Put]:
+    def take_in(self) -> Sequence[SubtickPackets]:
         came = [at_ns for at_ns in self.sends_ns if at_ns <= self.clock.time_ns]
         self.sends_ns = [at_ns for at_ns in self.sends_ns if at_ns > self.clock.time_ns]
-        return [Put(at_ns, None, PACKET) for at_ns in came]
+        return [SubtickPackets(at_ns, None, PACKET) for at_ns in came]
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         self.clock.time_ns += self.work_ns

@@ -10,26 +10,26 @@ import pytest
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import Limits, Offer, OfferedGroup
-from swarmwire.world.backends.join_policy import Refused, Terms
+from swarmwire.comms.wire.join import GroupInfo, JoinLimits, SessionInfo
+from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import Change, OnLoss
+from swarmwire.world.backends.registry import OnLoss, RunnerEvent
 from tests.support.agent.hosts import assignment, group
 from tests.support.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 
 Made = Lockstep | RealTime
 AGENTS = {"flock": "a" * 64, "scouts": "b" * 64, "lone": "c" * 64}
-OFFER = Offer(
+OFFER = SessionInfo(
     "RUN",
     "about",
     "d" * 64,
     "1.2.3",
     10,
     None,
-    tuple(OfferedGroup(name, "mine.py:Mine", sha256, 0, ()) for name, sha256 in AGENTS.items()),
+    tuple(GroupInfo(name, "mine.py:Mine", sha256, 0, ()) for name, sha256 in AGENTS.items()),
 )
-OPEN = Terms(OFFER, open=True)
+OPEN = JoinPolicy(OFFER, open=True)
 LEAVE = frames.encode("leave", -1, {})
 
 
@@ -37,7 +37,7 @@ def whole() -> list[Assignment]:
     return parts(dict.fromkeys(range(8), 0))
 
 
-def made(kind: str, on_loss: OnLoss = "stand", terms: Terms = OPEN) -> Made:
+def made(kind: str, on_loss: OnLoss = "stand", terms: JoinPolicy = OPEN) -> Made:
     if kind == "lockstep":
         return Lockstep(whole(), on_loss, terms)
     return RealTime(whole(), 0.5, 30.0, on_loss, terms)
@@ -119,10 +119,10 @@ def test_what_is_cut_has_its_own_parameters_and_keys() -> None:
     ids=repr,
 )
 def test_what_cannot_be_had_is_refused_counted_and_changes_nothing(kind: str, wanted: dict[str, Any], why: str) -> None:
-    roster = made(kind, terms=Terms(OFFER, open=True, limits=Limits(robots_per_runner=4)))
+    roster = made(kind, terms=JoinPolicy(OFFER, open=True, limits=JoinLimits(robots_per_runner=4)))
     asked(roster, "a", robots=3)
     before = state(roster)
-    with pytest.raises(Refused, match=why):
+    with pytest.raises(JoinRefused, match=why):
         roster.join("b", request(**wanted))
     assert state(roster) == before
     assert roster.counts() == {"refused_join": 1}
@@ -134,10 +134,10 @@ def test_the_right_agents_and_the_right_scenario_are_let_in(roster: Made) -> Non
 
 
 def test_there_are_no_more_runners_than_the_limit(kind: str) -> None:
-    roster = made(kind, terms=Terms(OFFER, open=True, limits=Limits(runners=2)))
+    roster = made(kind, terms=JoinPolicy(OFFER, open=True, limits=JoinLimits(runners=2)))
     asked(roster, "a", robots=1)
     asked(roster, "b", robots=1)
-    with pytest.raises(Refused, match="there are 2 runners already"):
+    with pytest.raises(JoinRefused, match="there are 2 runners already"):
         roster.join("c", request(robots=1))
 
 
@@ -161,7 +161,7 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
 
 
 def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(kind: str) -> None:
-    roster = made(kind, terms=Terms(OFFER, open=True))
+    roster = made(kind, terms=JoinPolicy(OFFER, open=True))
     asked(roster, "own", robots=2, agents=AGENTS)
     asked(roster, "foreign", robots=2)
     assert roster.health().foreign == 0
@@ -169,7 +169,7 @@ def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(ki
     assert roster.health().foreign == 1
     roster.answer("foreign", LEAVE)
     assert roster.health().foreign == 0
-    closed = made(kind, terms=Terms(OFFER))
+    closed = made(kind, terms=JoinPolicy(OFFER))
     asked(closed, "r0")
     ready(closed, "r0")
     assert closed.health().foreign == 0
@@ -183,7 +183,7 @@ def test_robots_that_nobody_plays_are_told_in_their_order_whoever_came_and_went(
 
 
 def test_a_run_may_begin_with_some_robots(kind: str) -> None:
-    roster = made(kind, terms=Terms(OFFER, open=True, start_with=3))
+    roster = made(kind, terms=JoinPolicy(OFFER, open=True, start_with=3))
     assert roster.waiting
     asked(roster, "a", robots=2)
     ready(roster, "a")
@@ -215,23 +215,23 @@ def test_who_leaves_a_run_that_bears_it_frees_its_robots_or_they_are_given_up(ki
         ready(roster, runner)
     roster._tick = 7
     roster.answer("a", LEAVE)
-    assert roster.changes[-1] == Change("left", "a", ("flock-0", "flock-1", "scouts-2"), 7)
+    assert roster.changes[-1] == RunnerEvent("left", "a", ("flock-0", "flock-1", "scouts-2"), 7)
     assert roster.counts() == {"runners_left": 1}
     assert not roster.losses
     if on_loss == "dead":
-        with pytest.raises(Refused, match="given up: flock-0"):
+        with pytest.raises(JoinRefused, match="given up: flock-0"):
             roster.join("c", request(names=["flock-0"]))
     else:
         assert rows(asked(roster, "c")) == {"flock": [0, 1], "scouts": [2]}
         ready(roster, "c")
-        assert roster.changes[-1] == Change("joined", "c", ("flock-0", "flock-1", "scouts-2"), 7)
+        assert roster.changes[-1] == RunnerEvent("joined", "c", ("flock-0", "flock-1", "scouts-2"), 7)
         assert roster.counts() == {"runners_left": 1, "runners_joined_late": 1}
 
 
 def test_an_offer_comes_over_whole(roster: Made) -> None:
     offer = roster.offer()
     assert offer is not None
-    assert Offer.decode(offer.encode()) == offer
+    assert SessionInfo.decode(offer.encode()) == offer
     assert free(roster)["flock"] == tuple(f"flock-{row}" for row in FLOCK)
 
 
@@ -244,7 +244,7 @@ def test_the_owner_of_each_robot_follows_the_cuts(roster: Made) -> None:
 
 @pytest.mark.parametrize("asked", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])
 def test_what_a_runner_asks_for_reaches_terminals_short_and_harmless(asked: Any) -> None:
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(JoinRefused) as refused:
         made("lockstep").join("a", request(**asked))
     assert str(refused.value).isprintable()
     assert len(str(refused.value)) <= 500

@@ -4,16 +4,16 @@ from typing import get_args
 
 import pytest
 
-from swarmwire.world.backends.allocation import MOVES, Move, Slot, State
+from swarmwire.world.backends.allocation import MOVES, Allocation, Move, State
 from tests.support.agent.hosts import assignment, group
 
 STATES, EVERY_MOVE = get_args(State), get_args(Move)
 PAIRS = [(state, move) for state in STATES for move in EVERY_MOVE]
 
 
-def slot(state: State) -> Slot:
+def slot(state: State) -> Allocation:
     its = assignment(group("unused:Agent", [0]))
-    return Slot(its, its.groups[0].rows, "somebody", state)
+    return Allocation(its, its.groups[0].rows, "somebody", state)
 
 
 @pytest.mark.parametrize(("state", "move"), PAIRS)

@@ -11,7 +11,7 @@ from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.backends.join_policy import Terms
+from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
@@ -31,7 +31,7 @@ from tests.support.world.locksteps import (
 
 LAYOUT = {"x": ("<i8", ())}
 KEPT = dict.fromkeys(("flock", "scouts", "lone"), LAYOUT)
-OPEN = Terms(open=True, start_with=0, memory=KEPT)
+OPEN = JoinPolicy(open=True, start_with=0, memory=KEPT)
 TICK_NS = 10**8
 LEAVE = frames.encode("leave", -1, {})
 

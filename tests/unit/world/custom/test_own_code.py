@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDE, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.comms.tick_io import Actions, Actuations
+from swarmwire.comms.tick_io import Actions, ActuatorCommands
 from swarmwire.world.custom.loading import made_actuator, made_sensor
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.file import scenario_from
@@ -44,7 +44,7 @@ def world(folder: Path, spec: str = BOTH, seeds: tuple[int, ...] = (1,), needs: 
 
 
 def actuated(of: World, rows: list[int], place: list[int], value: list[float], speed: float = 0.0) -> Actions:
-    own = Actuations(np.array(rows), np.array(place), np.array(value))
+    own = ActuatorCommands(np.array(rows), np.array(place), np.array(value))
     return replace(commanded(of, speed, 0.0), own=own)
 
 

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.engine import Motors, Setting
+from swarmwire.world.engines.engine import EngineConfig, Motors
 from swarmwire.world.engines.kinematic import KinematicEngine
 
 SIZE_M, TICK_S, ROBOTS = (4.0, 3.0), 0.1, 30
@@ -22,7 +22,7 @@ def engine(
     radius_m, bottom_m = np.resize([0.02, 0.1, 0.05, 0.04], n), np.resize([0.0, 0.0, 0.2], n)
     motors = Motors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     of = radius_m, bottom_m, bottom_m + 0.1, motors
-    return KinematicEngine(Setting(SIZE_M, boundary, standing, arrays, *of, TICK_S, 5), pose)
+    return KinematicEngine(EngineConfig(SIZE_M, boundary, standing, arrays, *of, TICK_S, 5), pose)
 
 
 def crowded(rng: np.random.Generator, count: int) -> tuple[Obstacle, ...]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.engine import Motors, Setting
+from swarmwire.world.engines.engine import EngineConfig, Motors
 from swarmwire.world.engines.kinematic import KinematicEngine
 
 RADIUS_M, TICK_S = 0.05, 0.1
@@ -29,7 +29,7 @@ def engine(
     bottom = np.broadcast_to(np.asarray(bottom_m, np.float64), n).copy()
     motors = Motors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     of = np.full(n, RADIUS_M), bottom, bottom + 0.1, motors
-    return KinematicEngine(Setting((4.0, 4.0), boundary, standing, obstacle_arrays(standing), *of, TICK_S, 5), at)
+    return KinematicEngine(EngineConfig((4.0, 4.0), boundary, standing, obstacle_arrays(standing), *of, TICK_S, 5), at)
 
 
 def target(*rows: tuple[float, float, float]) -> FloatArray:

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
-from swarmwire.world.event_scheduler import Events
+from swarmwire.world.event_scheduler import EventScheduler
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed
 from tests.support.world.scenes import read, scene
 
 EPUCK = load_body("epuck")
-SHEET = Battery(capacity_wh=0.01, idle_w=1.0, drive_w_per_mps=20.0, led_w=0.5)
+SHEET = BatterySpec(capacity_wh=0.01, idle_w=1.0, drive_w_per_mps=20.0, led_w=0.5)
 HOLONOMIC = body_from(
     {
         "like": "epuck",
@@ -28,7 +28,7 @@ HOLONOMIC = body_from(
 )
 
 
-def with_battery(spec: Battery) -> Body:
+def with_battery(spec: BatterySpec) -> Body:
     return replace(EPUCK, readings={**EPUCK.readings, "battery": spec})
 
 
@@ -75,9 +75,9 @@ def test_a_robot_whose_battery_is_empty_is_dead_and_its_run_says_so() -> None:
     events = [{"at_s": 1.0, "do": "revive", "robots": {"names": ["a-0"]}}]
     scenario = posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], events=events, duration_s=2.5)
     world = World(scenario, [1], {})
-    short = with_battery(Battery(capacity_wh=1.0, idle_w=3700.0, start=0.5))
+    short = with_battery(BatterySpec(capacity_wh=1.0, idle_w=3700.0, start=0.5))
     world.batteries = Batteries([Group("a", short, 0, 2)], 1, 0.1)
-    told = Events(scenario.events, world.static, world.keys)
+    told = EventScheduler(scenario.events, world.static, world.keys)
     deaths: list[tuple[int, str, list[bool]]] = []
     for tick in range(25):
         happened = told.apply(tick * 10**8, world, None)

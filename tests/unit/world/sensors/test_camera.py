@@ -9,18 +9,18 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.sensor_specs import Camera
+from swarmwire.comms.bodies.sensor_specs import CameraSpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.truth import Obstacle
 from tests.support.world.scenes import read, scene
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 BEACON = replace(FOOTBOT, leds=Leds(angles_deg=(0.0,), height_m=0.085, radius_m=0.09, beacon_height_m=0.174249733))
-HIGH = Camera(height_m=0.2887, aperture_deg=70.0)
+HIGH = CameraSpec(height_m=0.2887, aperture_deg=70.0)
 GREEN = 0x00FF00
 
 
-def told(poses: Any, spec: Camera = HIGH, tick: int = 0, **more: Any) -> dict[str, FloatArray]:
+def told(poses: Any, spec: CameraSpec = HIGH, tick: int = 0, **more: Any) -> dict[str, FloatArray]:
     body, colour = more.pop("body", BEACON), more.pop("colour", GREEN)
     looked_at = scene(poses, body, more.pop("obstacles", ()), boundary="open", colour=colour)
     if "dark" in more:
@@ -40,7 +40,7 @@ def distances(*at: Any, **more: Any) -> list[float]:
     [(0.2887, 70.0, 0.793), (0.2887, 80.0, 1.64), (0.122, 70.0, 0.335)],
 )
 def test_a_camera_sees_as_far_as_argos_s_do(height_m: float, aperture_deg: float, reach_m: float) -> None:
-    spec = Camera(height_m=height_m, aperture_deg=aperture_deg)
+    spec = CameraSpec(height_m=height_m, aperture_deg=aperture_deg)
     assert spec.reach_m(0.0) == pytest.approx(reach_m, abs=4e-3)
     low = replace(FOOTBOT, height_m=0.05, leds=Leds(angles_deg=(0.0,), radius_m=1e-9, height_m=0.05))
     for share, seen in ((0.999, 1), (1.001, 0)):

@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.bodies.sensor_specs import GroundColour
+from swarmwire.comms.bodies.sensor_specs import GroundSpec
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from tests.support.world.scenes import read, scene
 
 EPUCK = load_body("epuck")
-THREE = GroundColour(points_m=((0.03, -0.009), (0.03, 0.0), (0.03, 0.009)))  # ARGoS's e-puck
+THREE = GroundSpec(points_m=((0.03, -0.009), (0.03, 0.0), (0.03, 0.009)))  # ARGoS's e-puck
 SPOT = Floor(0.8, (Patch("disc", 0.5, 0.2, 0.1, radius_m=0.1), Patch("disc", 0.5, 0.2, 0.4, radius_m=0.02)))
 
 
-def shade(poses: Any, floor: Floor | None, spec: GroundColour = THREE, tick: int = 0) -> FloatArray:
+def shade(poses: Any, floor: Floor | None, spec: GroundSpec = THREE, tick: int = 0) -> FloatArray:
     return read(scene(poses, EPUCK, floor=floor), EPUCK, "ground", spec, tick)["ground.shade"]
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import Imu
+from swarmwire.comms.bodies.sensor_specs import ImuSpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.world.sensors import Scene
 from tests.support.world.scenes import scene, staged
@@ -20,11 +20,11 @@ def put(looked_at: Scene, heading, velocity) -> None:
     looked_at.state[0, :, 2], looked_at.state[0, :, 3:5] = heading, velocity
 
 
-def felt(headings, velocities, spec: Imu | None = None, robots: int = 1):
+def felt(headings, velocities, spec: ImuSpec | None = None, robots: int = 1):
     """What was felt last when these headings and velocities came one after another, (robots, fields)."""
     looked_at = scene(np.zeros((robots, 3)), EPUCK)
     put(looked_at, headings[0], velocities[0])
-    imu = staged(looked_at, EPUCK, "imu", spec or Imu())
+    imu = staged(looked_at, EPUCK, "imu", spec or ImuSpec())
     told = {}
     for tick, (heading, velocity) in enumerate(zip(headings, velocities, strict=True)):
         put(looked_at, heading, velocity)
@@ -61,12 +61,12 @@ def test_nothing_is_felt_in_the_first_tick() -> None:
 def test_biases_are_drawn_once_and_drift_from_tick_to_tick() -> None:
     still, robots = [(0.0, 0.0)] * 6, np.arange(500)[:, None]
     drawn = normal(7, robots, 0, np.arange(3), purpose("imu bias"))
-    biased = Imu(bias_std_mps2=0.1, bias_std_radps=0.02)
+    biased = ImuSpec(bias_std_mps2=0.1, bias_std_radps=0.02)
     constant = felt([0.0] * 6, still, biased, 500)
     assert constant == pytest.approx(drawn * [0.1, 0.1, 0.02])
     assert np.array_equal(constant, felt([0.0], still[:1], biased, 500))
     walk = sum(normal(7, robots, tick, np.arange(3), purpose("imu drift")) for tick in range(1, 6))
-    drifted = felt([0.0] * 6, still, Imu(drift_mps2=0.1, drift_radps=0.02), 500)
+    drifted = felt([0.0] * 6, still, ImuSpec(drift_mps2=0.1, drift_radps=0.02), 500)
     assert drifted == pytest.approx(walk * np.array([0.1, 0.1, 0.02]) * np.sqrt(0.1))
     # 500 draws: the standard deviation is known to 3.2 %; four of them, 1 in 16,000 for each of three.
     assert drifted.std(axis=0) == pytest.approx(np.array([0.1, 0.1, 0.02]) * np.sqrt(0.5), rel=0.127)
@@ -74,7 +74,7 @@ def test_biases_are_drawn_once_and_drift_from_tick_to_tick() -> None:
 
 def test_drift_goes_on_while_nobody_looks() -> None:
     looked_at = scene(np.zeros((3, 3)), EPUCK)
-    spec = Imu(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
+    spec = ImuSpec(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
     always, seldom = (staged(looked_at, EPUCK, "imu", spec) for _ in range(2))
     for tick in range(9):
         looked_at.state[0, :, 2:5] += 0.01 * tick

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.ranging_specs import Infrared, Proximity, ResponseCurve
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.samples import posed
@@ -25,8 +25,8 @@ RING: dict[str, Any] = {
 def seen(poses: Any, obstacles: tuple[Obstacle, ...] = (), **more: Any) -> tuple[FloatArray, FloatArray]:
     """What the first robot's proximity and passive infrared answer."""
     looked_at = scene(poses, EPUCK, obstacles, **more)
-    active = read(looked_at, EPUCK, "proximity", Proximity(**RING))["proximity.value"]
-    passive = read(looked_at, EPUCK, "infrared", Infrared(**RING))["infrared.value"]
+    active = read(looked_at, EPUCK, "proximity", ProximitySpec(**RING))["proximity.value"]
+    passive = read(looked_at, EPUCK, "infrared", InfraredSpec(**RING))["infrared.value"]
     return active[0], passive[0]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import Positioning
+from swarmwire.comms.bodies.sensor_specs import PositioningSpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.world import World
@@ -17,8 +17,8 @@ GPS = load_body("epuck-gps")
 def test_the_error_is_normal_and_keyed_by_robot_tick_and_axis() -> None:
     poses = np.random.default_rng(1).uniform(-2, 2, (20, 3))
     looked_at = scene(poses, GPS)
-    exact = read(looked_at, GPS, "positioning", Positioning(0.0), 4)
-    noisy = read(looked_at, GPS, "positioning", Positioning(0.1), 4)
+    exact = read(looked_at, GPS, "positioning", PositioningSpec(0.0), 4)
+    noisy = read(looked_at, GPS, "positioning", PositioningSpec(0.1), 4)
     for axis, field in enumerate(("positioning.x_m", "positioning.y_m")):
         assert np.array_equal(exact[field], poses[:, axis])
         error = 0.1 * normal(7, np.arange(20), 4, 0, purpose(f"{field} noise"))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
-from swarmwire.comms.bodies.sensor_specs import Camera
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import CameraSpec
 from swarmwire.comms.truth import Boundary
 from swarmwire.world.sensors import SENSORS
 from tests.support.world import brute_force
@@ -37,7 +37,7 @@ def same(seen: FloatArray, expected: FloatArray) -> None:
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_rays_from_the_rim_end_at_the_nearest_thing_or_for_passive_ones_the_nearest_robot(boundary: Boundary) -> None:
     of = sample(1, boundary)
-    for name, kind in (("proximity", Proximity), ("infrared", Infrared)):
+    for name, kind in (("proximity", ProximitySpec), ("infrared", InfraredSpec)):
         spec = kind(angles_deg=ANGLES_DEG, range_m=0.6, response=RESPONSE)
         expected = brute_force.rim_rays(of, name == "proximity", spec.angle_rad, 0.6)
         answers = truth(of, name, spec)[0]
@@ -56,7 +56,7 @@ def test_rays_from_the_rim_end_at_the_nearest_thing_or_for_passive_ones_the_near
     ],
 )
 def test_a_scan_shows_the_nearest_thing_on_every_ray(turned: dict[str, Any], boundary: Boundary) -> None:
-    of, spec = sample(3, boundary), Scan(range_m=1.0, **turned)
+    of, spec = sample(3, boundary), ScanSpec(range_m=1.0, **turned)
     same(truth(of, "scan", spec)[0], brute_force.scanned(of, spec.angle_rad, 1.0, spec.at_m))
 
 
@@ -64,7 +64,7 @@ def test_a_scan_shows_the_nearest_thing_on_every_ray(turned: dict[str, Any], bou
 @pytest.mark.parametrize("seed", [4, 5])
 def test_photocells_see_the_lights_that_nothing_beside_them_hides(seed: int, boundary: Boundary) -> None:
     of = sample(seed, boundary, each=5)
-    spec = Light(angles_deg=(0.0, 90.0, 180.0, 270.0))
+    spec = LightSpec(angles_deg=(0.0, 90.0, 180.0, 270.0))
     expected = brute_force.shone(of, spec.angle_rad)
     assert truth(of, "light", spec)[0] == pytest.approx(expected, abs=1e-9)
     assert 0.05 < (expected > 0).mean() < 0.6
@@ -74,7 +74,7 @@ def test_photocells_see_the_lights_that_nothing_beside_them_hides(seed: int, bou
 @pytest.mark.parametrize("height_m", [0.12, 0.25])
 def test_a_camera_sees_the_leds_within_its_cone_that_no_body_hides(height_m: float, boundary: Boundary) -> None:
     of = sample(6, boundary, each=8)
-    spec = Camera(height_m=height_m, aperture_deg=70.0, most_blobs=200)
+    spec = CameraSpec(height_m=height_m, aperture_deg=70.0, most_blobs=200)
     seen, hidden = truth(of, "camera", spec), 0
     rows = [(arena, group, i) for arena in range(2) for group in of.groups for i in range(group.start, group.stop)]
     for row, (arena, group, robot) in enumerate(rows):

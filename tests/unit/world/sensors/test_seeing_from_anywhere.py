@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import Infrared, Light, Proximity, Scan
-from swarmwire.comms.bodies.sensor_specs import Camera
+from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import CameraSpec
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
 from swarmwire.world.sensors import SENSORS, Scene
@@ -22,11 +22,11 @@ assert FOOTBOT.proximity is not None
 RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
 RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": RESPONSE}
 SENSOR_SPECS: dict[str, Any] = {
-    "proximity": Proximity(**RING),
-    "infrared": Infrared(**RING),
-    "scan": Scan(rays=45, range_m=1.0, at_m=0.02),
-    "camera": Camera(height_m=0.2887, aperture_deg=70.0, most_blobs=200),
-    "light": Light(angles_deg=RING["angles_deg"]),
+    "proximity": ProximitySpec(**RING),
+    "infrared": InfraredSpec(**RING),
+    "scan": ScanSpec(rays=45, range_m=1.0, at_m=0.02),
+    "camera": CameraSpec(height_m=0.2887, aperture_deg=70.0, most_blobs=200),
+    "light": LightSpec(angles_deg=RING["angles_deg"]),
 }
 
 

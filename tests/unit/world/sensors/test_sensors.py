@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.ranging_specs import Proximity
-from swarmwire.comms.bodies.sensor_specs import Compass, Odometry
+from swarmwire.comms.bodies.ranging_specs import ProximitySpec
+from swarmwire.comms.bodies.sensor_specs import CompassSpec, OdometrySpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.sensors import Scene
@@ -170,9 +170,9 @@ def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
 def test_the_compass_errs_normally_and_stays_within_a_turn() -> None:
     poses = np.tile([0.0, 0.0, np.pi], (20, 1))
     looked_at = scene(poses, EPUCK)
-    exact = read(looked_at, EPUCK, "compass", Compass(0.0))["compass.heading_rad"]
+    exact = read(looked_at, EPUCK, "compass", CompassSpec(0.0))["compass.heading_rad"]
     assert np.array_equal(exact, np.full(20, np.pi))
-    noisy = read(looked_at, EPUCK, "compass", Compass(0.1), 5)["compass.heading_rad"]
+    noisy = read(looked_at, EPUCK, "compass", CompassSpec(0.1), 5)["compass.heading_rad"]
     error = np.angle(np.exp(1j * (noisy - np.pi)))
     expected = 0.1 * normal(7, np.arange(20), 5, 0, purpose("compass.heading_rad noise"))
     assert np.allclose(error, expected)
@@ -182,7 +182,7 @@ def test_the_compass_errs_normally_and_stays_within_a_turn() -> None:
 @given(turns=st.integers(-5, 5), heading=st.floats(-3.14, 3.14))
 def test_the_compass_forgets_full_turns(turns: int, heading: float) -> None:
     looked_at = scene([[0.0, 0.0, heading + turns * 2 * np.pi]], EPUCK)
-    told = read(looked_at, EPUCK, "compass", Compass(0.0))["compass.heading_rad"]
+    told = read(looked_at, EPUCK, "compass", CompassSpec(0.0))["compass.heading_rad"]
     assert told[0] == pytest.approx(heading, abs=1e-12)
 
 
@@ -211,8 +211,8 @@ def test_a_robot_held_by_a_wall_rolls_no_further() -> None:
 
 def test_encoders_slip_by_tick_and_show_whole_steps() -> None:
     looked_at = scene(np.zeros((2, 3)), EPUCK)
-    slipping = staged(looked_at, EPUCK, "odometry", Odometry(slip=0.05, step_m=0.0))
-    stepped = staged(looked_at, EPUCK, "odometry", Odometry(slip=0.05, step_m=0.001))
+    slipping = staged(looked_at, EPUCK, "odometry", OdometrySpec(slip=0.05, step_m=0.0))
+    stepped = staged(looked_at, EPUCK, "odometry", OdometrySpec(slip=0.05, step_m=0.001))
     told = np.zeros((2, 2))
     for tick in range(1, 20):
         looked_at.travel_m[0] += [[0.01, 0.02], [-0.01, 0.0]]
@@ -245,13 +245,13 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
     assert EPUCK.readings.keys() == FOOTBOT.readings.keys() == {*SENSORS, "ground", "camera"}
-    assert isinstance(EPUCK.proximity, Proximity)
+    assert isinstance(EPUCK.proximity, ProximitySpec)
 
 
 def test_wheels_differ_from_what_their_encoders_take_them_for() -> None:
     """Drawn once per wheel, so it grows with the way; travel back and forth undoes it."""
     looked_at = scene(np.zeros((400, 3)), EPUCK)
-    odometry = staged(looked_at, EPUCK, "odometry", Odometry(wheel_error_std=0.02))
+    odometry = staged(looked_at, EPUCK, "odometry", OdometrySpec(wheel_error_std=0.02))
     looked_at.travel_m[0] = 2.0
     told = odometry.read(1)
     drawn = normal(7, np.arange(400)[:, None], 0, np.arange(2), purpose("odometry wheel"))

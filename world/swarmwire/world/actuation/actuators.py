@@ -20,7 +20,7 @@ DIFFERENTIAL, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels"
 ROUNDED = 1.0 + 1e-9  # a command that asks for exactly the limit and was rounded is not clipped
 
 
-class Limits(NamedTuple):
+class DriveLimits(NamedTuple):
     """How fast each robot index of an arena can go, (robots,) each."""
 
     kind: IntArray  # WHEELS, TWIST or HOLONOMIC
@@ -29,7 +29,7 @@ class Limits(NamedTuple):
     max_angular_radps: FloatArray
 
 
-def limits_of(groups: Sequence[Group]) -> Limits:
+def drive_limits_of(groups: Sequence[Group]) -> DriveLimits:
     """The limits of the groups' drives."""
     columns = [
         (
@@ -42,12 +42,12 @@ def limits_of(groups: Sequence[Group]) -> Limits:
     ]
     sizes = [group.stop - group.start for group in groups]
     kind, *rest = (np.repeat(np.array(column), sizes) for column in zip(*columns, strict=True))
-    return Limits(kind, *rest)
+    return DriveLimits(kind, *rest)
 
 
 @njit(cache=True)
 def take_commands(
-    limits: Limits,
+    limits: DriveLimits,
     alive: BoolArray,
     rows: IntArray,
     drive: BoolArray,
@@ -283,7 +283,7 @@ class Actuators:
         self.target: FloatArray = np.zeros((arenas, robots, 3))
         self.leds = ShownLeds(groups, arenas)
         self.failed = FailedDrives(groups, arenas)
-        self._limits, self._noise = limits_of(groups), NoisyWheels(groups, keys)
+        self._limits, self._noise = drive_limits_of(groups), NoisyWheels(groups, keys)
         self._ticks = 0
         self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
 

@@ -9,12 +9,12 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.actuators import HOLONOMIC, limits_of
+from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of
 
 PER_HOUR = 3600.0
-MAINS = Battery(capacity_wh=inf)  # of a body without a battery: its charge never falls
+MAINS = BatterySpec(capacity_wh=inf)  # of a body without a battery: its charge never falls
 
 
 class Batteries:
@@ -27,13 +27,15 @@ class Batteries:
     def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
         """Charged as their data sheets say."""
         sizes = [group.stop - group.start for group in groups]
-        specs = [next((s for s in group.body.sensors.values() if isinstance(s, Battery)), MAINS) for group in groups]
+        specs = [
+            next((s for s in group.body.sensors.values() if isinstance(s, BatterySpec)), MAINS) for group in groups
+        ]
         self.any = any(spec is not MAINS for spec in specs)
         self.charge: FloatArray = np.tile(np.repeat([spec.start for spec in specs], sizes), (arenas, 1))
         draw = [(spec.idle_w, spec.drive_w_per_mps, spec.led_w) for spec in specs]
         share = tick_s / PER_HOUR / np.array([spec.capacity_wh for spec in specs])  # of a charge, per W and tick
         self._draw = np.repeat(np.array(draw) * share[:, None], sizes, axis=0)  # (robots, 3) in a tick
-        limits = limits_of(groups)
+        limits = drive_limits_of(groups)
         self._half_base_m, self._holonomic = limits.half_base_m, limits.kind == HOLONOMIC
 
     @property

@@ -116,7 +116,7 @@ MOVES: dict[State, dict[Move, State]] = {
 
 
 @dataclass(eq=False)
-class Slot:
+class Allocation:
     """Some robots, and the runner that plays them."""
 
     assignment: Assignment
@@ -134,7 +134,7 @@ class Slot:
         """Every robot of the slot, (n,)."""
         return self._all_rows
 
-    def remember(self, other: "Slot", rows: IntArray) -> None:
+    def remember(self, other: "Allocation", rows: IntArray) -> None:
         """What another slot remembers of these robots is remembered here, too."""
         for name, parts in other.memory.items():
             own = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
@@ -162,10 +162,10 @@ def rows_of(assignment: Assignment) -> IntArray:
 
 NOBODY = -1  # owner of a robot that no slot holds
 
-S = TypeVar("S", bound=Slot)
+S = TypeVar("S", bound=Allocation)
 
 
-class Slots(Generic[S]):
+class Allocations(Generic[S]):
     """The slots in their order.
 
     Attributes:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import zenoh
 
-from swarmwire.comms.wire.join import LIMITS, Limits
+from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.keys import runner_of
 
 Item = zenoh.Sample | zenoh.Query
@@ -24,7 +24,7 @@ class RunnerInbox:
         arrived_ns: when the item that was got last arrived.
     """
 
-    def __init__(self, limits: Limits = LIMITS, now_ns: Callable[[], int] = lambda: 0) -> None:
+    def __init__(self, limits: JoinLimits = LIMITS, now_ns: Callable[[], int] = lambda: 0) -> None:
         """`now_ns` tells the time, where it matters when something arrives."""
         self._limits, self._now_ns, self.arrived_ns = limits, now_ns, 0
         self._arrived: queue.SimpleQueue[tuple[str, int, int, Item]] = queue.SimpleQueue()

@@ -11,9 +11,9 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.agent_memory import Layout
-from swarmwire.comms.wire.join import LIMITS, JoinRequest, Limits, Offer, versioned
+from swarmwire.comms.wire.join import LIMITS, JoinLimits, JoinRequest, SessionInfo, versioned
 from swarmwire.comms.wire.network import Network
-from swarmwire.world.backends.allocation import S, Slots
+from swarmwire.world.backends.allocation import Allocations, S
 
 
 def printable(text: str, most: int, keep: str = "") -> str:
@@ -34,7 +34,7 @@ def printable(text: str, most: int, keep: str = "") -> str:
 
 
 @dataclass(frozen=True)
-class Door:
+class ListenSettings:
     """The agents' side of a world in the network.
 
     Attributes:
@@ -52,7 +52,7 @@ class Door:
 
 
 @dataclass(frozen=True)
-class Terms:
+class JoinPolicy:
     """What a world asks of its runners.
 
     Attributes:
@@ -64,14 +64,14 @@ class Terms:
         memory: by group, what is kept of its robots for whoever plays them next; None: nothing is.
     """
 
-    offer: Offer | None = None
+    offer: SessionInfo | None = None
     open: bool = False
     start_with: int | None = None
-    limits: Limits = LIMITS
+    limits: JoinLimits = LIMITS
     memory: Mapping[str, Layout] | None = None
 
 
-USUAL = Terms()  # of runners that the run starts itself
+USUAL = JoinPolicy()  # of runners that the run starts itself
 
 
 # --- Whether a runner gets the robots that it asks for: its request against what there is, on the run's terms.
@@ -83,7 +83,7 @@ NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key
 MAX_SAID = 500  # letters
 
 
-class Refused(Exception):
+class JoinRefused(Exception):
     """A request that is not granted; the text goes back to the runner, and `count` says under which name it counts."""
 
     def __init__(self, text: str, count: str = "refused_join") -> None:
@@ -96,9 +96,9 @@ def read_request(runner: str, request: bytes) -> JoinRequest:
     try:
         asked = JoinRequest.decode(request)
     except BadFrame as fault:
-        raise Refused(str(fault), "bad_join") from fault
+        raise JoinRefused(str(fault), "bad_join") from fault
     if not NAME.fullmatch(runner):
-        raise Refused("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
+        raise JoinRefused("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
     return asked
 
 
@@ -107,57 +107,57 @@ def check_version(request: bytes) -> None:
     try:
         versioned(request)
     except BadFrame as fault:
-        raise Refused(str(fault), "bad_join") from fault
+        raise JoinRefused(str(fault), "bad_join") from fault
 
 
-def granted(asked: JoinRequest, slots: Slots[S], terms: Terms) -> IntArray:
+def accepted(asked: JoinRequest, slots: Allocations[S], terms: JoinPolicy) -> IntArray:
     """The rows that a runner gets, rising; Refused if what it asks for is not to be had."""
     _check_scenario(asked, terms)
     rows = _rows(asked, slots)
     most = terms.limits.robots_per_runner
     if terms.open and len(rows) > most:
-        raise Refused(f"expected at most {most} robots for one runner, got {len(rows)}")
+        raise JoinRefused(f"expected at most {most} robots for one runner, got {len(rows)}")
     groups = [group for slot in slots.holding(rows) for group in slot.assignment.groups]
     _check_agents(asked, terms, [group.name for group in groups if np.isin(group.rows, rows).any()])
     return rows
 
 
-def _rows(asked: JoinRequest, slots: Slots[S]) -> IntArray:
+def _rows(asked: JoinRequest, slots: Allocations[S]) -> IntArray:
     free = slots.free
     if asked.names is not None:
         return _named(asked.names, slots)
     if not free:
-        raise Refused("all robots are taken")
+        raise JoinRefused("all robots are taken")
     if asked.robots is None:
         return np.sort(free[0].all_rows)
     rows = np.sort(np.concatenate([slot.all_rows for slot in free]))[: asked.robots]
     if len(rows) < asked.robots:
-        raise Refused(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
+        raise JoinRefused(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
     return rows
 
 
-def _named(names: Sequence[str], slots: Slots[S]) -> IntArray:
+def _named(names: Sequence[str], slots: Allocations[S]) -> IntArray:
     """The rows of robots that are free; Refused if one is not, or is none."""
     row_of = slots.row_of
     if not names or len(set(names)) < len(names) or not row_of.keys() >= set(names):
-        raise Refused(
+        raise JoinRefused(
             f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(list(names))}"
         )
     rows = np.sort(np.array([row_of[name] for name in names], np.int64))
     for slot in slots.holding(rows):
         if not slot.may("joins"):
             taken = robots_text([name for name in names if row_of[name] in slot.all_rows])
-            raise Refused(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
+            raise JoinRefused(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
     return rows
 
 
-def _check_scenario(asked: JoinRequest, terms: Terms) -> None:
+def _check_scenario(asked: JoinRequest, terms: JoinPolicy) -> None:
     offer = terms.offer
     if offer is not None and asked.scenario_sha256 not in (None, offer.scenario_sha256):
-        raise Refused(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
+        raise JoinRefused(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
 
 
-def _check_agents(asked: JoinRequest, terms: Terms, groups: Sequence[str]) -> None:
+def _check_agents(asked: JoinRequest, terms: JoinPolicy, groups: Sequence[str]) -> None:
     """The runner's own agents must be those of the run, unless it says nothing of them."""
     if asked.agents is None or terms.offer is None:
         return
@@ -166,4 +166,4 @@ def _check_agents(asked: JoinRequest, terms: Terms, groups: Sequence[str]) -> No
         if group.name in groups and got != group.agent_sha256:
             its = "none" if got is None else f"{got[:12]}…"
             here = f"{group.agent} has sha256 {group.agent_sha256[:12]}… here"
-            raise Refused(f"another agent for {group.name}: {here}, the runner's own has {its}")
+            raise JoinRefused(f"another agent for {group.name}: {here}, the runner's own has {its}")

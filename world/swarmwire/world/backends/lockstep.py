@@ -15,9 +15,9 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.backends.allocation import NOBODY, Slot, rows_of
-from swarmwire.world.backends.join_policy import USUAL, Terms
-from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, What
+from swarmwire.world.backends.allocation import NOBODY, Allocation, rows_of
+from swarmwire.world.backends.join_policy import USUAL, JoinPolicy
+from swarmwire.world.backends.registry import GOES_ON, OnLoss, RunnerRegistry, What
 
 
 def split_readings(readings: Readings, owner: IntArray, assignments: list[Assignment]) -> list[Readings]:
@@ -92,7 +92,7 @@ def split_tx_status(tx_status: TxStatuses, owner: IntArray, slots: int) -> list[
 
 
 @dataclass(eq=False)
-class _Slot(Slot):
+class _Slot(Allocation):
     actions: Actions | None = None  # in the open tick
     idle: bool = False  # whether its robots have no agent in the open tick
     before: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # memory, at its start
@@ -107,10 +107,10 @@ class _Open(NamedTuple):
     tx_status: TxStatuses
 
 
-class Lockstep(Roster[_Slot]):
+class Lockstep(RunnerRegistry[_Slot]):
     """The runners of a run: who plays which robots, and how far each has come."""
 
-    def __init__(self, parts: list[Assignment], on_loss: OnLoss = "stop", terms: Terms = USUAL) -> None:
+    def __init__(self, parts: list[Assignment], on_loss: OnLoss = "stop", terms: JoinPolicy = USUAL) -> None:
         super().__init__(parts, on_loss, terms)
         self._open: _Open | None = None
 
@@ -176,7 +176,7 @@ class Lockstep(Roster[_Slot]):
                 self._counts[name] += len(some)
 
 
-def standing(slot: Slot) -> Actions:
+def standing(slot: Allocation) -> Actions:
     """Command 0 for every robot of a slot."""
     rows = slot.all_rows
     still = np.zeros(len(rows))

@@ -14,7 +14,7 @@ CLASSES = 5200  # up to days
 
 
 @dataclass(frozen=True)
-class Delays:
+class LatencyHistogram:
     """By how much things came later than they were due, wall time; percentiles within 0.5 %."""
 
     count: int
@@ -23,7 +23,7 @@ class Delays:
     worst_s: float
 
 
-class Lateness:
+class TimingReport:
     """Counts delays in classes 0.5 % apart, of 5 ns below 1 us."""
 
     def __init__(self) -> None:
@@ -39,12 +39,12 @@ class Lateness:
         place = (np.log1p(late_ns / NS_PER_US) * PER_FOLD).astype(np.int64)
         self._counted += np.bincount(np.minimum(place, CLASSES - 1), minlength=CLASSES)
 
-    def delays(self) -> Delays | None:
+    def delays(self) -> LatencyHistogram | None:
         """What was counted; None: nothing."""
         count = int(self._counted.sum())
         if not count:
             return None
-        return Delays(count, self._percentile_s(0.5), self._percentile_s(0.99), to_s(self._worst_ns))
+        return LatencyHistogram(count, self._percentile_s(0.5), self._percentile_s(0.99), to_s(self._worst_ns))
 
     def _percentile_s(self, share: float) -> float:
         """So that this share is no later: the upper end of its class, but never above the worst."""
@@ -84,7 +84,7 @@ class Pace:
         self._quiet_until_ns: int | None = None
         self._next_ns: int | None = None  # when the next tick is to begin, where there was one before
         self.missed_ticks = self.worst_lag_ns = self.lag_ns = 0
-        self.jitter, self.delivery = Lateness(), Lateness()
+        self.jitter, self.delivery = TimingReport(), TimingReport()
 
     def begin(self) -> int:
         """A tick begins; the first sets the schedule. Returns the wall time in ns, pauses left out."""

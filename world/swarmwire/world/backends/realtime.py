@@ -31,15 +31,15 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.interfaces import Put
+from swarmwire.comms.interfaces import SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Actuations, LedChanges, Notes, Readings, Values
+from swarmwire.comms.tick_io import Actions, ActuatorCommands, LedChanges, Notes, Readings, Values
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
-from swarmwire.world.backends.allocation import Slot, rows_of
-from swarmwire.world.backends.join_policy import USUAL, Terms
+from swarmwire.world.backends.allocation import Allocation, rows_of
+from swarmwire.world.backends.join_policy import USUAL, JoinPolicy
 from swarmwire.world.backends.lockstep import acting, split_readings, split_received, split_tx_status
-from swarmwire.world.backends.registry import GOES_ON, OnLoss, Roster, RunnerHealth, What
+from swarmwire.world.backends.registry import GOES_ON, OnLoss, RunnerHealth, RunnerRegistry, What
 
 ANSWERED = -1
 
@@ -55,11 +55,11 @@ class _Asked(NamedTuple):
 
 
 @dataclass(eq=False)
-class _Slot(Slot):
+class _Slot(Allocation):
     asked: deque[_Asked] = field(default_factory=deque[_Asked])  # without an answer so far, oldest first
 
 
-class RealTime(Roster[_Slot]):
+class RealTime(RunnerRegistry[_Slot]):
     """The runners of a run that waits for none of them.
 
     Attributes:
@@ -78,7 +78,7 @@ class RealTime(Roster[_Slot]):
         watchdog_s: float,
         timeout_s: float,
         on_loss: OnLoss,
-        terms: Terms = USUAL,
+        terms: JoinPolicy = USUAL,
         *,
         subtick: bool = False,
     ) -> None:
@@ -91,12 +91,12 @@ class RealTime(Roster[_Slot]):
         self._asked_ns = np.full(rows, ANSWERED, np.int64)  # simulated time of the first question without an answer
         self._stopped = np.zeros(rows, np.bool_)
         self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
-        self._sent: list[Put] = []
+        self._sent: list[SubtickPackets] = []
         self._numbers = Counter[str]()  # of "packets" frames to each runner
         self.now_ns = 0
         self._notes: list[Notes] = []
         self._leds: list[LedChanges] = []
-        self._own: list[Actuations] = []
+        self._own: list[ActuatorCommands] = []
         self._values: list[Values] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.tx_status_dropped = 0
@@ -158,7 +158,7 @@ class RealTime(Roster[_Slot]):
                 self.tx_status_dropped += len(its)
         return out
 
-    def puts(self) -> list[Put]:
+    def puts(self) -> list[SubtickPackets]:
         """Packets that came since the last call, `at_ns` in the time of `now_ns`."""
         puts, self._sent = self._sent, []
         return puts
@@ -172,7 +172,7 @@ class RealTime(Roster[_Slot]):
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
         sent, notes = SentPackets.joined([put.sent for put in self.puts()]), self._latest_notes()
-        leds, own, told = LedChanges.joined(self._leds), Actuations.joined(self._own), Values.joined(self._values)
+        leds, own, told = LedChanges.joined(self._leds), ActuatorCommands.joined(self._own), Values.joined(self._values)
         actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
         self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
         self._notes, self._leds, self._own, self._values = [], [], [], []
@@ -192,7 +192,7 @@ class RealTime(Roster[_Slot]):
         self._drive[given] = True
         command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
         self._command[:, given] = command[:, actions.drive]
-        self._sent.append(Put(self.now_ns, frame.tick, actions.sent))
+        self._sent.append(SubtickPackets(self.now_ns, frame.tick, actions.sent))
         self._notes.append(actions.notes)
         self._leds.append(actions.leds)
         self._own.append(actions.own)
@@ -202,7 +202,7 @@ class RealTime(Roster[_Slot]):
         if not self.subtick:
             super()._sent_between(slot, frame)
         sent, missed = decode_sent(frame, slot.all_rows), frame.values.get("missed", 0)
-        self._sent.append(Put(self.now_ns, None, sent))
+        self._sent.append(SubtickPackets(self.now_ns, None, sent))
         if type(missed) is int and missed > 0:
             self._counts["packets_frames_missed_by_runners"] += missed
 

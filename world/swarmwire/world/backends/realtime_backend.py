@@ -9,15 +9,15 @@ import zenoh
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
-from swarmwire.comms.interfaces import Put, ReceivingBackend, SubtickMedium
+from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import USUAL, Door, Terms
-from swarmwire.world.backends.pacing import Delays, Pace
+from swarmwire.world.backends.join_policy import USUAL, JoinPolicy, ListenSettings
+from swarmwire.world.backends.pacing import LatencyHistogram, Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
-from swarmwire.world.backends.zenoh_backend import Surroundings, ZenohBackend
+from swarmwire.world.backends.zenoh_backend import BackendHooks, ZenohBackend
 from swarmwire.world.subtick import Subticks
 
 
@@ -34,8 +34,10 @@ class RealTimeReport:
     packets_dropped: int = 0  # in these frames: received by the radio, never by the agent
     tx_status_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
     subtick_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
-    delivery: Delays | None = None  # packets: when they were handed over against when the modelled radio had them
-    tick_jitter: Delays | None = None  # ticks: when they began against when the ones before were to end
+    delivery: LatencyHistogram | None = (
+        None  # packets: when they were handed over against when the modelled radio had them
+    )
+    tick_jitter: LatencyHistogram | None = None  # ticks: when they began against when the ones before were to end
 
 
 def report_of(pace: Pace, subticks: Subticks | None) -> RealTimeReport:
@@ -55,7 +57,7 @@ class PacedBackend:
 
     def __init__(self, backend: ReceivingBackend, pace: Pace, subticks: Subticks | None = None) -> None:
         self._backend, self._pace, self._subticks = backend, pace, subticks
-        self._puts: list[Put] = []
+        self._puts: list[SubtickPackets] = []
         self.start, self.counts, self.close = backend.start, backend.counts, backend.close
 
     def act(
@@ -77,11 +79,11 @@ class PacedBackend:
         self._pace.handed_over(received.received_at_ns)
         self._backend.receive(received, tx_status)
         actions = self._backend.act(tick, readings, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
-        self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
+        self._puts.append(SubtickPackets(self._pace.now_ns(), tick, actions.sent))
         self._subticks.pass_tick(tick, medium, self)
         return replace(actions, sent=SentPackets.none())
 
-    def take_in(self) -> list[Put]:
+    def take_in(self) -> list[SubtickPackets]:
         """What agents sent since the last call."""
         puts, self._puts = self._puts, []
         return puts
@@ -91,7 +93,7 @@ class PacedBackend:
         self._backend.receive(received, tx_status)
         sent = self._backend.on_receive(tick, at_ns)
         if len(sent):
-            self._puts.append(Put(self._pace.now_ns(), None, sent))
+            self._puts.append(SubtickPackets(self._pace.now_ns(), None, sent))
 
     def report(self) -> RealTimeReport:
         """How far the loop kept up."""
@@ -105,16 +107,16 @@ class RealTimeBackend(ZenohBackend[RealTime]):
 
     def __init__(
         self,
-        door: Door | str,
+        door: ListenSettings | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
         clock: Clock,
-        around: Surroundings,
+        around: BackendHooks,
         on_loss: OnLoss,
         pace: Pace,
         watchdog_s: float,
-        terms: Terms = USUAL,
+        terms: JoinPolicy = USUAL,
         subticks: Subticks | None = None,
     ) -> None:
         roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, subtick=subticks is not None)
@@ -147,7 +149,7 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         self._subticks.pass_tick(tick, medium, self)
         return self._roster.take()
 
-    def take_in(self) -> list[Put]:
+    def take_in(self) -> list[SubtickPackets]:
         """Packets that arrived from runners since the last call."""
         self._take_in()
         return self._roster.puts()

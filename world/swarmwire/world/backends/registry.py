@@ -13,15 +13,15 @@ from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
-from swarmwire.comms.wire.join import Limits, Offer
-from swarmwire.world.backends.allocation import S, Slots
+from swarmwire.comms.wire.join import JoinLimits, SessionInfo
+from swarmwire.world.backends.allocation import Allocations, S
 from swarmwire.world.backends.join_policy import (
     MAX_SAID,
     USUAL,
-    Refused,
-    Terms,
+    JoinPolicy,
+    JoinRefused,
+    accepted,
     check_version,
-    granted,
     printable,
     read_request,
 )
@@ -30,7 +30,7 @@ What = Literal["joined", "left", "lost", "returned"]
 
 
 @dataclass(frozen=True)
-class Change:
+class RunnerEvent:
     """One runner that came or went."""
 
     what: What
@@ -105,7 +105,7 @@ class Loss:
         return f"{self.runner}, which played {self.robots}: {self.reason}"
 
 
-class Roster(ABC, Generic[S]):
+class RunnerRegistry(ABC, Generic[S]):
     """The runners of a run: what lockstep and real time share.
 
     Attributes:
@@ -113,16 +113,16 @@ class Roster(ABC, Generic[S]):
         changes: runners that came and went; those that a run starts itself are told of only once it began.
     """
 
-    def __init__(self, parts: list[Assignment], on_loss: OnLoss, terms: Terms = USUAL) -> None:
+    def __init__(self, parts: list[Assignment], on_loss: OnLoss, terms: JoinPolicy = USUAL) -> None:
         """`parts` of the robots are free: a runner that asks for nothing in particular gets the next one."""
-        self._slots, self._on_loss, self._terms = Slots(parts, self._slot), on_loss, terms
+        self._slots, self._on_loss, self._terms = Allocations(parts, self._slot), on_loss, terms
         self._by_runner: dict[str, S] = {}
         self._parts = len(parts)  # as many runners as the run itself started are welcome, whatever the limits say
         self._gone: set[str] = set()  # runners that left or were lost
         self._tick = -1
         self._counts: Counter[str] = Counter()
         self.losses: list[Loss] = []
-        self.changes: list[Change] = []
+        self.changes: list[RunnerEvent] = []
 
     @property
     def is_open(self) -> bool:
@@ -130,7 +130,7 @@ class Roster(ABC, Generic[S]):
         return self._terms.open
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> JoinLimits:
         """What is taken from runners at most."""
         return self._terms.limits
 
@@ -198,7 +198,7 @@ class Roster(ABC, Generic[S]):
         slot = self._by_runner.get(runner)
         return slot is not None and slot.state == "joined"
 
-    def offer(self, request: bytes = b"") -> Offer | None:
+    def offer(self, request: bytes = b"") -> SessionInfo | None:
         """What there is to play at present; None: nothing is told. Refused if it is asked for in another version."""
         if request:
             with self._refusals_counted():
@@ -216,7 +216,7 @@ class Roster(ABC, Generic[S]):
         with self._refusals_counted():
             asked = read_request(runner, request)
             self._check_room(runner)
-            slot = self._slots.cut(granted(asked, self._slots, self._terms))
+            slot = self._slots.cut(accepted(asked, self._slots, self._terms))
         slot.move("joins")
         slot.runner = runner
         slot.foreign = self._terms.open and asked.agents is None  # a run's own runners tell nothing, either
@@ -270,15 +270,15 @@ class Roster(ABC, Generic[S]):
     def _refusals_counted(self) -> Generator[None]:
         try:
             yield
-        except Refused as refusal:
+        except JoinRefused as refusal:
             self._counts[refusal.count] += 1
             raise
 
     def _check_room(self, runner: str) -> None:
         if runner in self._by_runner:
-            raise Refused(f"the name {runner} is in use: another runner of this name plays")
+            raise JoinRefused(f"the name {runner} is in use: another runner of this name plays")
         if len(self._by_runner) >= max(self._terms.limits.runners, self._parts):
-            raise Refused(f"there are {len(self._by_runner)} runners already, the most that this run takes")
+            raise JoinRefused(f"there are {len(self._by_runner)} runners already, the most that this run takes")
 
     @abstractmethod
     def _slot(self, assignment: Assignment) -> S:
@@ -341,7 +341,7 @@ class Roster(ABC, Generic[S]):
             self._changed("returned" if back else "joined", runner, slot)
 
     def _changed(self, what: What, runner: str, slot: S, reason: str = "") -> None:
-        self.changes.append(Change(what, runner, slot.assignment.robot_names, self._tick, reason))
+        self.changes.append(RunnerEvent(what, runner, slot.assignment.robot_names, self._tick, reason))
 
     def _failed(self, slot: S, frame: frames.Frame) -> None:
         match frame.values:

@@ -20,9 +20,9 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import USUAL, Door, Refused, Terms
+from swarmwire.world.backends.join_policy import USUAL, JoinPolicy, JoinRefused, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.registry import Change, Loss, OnLoss, Roster, RunnerHealth
+from swarmwire.world.backends.registry import Loss, OnLoss, RunnerEvent, RunnerHealth, RunnerRegistry
 
 # zenoh's stubs leave out the return types of put, reply and close.
 
@@ -34,11 +34,11 @@ MAX_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
 FLOODED = "it sent far more than it was asked for"
 FAREWELL_S = 3.0  # how long runners may take to leave after the end
 
-R = TypeVar("R", bound=Roster[Any])
+R = TypeVar("R", bound=RunnerRegistry[Any])
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class BackendHooks:
     """What a backend asks and tells whoever runs it.
 
     `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
@@ -50,7 +50,7 @@ class Surroundings:
     trouble: Callable[[], str | None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     lost: Callable[[Loss], None] = lambda _: None
-    changed: Callable[[Change, tuple[str, ...]], None] = lambda _change, _free: None
+    changed: Callable[[RunnerEvent, tuple[str, ...]], None] = lambda _change, _free: None
     refused: Callable[[str, str], None] = lambda _runner, _why: None
     opened: Callable[[tuple[str, ...]], None] = lambda _: None
 
@@ -62,15 +62,15 @@ class ZenohBackend(ABC, Generic[R]):
 
     def __init__(
         self,
-        door: Door | str,
+        door: ListenSettings | str,
         run_id: str,
         roster: R,
         timeout_s: float,
         clock: Clock,
-        around: Surroundings,
+        around: BackendHooks,
         start_s: float = START_S,
     ) -> None:
-        self._door = Door((door,)) if isinstance(door, str) else door
+        self._door = ListenSettings((door,)) if isinstance(door, str) else door
         self._keys = Keys(run_id)
         self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
         self._inbox = RunnerInbox(roster.limits)
@@ -249,10 +249,10 @@ class ZenohBackend(ABC, Generic[R]):
                         query.reply(key, offer.encode())
                     return
                 if runner in self._shut_out:
-                    raise Refused(FLOODED)
+                    raise JoinRefused(FLOODED)
                 # Only the exact key speaks for a runner, as below.
                 reply = self._roster.join(runner if key == self._keys.join(runner) else key, request)
-            except Refused as refusal:
+            except JoinRefused as refusal:
                 self._refusals += 1
                 if self._refusals <= MAX_TOLD:
                     self._around.refused(runner, str(refusal))
@@ -313,7 +313,7 @@ class ZenohBackend(ABC, Generic[R]):
 # --- The remote backend in lockstep: the loop waits for every runner, as fast as the machine allows.
 
 
-ALONE = Surroundings()
+ALONE = BackendHooks()
 
 
 class LockstepBackend(ZenohBackend[Lockstep]):
@@ -321,15 +321,15 @@ class LockstepBackend(ZenohBackend[Lockstep]):
 
     def __init__(
         self,
-        door: Door | str,
+        door: ListenSettings | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
         clock: Clock,
-        around: Surroundings = ALONE,
+        around: BackendHooks = ALONE,
         on_loss: OnLoss = "stop",
         start_s: float = START_S,
-        terms: Terms = USUAL,
+        terms: JoinPolicy = USUAL,
     ) -> None:
         super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
 

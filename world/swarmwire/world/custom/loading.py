@@ -14,7 +14,7 @@ from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.plugins import custom_class, entry_points_of
-from swarmwire.comms.tick_io import Actuations
+from swarmwire.comms.tick_io import ActuatorCommands
 from swarmwire.comms.truth import Group
 from swarmwire.world.custom.actuators import CustomActuator
 from swarmwire.world.custom.sensors import CustomSensor, field_fault
@@ -128,7 +128,7 @@ class CustomActuators:
         self.not_there: IntArray = np.zeros(arenas, np.int64)
         self._robots, self._ticks = robots, 0
 
-    def act(self, actuations: Actuations, alive: BoolArray) -> None:
+    def act(self, actuations: ActuatorCommands, alive: BoolArray) -> None:
         """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
         rows, place = actuations.rows, actuations.place
         there = place < self._places[rows]

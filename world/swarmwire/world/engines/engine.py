@@ -36,7 +36,7 @@ def motors_of(groups: Sequence[Group]) -> Motors:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class EngineConfig:
     """The arenas and the n robots of each that one engine moves, in the order of its rows."""
 
     size_m: tuple[float, float]  # full extents of an arena; the origin is its centre
@@ -51,14 +51,14 @@ class Setting:
     steps: int  # physics steps in a tick
 
 
-def setting_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> Setting:
+def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> EngineConfig:
     """What an engine is told that is to move these of an arena's groups, in this order."""
     count = [group.stop - group.start for group in groups]
     radius_m, bottom_m, height_m = (
         np.repeat(column, count)
         for column in zip(*((g.body.radius_m, g.body.altitude_m, g.body.height_m) for g in groups), strict=True)
     )
-    return Setting(
+    return EngineConfig(
         size_m=static.arena_size_m,
         boundary=static.boundary,
         standing=static.obstacles,

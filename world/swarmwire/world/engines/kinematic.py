@@ -14,10 +14,10 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.world.engines.contacts import count_began, mark
-from swarmwire.world.engines.engine import Setting
-from swarmwire.world.engines.position_correction import Hindrances, any_near, held_back, overlaps, shortest
+from swarmwire.world.engines.engine import EngineConfig
+from swarmwire.world.engines.position_correction import PositionCorrections, any_near, held_back, overlaps, shortest
 
 PIECE_OF_RADIUS = 0.25  # near obstacles a tick's way is gone in pieces of so much of the radius, so none is jumped over
 
@@ -27,7 +27,7 @@ class KinematicEngine:
 
     name: ClassVar[str] = "kinematic"
 
-    def __init__(self, setting: Setting, pose: FloatArray) -> None:
+    def __init__(self, setting: EngineConfig, pose: FloatArray) -> None:
         """Bodies at rest at `pose` (arenas, n, 3)."""
         arenas, n = pose.shape[:2]
         self.state = np.zeros((arenas, n, 6))
@@ -37,7 +37,7 @@ class KinematicEngine:
         self.braked: BoolArray = np.zeros((arenas, n), np.bool_)
         self._tick_s, self._wheel_base_m = setting.tick_s, setting.motors.wheel_base_m
         self._disc = setting.radius_m, setting.bottom_m, setting.top_m
-        self._hindrances = Hindrances(setting)
+        self._hindrances = PositionCorrections(setting)
         self._running: BoolArray = np.ones(arenas, np.bool_)
         self._held: BoolArray = np.zeros((arenas, n), np.bool_)
         self._touching = np.empty(0, np.int64)
@@ -65,7 +65,7 @@ class KinematicEngine:
         self._running &= ~over
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, running, state, travel_m, held):
     for arena in range(target.shape[0]):
         if not running[arena]:
@@ -79,7 +79,7 @@ def _move(around, wheel_base_m, radius_m, bottom_m, target, tick_s, running, sta
             travel_m[arena, i, 1] += rolled + apart
 
 
-@borrowing()
+@kernel()
 def _go(around, arena, size, forward, turn, left, tick_s, state):
     """Bring the state (6,) of one robot of this radius and height to the end of the tick.
 

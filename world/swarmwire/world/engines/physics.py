@@ -13,13 +13,13 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Static
 from swarmwire.world.engines.discs.engine import DiscsEngine
-from swarmwire.world.engines.engine import Engine, Setting, setting_of
+from swarmwire.world.engines.engine import Engine, EngineConfig, engine_config_of
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 from swarmwire.world.scenario.scenario import EngineName, Scenario
 
 # By the name that a scenario has for it.
-ENGINES: dict[EngineName, Callable[[Setting, FloatArray], Engine]] = {
+ENGINES: dict[EngineName, Callable[[EngineConfig, FloatArray], Engine]] = {
     "discs": DiscsEngine,
     "pymunk": PymunkEngine,
     "kinematic": KinematicEngine,
@@ -53,7 +53,7 @@ class Physics:
         for name in self.names:
             moved = [group for group in static.groups if engines[group.name] == name]
             index = np.concatenate([np.arange(group.start, group.stop) for group in moved])
-            setting = setting_of(static, obstacles, moved, steps)
+            setting = engine_config_of(static, obstacles, moved, steps)
             self._engines.append(ENGINES[name](setting, np.ascontiguousarray(pose[:, index])))
             self._robots.append(index)
         pushing = [engine for engine in self._engines if isinstance(engine, PymunkEngine)]

@@ -11,17 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.geometry.obstacle_index import things_within
+from swarmwire.comms.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.geometry.robot_index import Cells, cell_of, column_of, row_of
-from swarmwire.comms.kernels import borrowing
-from swarmwire.world.engines.engine import Setting
+from swarmwire.comms.kernels import kernel
+from swarmwire.world.engines.engine import EngineConfig
 
 PASSES = 8  # in a corner, what one thing pushes out of itself another may push back
 EPSILON_M = 1e-9  # touching by rounding is no overlap
 
 
-class Hindrance(NamedTuple):
+class PositionCorrection(NamedTuple):
     """What holds discs back in every arena, as kernels take it."""
 
     half_x_m: float
@@ -38,7 +38,7 @@ def shortest(apart_m, half_m, wraps):
     return apart_m - 2.0 * half_m * np.floor((apart_m + half_m) / (2.0 * half_m)) if wraps else apart_m
 
 
-@borrowing()
+@kernel()
 def any_near(around, arena, x, y, reach_m, bottom_m):
     """Whether the circle around any obstacle that is taller than `bottom_m` lies within reach of a point.
 
@@ -58,12 +58,12 @@ def any_near(around, arena, x, y, reach_m, bottom_m):
     return False
 
 
-@borrowing()
+@kernel()
 def _cell(cells, arena, x, y):
     return (arena * cells.ny + row_of(cells, y)) * cells.nx + column_of(cells, x)
 
 
-@borrowing()
+@kernel()
 def _within(around, circle, k, x, y, reach_m):
     dx = shortest(x - circle[k, 0], around.half_x_m, around.wraps)
     dy = shortest(y - circle[k, 1], around.half_y_m, around.wraps)
@@ -71,7 +71,7 @@ def _within(around, circle, k, x, y, reach_m):
     return dx * dx + dy * dy < reach * reach
 
 
-@borrowing()
+@kernel()
 def held_back(around, arena, x, y, radius_m, bottom_m, near):
     """The place x, y of a disc after it is pushed out, whether it was, and whether it is free there.
 
@@ -91,7 +91,7 @@ def held_back(around, arena, x, y, radius_m, bottom_m, near):
     return x, y, True, False
 
 
-@borrowing()
+@kernel()
 def _out_of_obstacles(around, arena, x, y, radius_m, bottom_m):
     """Out of one obstacle after the other; who is pushed into another cell goes on with what is listed there."""
     cells, circles = around.cells, len(around.obstacles.circle)
@@ -115,7 +115,7 @@ def _out_of_obstacles(around, arena, x, y, radius_m, bottom_m):
     return x, y
 
 
-@borrowing()
+@kernel()
 def _out_of_circle(around, k, x, y, radius_m, bottom_m):
     obstacles = around.obstacles
     dx = shortest(x - obstacles.circle[k, 0], around.half_x_m, around.wraps)
@@ -126,7 +126,7 @@ def _out_of_circle(around, k, x, y, radius_m, bottom_m):
     return x + dx / distance * (apart - distance), y + dy / distance * (apart - distance)
 
 
-@borrowing()
+@kernel()
 def _out_of_sides(around, k, x, y, radius_m, bottom_m):
     obstacles = around.obstacles
     if obstacles.polygon_top_m[k] <= bottom_m or not _within(around, obstacles.polygon, k, x, y, radius_m):
@@ -140,7 +140,7 @@ def _out_of_sides(around, k, x, y, radius_m, bottom_m):
     return x + dx, y + dy
 
 
-@borrowing()
+@kernel()
 def _out_of_polygon(side, start, stop, x, y, radius_m):
     """The shortest way by which a disc leaves a convex polygon, (0, 0) if it is clear."""
     beyond, outer = -np.inf, start  # the side that the centre is furthest beyond, or least behind
@@ -260,19 +260,19 @@ def _room_for(codes, found):
 SPARE = 1.25  # of a reach that has grown, so that robots that gather speed do not have the obstacles sorted each tick
 
 
-class Hindrances:
+class PositionCorrections:
     """The hindrances of a setting: obstacles are sorted once, or in each tick where some of them can be pushed."""
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setting: EngineConfig) -> None:
         """Nothing is sorted yet for any reach."""
         self._obstacles, self._size_m = setting.obstacles, setting.size_m
         self._move = any(obstacle.movable for standing in setting.standing for obstacle in standing)
         self._reach_m = 0.0
         width, height = setting.size_m
         walled, wraps = setting.boundary == "walls", setting.boundary == "torus"
-        self._now = Hindrance(0.5 * width, 0.5 * height, walled, wraps, setting.obstacles, self._cells())
+        self._now = PositionCorrection(0.5 * width, 0.5 * height, walled, wraps, setting.obstacles, self._cells())
 
-    def within(self, reach_m: float) -> Hindrance:
+    def within(self, reach_m: float) -> PositionCorrection:
         """As they stand now, for looking at least `reach_m` far."""
         grown = reach_m > self._reach_m
         if grown:
@@ -288,4 +288,4 @@ class Hindrances:
             side_start=np.zeros_like(self._obstacles.side_start), side=np.empty((0, 5), np.float64)
         )
         reach_m = min(self._reach_m, sum(self._size_m))  # farther is in all cells
-        return things_within(bare, self._size_m, reach_m, torus=False).cells
+        return obstacles_within(bare, self._size_m, reach_m, torus=False).cells

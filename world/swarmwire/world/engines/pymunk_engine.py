@@ -20,7 +20,7 @@ from pymunk.constraints import PivotJoint
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
-from swarmwire.world.engines.engine import Motors, Setting
+from swarmwire.world.engines.engine import EngineConfig, Motors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables
 
 
@@ -119,7 +119,7 @@ class ArenaSpace:
 
     def __init__(
         self,
-        setting: Setting,
+        setting: EngineConfig,
         obstacles: tuple[Obstacle, ...],
         loads: Sequence[Load],
         pose: FloatArray,
@@ -245,7 +245,7 @@ class PymunkEngine:
 
     name: ClassVar[str] = "pymunk"
 
-    def __init__(self, setting: Setting, pose: FloatArray) -> None:
+    def __init__(self, setting: EngineConfig, pose: FloatArray) -> None:
         """Bodies at rest at `pose` (arenas, n, 3)."""
         arenas, robots = pose.shape[:2]
         self._motors, self._steps, self._step_s = setting.motors, setting.steps, setting.tick_s / setting.steps

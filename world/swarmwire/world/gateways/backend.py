@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import Put, ReceivingBackend, SubtickMedium
+from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, LedChanges, Readings
 from swarmwire.comms.truth import Group
@@ -118,7 +118,7 @@ class GatewayBackend:
         """
         self._inner, self._groups, self._medium, self._pace, self._show = inner, groups, medium, pace, show
         self._rate_hz, self._show_counts, self._subticks = rate_hz, show_counts, subticks
-        self._puts: list[Put] = []
+        self._puts: list[SubtickPackets] = []
         self._names = frozenset(group.name for group in groups)
         self._rows = np.sort(np.concatenate([group.rows for group in groups]))
         self.start, self.close = inner.start, inner.close
@@ -142,16 +142,16 @@ class GatewayBackend:
         others = self._begin(tick, readings, received, tx_status)
         self._inner.receive(received, tx_status)
         actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
-        self._puts.append(Put(self._pace.now_ns(), tick, actions.sent))
+        self._puts.append(SubtickPackets(self._pace.now_ns(), tick, actions.sent))
         self._subticks.pass_tick(tick, medium, self)
         self._catch_up(tick)
         still = replace(actions, sent=SentPackets.none())
         return Actions.joined([still, *(group.take() for group in self._groups)])
 
-    def take_in(self) -> list[Put]:
+    def take_in(self) -> list[SubtickPackets]:
         """What agents here sent since the last call, and what came from foreign ones."""
         puts, self._puts = self._puts, []
-        return [*puts, Put(self._pace.now_ns(), None, self._medium.take())] if self._medium else puts
+        return [*puts, SubtickPackets(self._pace.now_ns(), None, self._medium.take())] if self._medium else puts
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Tell robots behind gateways, and let agents here that read between ticks read."""
@@ -159,7 +159,7 @@ class GatewayBackend:
         self._inner.receive(received, tx_status)
         sent = self._inner.on_receive(tick, at_ns)
         if len(sent):
-            self._puts.append(Put(self._pace.now_ns(), None, sent))
+            self._puts.append(SubtickPackets(self._pace.now_ns(), None, sent))
 
     def counts(self) -> dict[str, int]:
         """Faults of the inner backend, of gateways by their kind, of what is shown, and of the medium between."""

@@ -1,6 +1,5 @@
 """The world as the tracker of its robots: what a camera above a real arena would publish."""
 
-# zenoh's stubs leave out the return type of put.
 # pyright: reportUnknownMemberType=false
 
 from typing import cast
@@ -13,8 +12,10 @@ from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 
+# zenoh's stubs leave out the return type of put.
 
-class Tracker:
+
+class EmulatedTracker:
     """Publishes where each robot alive is, once per tick; of a world of several arenas, those of the first."""
 
     def __init__(self, session: zenoh.Session, keys: SwarmKeys, clock: DatedClock) -> None:

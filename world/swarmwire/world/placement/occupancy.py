@@ -49,7 +49,7 @@ GAP_M = 1e-3  # least free space between two things at the start
 ROUNDING_M = 1e-9
 
 
-class Taken(NamedTuple):
+class Occupancy(NamedTuple):
     """What stands in an arena so far. Robots are found by cell: head[cell], then follow[robot], until -1."""
 
     half_x_m: float  # of the arena
@@ -201,7 +201,7 @@ def _polygon_clear_here(taken, sides, gap_m):
 # --- The obstacles that stand in an arena so far, for whatever is to find a place among them.
 
 
-class Standing:
+class PlacementRules:
     """The obstacles of one arena as arrays with room for all that will stand there; those of the map are the first."""
 
     def __init__(self, arena: ArenaTable, layout: Layout) -> None:
@@ -229,7 +229,7 @@ class Standing:
             self._side_start[self._polygons] = first + len(shape.side)
         return obstacle
 
-    def taken(self, groups: Sequence[Group] = (), gap_m: float = 0.0, lights: Sequence[Light] = ()) -> Taken:
+    def taken(self, groups: Sequence[Group] = (), gap_m: float = 0.0, lights: Sequence[Light] = ()) -> Occupancy:
         """What kernels look at, with room to note the robots of these groups, which keep at most `gap_m` apart.
 
         `lights` are points to keep away from, too.
@@ -242,7 +242,7 @@ class Standing:
         if lights:
             points = np.array([(light.x_m, light.y_m, 0.0, np.inf) for light in lights])
             circle = np.concatenate([circle, points])
-        return Taken(
+        return Occupancy(
             half_x_m=0.5 * width,
             half_y_m=0.5 * height,
             wraps=self._wraps,

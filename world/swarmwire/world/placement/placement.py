@@ -11,7 +11,7 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.maps import Layout
-from swarmwire.world.placement.occupancy import GAP_M, Disc, Standing, Taken, heading_of, obstacle_at
+from swarmwire.world.placement.occupancy import GAP_M, Disc, Occupancy, PlacementRules, heading_of, obstacle_at
 from swarmwire.world.placement.sampling import (
     BOX,
     DISC,
@@ -57,7 +57,7 @@ class Placed:
 
 def place(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int, key: np.uint64) -> Placed:
     """The obstacles, lights and robots of the arena with this seed and key; BadInput names what finds no room."""
-    standing = Standing(scenario.arena, layout)
+    standing = PlacementRules(scenario.arena, layout)
     obstacles = (*layout.boxes, *_place_obstacles(scenario, standing, seed, key))
     lights = _place_lights(scenario, standing, seed, key)
     gaps_m = {group.name: _gap_m(scenario.robots[group.name].place) for group in groups}
@@ -82,7 +82,7 @@ def _no_room(scenario: Scenario, key: str, what: str, why: str, seed: int) -> Ba
     return BadInput(scenario.source, key, f"no room for {what} with seed {seed}: {why}")
 
 
-def _place_obstacles(scenario: Scenario, standing: Standing, seed: int, key: np.uint64) -> tuple[Obstacle, ...]:
+def _place_obstacles(scenario: Scenario, standing: PlacementRules, seed: int, key: np.uint64) -> tuple[Obstacle, ...]:
     tables = scenario.arena.obstacles
     placed: list[list[Obstacle]] = [[] for _ in tables]
     for i, table in enumerate(tables):
@@ -98,7 +98,7 @@ def _place_obstacles(scenario: Scenario, standing: Standing, seed: int, key: np.
     return tuple(obstacle for some in placed for obstacle in some)
 
 
-def _random_obstacle(table: ObstacleTable, taken: Taken, key: np.uint64, copy: int, of: int) -> Obstacle | None:
+def _random_obstacle(table: ObstacleTable, taken: Occupancy, key: np.uint64, copy: int, of: int) -> Obstacle | None:
     heading, wanted, gap_m = 0.0, heading_of(table), max(GAP_M, table.apart_m)
     region = _region(table.within, taken)
     if isinstance(table, CylinderTable):
@@ -110,7 +110,7 @@ def _random_obstacle(table: ObstacleTable, taken: Taken, key: np.uint64, copy: i
     return obstacle_at(table, x, y, heading) if np.isfinite(x) else None
 
 
-def _place_lights(scenario: Scenario, standing: Standing, seed: int, key: np.uint64) -> tuple[Light, ...]:
+def _place_lights(scenario: Scenario, standing: PlacementRules, seed: int, key: np.uint64) -> tuple[Light, ...]:
     placed: list[Light] = []
     for i, table in enumerate(scenario.arena.lights):
         disc = Disc(0.0, max(GAP_M, table.apart_m), 0.0, inf)
@@ -126,13 +126,13 @@ def _place_lights(scenario: Scenario, standing: Standing, seed: int, key: np.uin
     return tuple(placed)
 
 
-def _region(of: RegionTable | PlaceTable | None, taken: Taken) -> Region:
+def _region(of: RegionTable | PlaceTable | None, taken: Occupancy) -> Region:
     """The region of a table; the whole arena where it names none."""
-    if isinstance(of, tables.Disc):
+    if isinstance(of, tables.DiscTable):
         return Region(DISC, *of.at, of.radius_m, of.radius_m, 0.0)
-    if isinstance(of, tables.Ring):
+    if isinstance(of, tables.RingTable):
         return Region(RING, *of.at, of.radius_m, of.radius_m, of.inner_radius_m)
-    if isinstance(of, tables.Box):
+    if isinstance(of, tables.RectangleTable):
         return Region(BOX, *of.at, 0.5 * of.size_m[0], 0.5 * of.size_m[1], 0.0)
     return Region(BOX, 0.0, 0.0, taken.half_x_m, taken.half_y_m, 0.0)
 

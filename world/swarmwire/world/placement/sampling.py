@@ -12,7 +12,7 @@ from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.geometry.robot_index import cell_of
 from swarmwire.world.placement.occupancy import (
     Disc,
-    Taken,
+    Occupancy,
     disc_clear_of_obstacles,
     disc_clear_of_robots,
     on_torus,
@@ -57,7 +57,7 @@ MAX_CANDIDATES = 1000
 
 @njit(cache=True)
 def free_circle(
-    taken: Taken, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
+    taken: Occupancy, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
 ) -> tuple[float, float]:
     """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
     for attempt in range(MAX_CANDIDATES):
@@ -70,7 +70,7 @@ def free_circle(
 
 @njit(cache=True)
 def free_polygon(
-    taken: Taken,
+    taken: Occupancy,
     region: Region,
     key: np.uint64,
     entity: int,
@@ -99,7 +99,7 @@ def free_polygon(
 
 @njit(cache=True)
 def put_robots(
-    taken: Taken,
+    taken: Occupancy,
     region: Region,
     fixed: FloatArray,
     key: np.uint64,

@@ -10,7 +10,7 @@ import pydantic
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from swarmwire.comms.config import limits_of
+from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
 
 Node = dict[str, Any]  # of a JSON schema
@@ -143,7 +143,7 @@ def table_of(kind: type[Any]) -> type[BaseModel]:
 
 
 def _hint(hint: Any, of: "Field[Any]") -> Any:
-    limits = limits_of(of)
+    limits = bounds_of(of)
     if limits.choices:
         choices: Any = Literal[limits.choices]
         return choices | None if of.default is None else choices
@@ -162,7 +162,7 @@ def _readable(hint: Any) -> Any:
 
 
 def _field(of: "Field[Any]") -> Any:
-    limits = limits_of(of)
+    limits = bounds_of(of)
     given: dict[str, Any] = {"ge": limits.at_least, "le": limits.at_most, "gt": limits.above, "lt": limits.below}
     given = {name: bound for name, bound in given.items() if bound is not None}
     if limits.help:

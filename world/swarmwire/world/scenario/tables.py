@@ -74,7 +74,7 @@ def _turn(a: Corner, b: Corner, c: Corner) -> float:
 # --- Where things stand at the start: in a region, at random and apart from one another, in rows, or at given poses.
 
 
-class Disc(Table):
+class DiscTable(Table):
     """Uniform in a disc."""
 
     how: Literal["disc"]
@@ -85,7 +85,7 @@ class Disc(Table):
     """Centre of the disc."""
 
 
-class Box(Table):
+class RectangleTable(Table):
     """Uniform in a rectangle."""
 
     how: Literal["box"]
@@ -96,7 +96,7 @@ class Box(Table):
     """Centre of the rectangle."""
 
 
-class Ring(Table):
+class RingTable(Table):
     """Uniform in a ring."""
 
     how: Literal["ring"]
@@ -109,14 +109,14 @@ class Ring(Table):
     """Centre of the ring."""
 
     @model_validator(mode="after")
-    def _not_inside_out(self) -> "Ring":
+    def _not_inside_out(self) -> "RingTable":
         if self.inner_radius_m > self.radius_m:
             text = "expected an inner_radius_m of at most radius_m, {outer}; got {inner}"
             raise PydanticCustomError("place", text, {"outer": self.radius_m, "inner": self.inner_radius_m})
         return self
 
 
-RegionTable = Annotated[Disc | Box | Ring, Field(discriminator="how")]
+RegionTable = Annotated[DiscTable | RectangleTable | RingTable, Field(discriminator="how")]
 
 
 class _Turned(Table):
@@ -133,15 +133,15 @@ class _AtRandom(_Turned):
     """Least gap between the surface of each of them and those of obstacles, of robots put before and of one another."""
 
 
-class InDisc(_AtRandom, Disc):
+class InDisc(_AtRandom, DiscTable):
     """Uniform in a disc."""
 
 
-class InBox(_AtRandom, Box):
+class InBox(_AtRandom, RectangleTable):
     """Uniform in a rectangle."""
 
 
-class InRing(_AtRandom, Ring):
+class InRing(_AtRandom, RingTable):
     """Uniform in a ring."""
 
 

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.robot_events import Impulse
@@ -38,16 +38,16 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
     names, node, holder = _followed(error["loc"], schema)
     kind, key, got = error["type"], ".".join(names), _shown(error["input"])
     if kind == "extra_forbidden":
-        return key, f"unknown key; expected {one_of(holder.get('properties', {}), names[-1])}"
+        return key, f"unknown key; expected {did_you_mean(holder.get('properties', {}), names[-1])}"
     if kind == "missing":
         return key, f"is missing; expected {words(node, schema)}"
     if "discriminator" in node:  # one of several tables, by their tag
         tag = node["discriminator"]["propertyName"]
         kinds = node["discriminator"]["mapping"]
         if not isinstance(error["input"], dict):
-            return key, f"expected a table with {tag} = {one_of(kinds)}; got {got}"
+            return key, f"expected a table with {tag} = {did_you_mean(kinds)}; got {got}"
         given = cast("Node", error["input"])
-        choices = f"expected {one_of(kinds, given.get(tag))}"
+        choices = f"expected {did_you_mean(kinds, given.get(tag))}"
         return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
     if error["loc"][-1] == "[key]":
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
@@ -57,7 +57,7 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return key, error["msg"]
     if "patternProperties" in holder and node.get("type") == "object":
         return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got}"
-    expected = one_of(map(str, node["enum"]), error["input"]) if "enum" in node else words(node, schema)
+    expected = did_you_mean(map(str, node["enum"]), error["input"]) if "enum" in node else words(node, schema)
     return key, f"expected {expected}, got {got}"
 
 

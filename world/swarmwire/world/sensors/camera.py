@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensor_specs import Camera
-from swarmwire.comms.geometry.obstacle_index import near_things
+from swarmwire.comms.bodies.sensor_specs import CameraSpec
+from swarmwire.comms.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.geometry.robot_index import sort
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.rays import Standing, crowd_of, near_robots, nearest
+from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 NEVER = (np.inf, -np.inf)
@@ -30,7 +30,7 @@ class SightLine(NamedTuple):
     dz: float
 
 
-@borrowing()
+@kernel()
 def through_disc(line, cx, cy, radius):
     """Between which shares of the way, prolonged, the line is above or below a disc; inf, -inf if it misses it."""
     ox, oy = cx - line.x, cy - line.y
@@ -46,7 +46,7 @@ def through_disc(line, cx, cy, radius):
     return (along - root) / length2, (along + root) / length2
 
 
-@borrowing()
+@kernel()
 def through_polygon(line, things, k):
     """As `through_disc`, for polygon k."""
     enter, leave = -np.inf, np.inf
@@ -64,7 +64,7 @@ def through_polygon(line, things, k):
     return enter, leave
 
 
-@borrowing()
+@kernel()
 def is_cut(line, enter, leave, bottom_m, top_m):
     """Whether the line, before it arrives, passes between two heights while it is between these shares of the way."""
     first, last = max(enter, 0.0), min(leave, END)
@@ -95,7 +95,7 @@ class Mirror(NamedTuple):
 class CameraSensor:
     """Sense `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Camera) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: CameraSpec) -> None:
         blobs, noise = spec.most_blobs, Noise("normal", 0.0, spec.noise_relative)
         reach_m = spec.reach_m(group.body.altitude_m)
         self.fields = (
@@ -106,8 +106,8 @@ class CameraSensor:
         self._scene, self._shape = scene, (len(scene.keys), group.stop - group.start, blobs)
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
-        self._crowd = crowd_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
-        self._standing = Standing(scene, reach_m)
+        self._crowd = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
+        self._standing = ObstacleIndices(scene, reach_m)
         found = np.empty(len(self._standing.now().shape), np.int64)
         self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, found)
 
@@ -119,7 +119,7 @@ class CameraSensor:
         return blobs
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _watch(blobs, crowd, things, mirror, leds, places):
     """Set distance, bearing and colour (arenas, n, blobs each)."""
     sort(crowd.cells, crowd.state, crowd.running)
@@ -134,12 +134,12 @@ def _watch(blobs, crowd, things, mirror, leds, places):
             robots = near_robots(crowd, arena, own, x, y, mirror.reach_m + mirror.overhang_m, -np.inf, np.inf)
             if robots == 0:
                 continue
-            obstacles = near_things(mirror.found, things, arena, x, y, mirror.reach_m, 0.0)
+            obstacles = obstacles_near(mirror.found, things, arena, x, y, mirror.reach_m, 0.0)
             eye = x, y, eye_z, crowd.state[arena, own, 2]
             _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places)
 
 
-@borrowing()
+@kernel()
 def _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places):
     """Set the blobs of one row: the lit LEDs in sight of the robots that were found."""
     x, y, eye_z, heading = eye
@@ -162,7 +162,7 @@ def _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, 
                 count = _keep(blobs, arena, i, count, apart, bearing, leds[arena, other, led])
 
 
-@borrowing()
+@kernel()
 def _is_hidden(line, crowd, robots, things, found, obstacles):
     for at in range(robots):
         other = crowd.found[at]
@@ -180,7 +180,7 @@ def _is_hidden(line, crowd, robots, things, found, obstacles):
     return False
 
 
-@borrowing()
+@kernel()
 def _keep(blobs, arena, i, count, apart, bearing, colour):
     """Put a blob in its place by distance, as long as there is room; how many there are then."""
     distances, bearings, colours = blobs[0][arena, i], blobs[1][arena, i], blobs[2][arena, i]

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensor_specs import Imu
+from swarmwire.comms.bodies.sensor_specs import ImuSpec
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
@@ -24,7 +24,7 @@ BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
 class ImuSensor:
     """Sense `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Imu) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: ImuSpec) -> None:
         self._scene, self._group = scene, group
         acceleration, turn = Noise("normal", spec.noise_mps2), Noise("normal", spec.noise_radps)
         self.fields = (

@@ -5,19 +5,19 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import Light
-from swarmwire.comms.geometry.obstacle_index import ray_to_thing
+from swarmwire.comms.bodies.ranging_specs import LightSpec
+from swarmwire.comms.geometry.obstacle_index import ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import sort
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.rays import Standing, crowd_of, nearest
+from swarmwire.world.sensors.rays import ObstacleIndices, nearest, robot_index_of
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 MARGIN_M = 1e-9  # a line along the border of two cells goes through both
 
 
-@borrowing()
+@kernel()
 def things_between(things, arena, x, y, to_x, to_y, low_m):
     """Whether an obstacle higher than `low_m` touches the line from x, y to another place."""
     cells = things.cells
@@ -31,12 +31,12 @@ def things_between(things, arena, x, y, to_x, to_y, low_m):
             c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
             for at in range(cells.start[c], cells.start[c + 1]):
                 k = cells.item[at]
-                if things.shape[k, 3] > low_m and ray_to_thing(x, y, dx, dy, things, k) <= apart:
+                if things.shape[k, 3] > low_m and ray_to_obstacle(x, y, dx, dy, things, k) <= apart:
                     return True
     return False
 
 
-@borrowing()
+@kernel()
 def robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
     """Whether a robot that is as high as robot `own` somewhere touches the line from its place x, y to another."""
     cells = crowd.cells
@@ -63,13 +63,13 @@ def robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
     return False
 
 
-@borrowing()
+@kernel()
 def _cell(at, per, cells):
     """The column or row of a coordinate, not rolled up."""
     return int(np.floor(at * per + 0.5 * cells))
 
 
-@borrowing()
+@kernel()
 def _rows(cells, column, margin_m, x, y, to_x, to_y):
     """First and last row of a column, not rolled up, where something this wide may touch the line."""
     low, high = min(y, to_y), max(y, to_y)
@@ -101,7 +101,7 @@ TURN_RAD = 2.0 * np.pi
 class LightSensor:
     """Sense `light`: value (n, sensors), 0 dark to 1. Noise is uniform, and new in every reading."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Light) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: LightSpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
         noise = Noise("uniform", spec.noise)
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
@@ -109,8 +109,8 @@ class LightSensor:
         self._arena = np.array([a for a, _ in lights], np.int64)
         self._light = np.array([(of.x_m, of.y_m, of.intensity_m) for _, of in lights], np.float64).reshape(-1, 3)
         self._widest_m = float(scene.radius_m.max())
-        self._crowd = crowd_of(scene, 2.0 * self._widest_m)
-        self._standing = Standing(scene, 0.0, images_m=0.5 * max(scene.size_m))  # no light is farther on a torus
+        self._crowd = robot_index_of(scene, 2.0 * self._widest_m)
+        self._standing = ObstacleIndices(scene, 0.0, images_m=0.5 * max(scene.size_m))  # no light is farther on a torus
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """What every photocell of every robot of the group answers, without noise; more than 1 where lights add up."""
@@ -121,7 +121,7 @@ class LightSensor:
         return (value,)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _shine(value, start, angle, crowd, widest_m, things, arena_of, lights):
     """Add what the cells of each robot (arenas, n, sensors) see of each light."""
     sort(crowd.cells, crowd.state, crowd.running)

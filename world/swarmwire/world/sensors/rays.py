@@ -7,18 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import FORMS, Infrared, Proximity, Rim
-from swarmwire.comms.geometry.obstacle_index import Things, near_things, ray_to_thing, things_within
+from swarmwire.comms.bodies.ranging_specs import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndex, obstacles_near, obstacles_within, ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 CELLS_PER_ROBOT = 8  # so that few share one where they gather in a corner of a large arena
 
 
-class Crowd(NamedTuple):
+class RobotIndex(NamedTuple):
     """What kernels know of the robots; `cells` is filled by `cells.sort`."""
 
     state: FloatArray  # (arenas, robots, 6)
@@ -35,14 +35,14 @@ class Crowd(NamedTuple):
     found_at: FloatArray  # (robots, 2) and for where they are
 
 
-def crowd_of(scene: Scene, reach_m: float) -> Crowd:
+def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
     """The robots of a scene, for looking at whose centre is within `reach_m`."""
     arenas, robots = scene.state.shape[:2]
     per_cell_m = np.sqrt(scene.size_m[0] * scene.size_m[1] / (CELLS_PER_ROBOT * robots))
     torus = scene.boundary == "torus"
     wrap_x, wrap_y = scene.size_m if torus else (0.0, 0.0)
     per_wrap_x, per_wrap_y = (1.0 / wrap_x, 1.0 / wrap_y) if torus else (0.0, 0.0)
-    return Crowd(
+    return RobotIndex(
         scene.state,
         scene.running,
         scene.radius_m,
@@ -58,13 +58,13 @@ def crowd_of(scene: Scene, reach_m: float) -> Crowd:
     )
 
 
-@borrowing()
+@kernel()
 def nearest(at, there, wrap, per_wrap):
     """Where a coordinate `there` is as seen from `at`: on a torus, its image at the least distance."""
     return there - wrap * np.rint((there - at) * per_wrap)
 
 
-@borrowing()
+@kernel()
 def near_robots(crowd, arena, own, x, y, reach_m, low_m, high_m):
     """Write into `crowd.found` the robots but `own` whose rims are within reach of a place; how many.
 
@@ -93,7 +93,7 @@ def near_robots(crowd, arena, own, x, y, reach_m, low_m, high_m):
 # --- The obstacles of a scene as a sensor looks at them.
 
 
-class Standing:
+class ObstacleIndices:
     """The obstacles of a scene by cell, sorted once, or in each tick where some of them can be pushed."""
 
     def __init__(self, scene: Scene, reach_m: float, images_m: float | None = None) -> None:
@@ -101,16 +101,16 @@ class Standing:
         self._scene, self._reach_m, self._images_m = scene, reach_m, images_m
         self._things = self._sorted()
 
-    def now(self) -> Things:
+    def now(self) -> ObstacleIndex:
         """The obstacles where they stand in this tick; as many as ever."""
         if self._scene.obstacles_move:
             self._things = self._sorted()
         return self._things
 
-    def _sorted(self) -> Things:
+    def _sorted(self) -> ObstacleIndex:
         scene = self._scene
         torus = scene.boundary == "torus"
-        return things_within(scene.obstacles, scene.size_m, self._reach_m, torus, self._images_m)
+        return obstacles_within(scene.obstacles, scene.size_m, self._reach_m, torus, self._images_m)
 
 
 # --- A few rays from the rim of each robot, and the nearest thing on each. Compiled; for active and passive infrared.
@@ -120,7 +120,7 @@ RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
 MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, however numbers are rounded
 
 
-class Fan(NamedTuple):
+class RayArray(NamedTuple):
     """The sheet as kernels take it, and room for what they find out of one robot."""
 
     first: int  # robot of the group
@@ -141,17 +141,17 @@ class Fan(NamedTuple):
     found: IntArray  # (things,)
 
 
-class FanSight:
+class RayArraySight:
     """What the rays of a group's robots meet: everything if they are active, else only robots alive and in sight."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Rim, active: bool) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: RayArraySpec, active: bool) -> None:
         reach_m = group.body.radius_m + spec.range_m
         self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
         self._active, self._alive, curve = active, scene.alive, spec.response
-        self._crowd = crowd_of(scene, reach_m + float(scene.radius_m.max()))
-        self._standing = Standing(scene, reach_m)
+        self._crowd = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
+        self._standing = ObstacleIndices(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
-        self._fan = Fan(
+        self._fan = RayArray(
             group.start,
             np.cos(spec.angle_rad),
             np.sin(spec.angle_rad),
@@ -183,7 +183,7 @@ class FanSight:
         return near
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _look(value, crowd, alive, things, fan, active, answers):
     """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
     sort(crowd.cells, crowd.state, crowd.running)
@@ -200,7 +200,7 @@ def _look(value, crowd, alive, things, fan, active, answers):
             robots = near_robots(crowd, arena, own, x, y, reach, low, high)
             if not active and robots == 0:
                 continue
-            count = near_things(fan.found, things, arena, x, y, reach, low)
+            count = obstacles_near(fan.found, things, arena, x, y, reach, low)
             at_wall = abs(x) + reach >= fan.half_x or abs(y) + reach >= fan.half_y
             if robots == 0 and count == 0 and not at_wall:
                 continue
@@ -222,7 +222,7 @@ def _look(value, crowd, alive, things, fan, active, answers):
                 near[ray] = _answer(d, fan) if answers else d
 
 
-@borrowing()
+@kernel()
 def _turn(fan, heading):
     """Set the directions of the rays of a robot."""
     c, s = np.cos(heading), np.sin(heading)
@@ -231,7 +231,7 @@ def _turn(fan, heading):
         fan.dy[ray] = s * fan.cos[ray] + c * fan.sin[ray]
 
 
-@borrowing()
+@kernel()
 def _meet_walls(near, x, y, rim, fan):
     for ray in range(len(near)):
         for at, step, end in ((x, fan.dx[ray], fan.half_x), (y, fan.dy[ray], fan.half_y)):
@@ -240,15 +240,15 @@ def _meet_walls(near, x, y, rim, fan):
                 near[ray] = min(near[ray], max((wall - at - rim * step) / step, 0.0))
 
 
-@borrowing()
+@kernel()
 def _meet_things(near, x, y, rim, fan, things, count):
     for at in range(count):
         for ray in range(len(near)):
             dx, dy = fan.dx[ray], fan.dy[ray]
-            near[ray] = min(near[ray], ray_to_thing(x + rim * dx, y + rim * dy, dx, dy, things, fan.found[at]))
+            near[ray] = min(near[ray], ray_to_obstacle(x + rim * dx, y + rim * dy, dx, dy, things, fan.found[at]))
 
 
-@borrowing()
+@kernel()
 def _meet_robots(near, x, y, rim, fan, crowd, count, alive, living):
     """Those of the robots found that are alive, or those that are dead."""
     for at in range(count):
@@ -262,7 +262,7 @@ def _meet_robots(near, x, y, rim, fan, crowd, count, alive, living):
                 near[ray] = min(near[ray], ray_to_circle(x + rim * dx, y + rim * dy, dx, dy, cx, cy, radius))
 
 
-@borrowing()
+@kernel()
 def _answer(distance, fan):
     """What a sensor answers to a distance (`ResponseCurve.value`)."""
     if distance > fan.reach_m:
@@ -284,8 +284,8 @@ def _answer(distance, fan):
 class ProximitySensor:
     """Sense `proximity`: value (n, rays), the sensors' answers, 0 to 1. Noise is uniform, and new in every reading."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Proximity) -> None:
-        self._sight = FanSight(scene, group, spec, active=True)
+    def __init__(self, scene: Scene, group: Group, spec: ProximitySpec) -> None:
+        self._sight = RayArraySight(scene, group, spec, active=True)
         noise = Noise("uniform", spec.noise)
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 
@@ -304,8 +304,8 @@ class ProximitySensor:
 class InfraredSensor:
     """Sense `infrared`: value (n, rays), the answers to other robots' light, 0 to 1. Noise is uniform."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Infrared) -> None:
-        self._sight = FanSight(scene, group, spec, active=False)
+    def __init__(self, scene: Scene, group: Group, spec: InfraredSpec) -> None:
+        self._sight = RayArraySight(scene, group, spec, active=False)
         noise = Noise("uniform", spec.noise)
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 

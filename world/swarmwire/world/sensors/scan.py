@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import Scan
-from swarmwire.comms.geometry.obstacle_index import near_things
+from swarmwire.comms.bodies.ranging_specs import ScanSpec
+from swarmwire.comms.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import sort
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.rays import Standing, crowd_of, near_robots, nearest
+from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 TURN_RAD = 2.0 * np.pi
@@ -40,14 +40,14 @@ class Laser(NamedTuple):
 class ScanSensor:
     """Sense `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Scan) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: ScanSpec) -> None:
         noise = Noise("normal", spec.noise_m, spec.noise_relative)
         self.fields = (
             Field("range_m", spec.rays, noise, spec.step, low=spec.range_min_m, high=spec.range_m, blank=np.inf),
         )
         self._shape = len(scene.keys), group.stop - group.start, spec.rays
-        self._crowd = crowd_of(scene, spec.range_m + float(scene.radius_m.max()))
-        self._standing = Standing(scene, spec.range_m)
+        self._crowd = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
+        self._standing = ObstacleIndices(scene, spec.range_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._laser = Laser(
             group.start,
@@ -70,7 +70,7 @@ class ScanSensor:
         return (near,)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _scan(near, crowd, things, laser):
     """Set near (arenas, n, rays)."""
     sort(crowd.cells, crowd.state, crowd.running)
@@ -90,7 +90,7 @@ def _scan(near, crowd, things, laser):
                 laser.dy[ray] = s * laser.cos[ray] + c * laser.sin[ray]
                 rays[ray] = np.inf
             _meet_walls(rays, x, y, laser)
-            for at in range(near_things(laser.found, things, arena, x, y, laser.range_m, low)):
+            for at in range(obstacles_near(laser.found, things, arena, x, y, laser.range_m, low)):
                 k = laser.found[at]
                 if things.side_start[k] == things.side_start[k + 1]:
                     _meet_disc(rays, x, y, heading, laser, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
@@ -104,7 +104,7 @@ def _scan(near, crowd, things, laser):
                     rays[ray] = np.inf
 
 
-@borrowing()
+@kernel()
 def _meet_walls(rays, x, y, laser):
     if abs(x) + laser.range_m >= laser.half_x:
         for ray in range(len(rays)):
@@ -118,7 +118,7 @@ def _meet_walls(rays, x, y, laser):
                 rays[ray] = min(rays[ray], max((np.copysign(laser.half_y, step) - y) / step, 0.0))
 
 
-@borrowing()
+@kernel()
 def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
     ox, oy = cx - x, cy - y
     apart = np.sqrt(ox * ox + oy * oy)
@@ -132,7 +132,7 @@ def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
             rays[ray] = min(rays[ray], ray_to_circle(x, y, laser.dx[ray], laser.dy[ray], cx, cy, radius))
 
 
-@borrowing()
+@kernel()
 def _meet_polygon(rays, x, y, heading, laser, things, k):
     right, width = _seen(x, y, things, k)
     for past_last in range(2):
@@ -141,7 +141,7 @@ def _meet_polygon(rays, x, y, heading, laser, things, k):
             rays[ray] = min(rays[ray], ray_to_polygon(x, y, laser.dx[ray], laser.dy[ray], things, k))
 
 
-@borrowing()
+@kernel()
 def _span(right, width, past_last, laser):
     """The rays from the angle `right` in the body's frame on that a thing of this width may meet, as a range.
 
@@ -154,7 +154,7 @@ def _span(right, width, past_last, laser):
     return max(int(np.ceil(first - SLACK)), 0), min(int(np.floor(last + SLACK)) + 1, len(laser.dx))
 
 
-@borrowing()
+@kernel()
 def _seen(x, y, things, k):
     """The direction of the rightmost corner of a polygon, and how wide it looks; all around from inside."""
     begin, end = things.side_start[k], things.side_start[k + 1]

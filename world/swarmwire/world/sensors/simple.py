@@ -8,12 +8,19 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensor_specs import Battery, Bumper, Compass, GroundColour, Odometry, Positioning
+from swarmwire.comms.bodies.sensor_specs import (
+    BatterySpec,
+    BumperSpec,
+    CompassSpec,
+    GroundSpec,
+    OdometrySpec,
+    PositioningSpec,
+)
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.ground import shade_at
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
@@ -21,7 +28,7 @@ from swarmwire.world.sensors.sensor import Field, Noise, Scene
 class BatterySensor:
     """Sense `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,)."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Battery) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: BatterySpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
         self.fields = (
             Field("charge", noise=Noise("normal", spec.noise), step=spec.step, low=0.0, high=1.0),
@@ -41,7 +48,7 @@ class BatterySensor:
 class BumperSensor:
     """Sense `bumper`: pressed (n,), 1 if the body touched a robot, an obstacle or a wall in the tick before, else 0."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Bumper) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: BumperSpec) -> None:
         self._scene, self._group = scene, group
         self.fields = (Field("pressed", blank=0.0),)
 
@@ -56,7 +63,7 @@ class BumperSensor:
 class CompassSensor:
     """Sense `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Compass) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: CompassSpec) -> None:
         self._scene, self._group = scene, group
         noise = Noise("normal", spec.noise_rad)
         self.fields = (Field("heading_rad", noise=noise, step=spec.step, angle=True, span=(-pi, pi)),)
@@ -72,7 +79,7 @@ class CompassSensor:
 class PositioningSensor:
     """Sense `positioning`: x_m, y_m (n,), in m, arena frame. An outlier is anywhere in the arena."""
 
-    def __init__(self, scene: Scene, group: Group, spec: Positioning) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: PositioningSpec) -> None:
         self._scene, self._group = scene, group
         noise = Noise("normal", spec.noise_m)
         self.fields = tuple(
@@ -99,7 +106,7 @@ class OdometrySensor:
     reading.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: Odometry) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: OdometrySpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
         self.fields = (Field("left_m", step=spec.step), Field("right_m", step=spec.step))
         self._rolled_m = scene.travel_m[:, group.start : group.stop].copy()
@@ -144,7 +151,7 @@ def _add_travel(told, rolled, travel, start, scale, keys, running, tick, slip):
 class GroundSensor:
     """Sense `ground`: shade (n, points), 0 black to 1 white, of the floor under each point. Noise is uniform."""
 
-    def __init__(self, scene: Scene, group: Group, spec: GroundColour) -> None:
+    def __init__(self, scene: Scene, group: Group, spec: GroundSpec) -> None:
         self._scene, self._group = scene, group
         self._points = np.array(spec.points_m, np.float64)
         noise = Noise("uniform", spec.noise)
@@ -158,7 +165,7 @@ class GroundSensor:
         return (shade,)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _look_down(shade, state, running, start, points, ground):
     """Set shade (arenas, n, points)."""
     for arena in range(shade.shape[0]):

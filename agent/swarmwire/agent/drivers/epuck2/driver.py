@@ -9,14 +9,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.drivers.driver import STOP, Command, Driver, DriverLost
-from swarmwire.agent.drivers.epuck2.link import Link, host_and_port
+from swarmwire.agent.drivers.epuck2.link import RobotLink, host_and_port
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, RobotCommand, check_fits, wheel_steps
-from swarmwire.comms.robots.epuck2.packets import SENSORS, Request, Settings
+from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import (
     CHIPS,
     GROUND_BLACK,
@@ -100,7 +100,7 @@ class Epuck2Driver(Driver):
         self._anew = True  # the next reading is the first one of a connection
         self._calibrate = self._options.calibrate
         self._lock = Lock()  # of the next two: held to send 21 bytes, which never waits
-        self._link: Link | None = None
+        self._link: RobotLink | None = None
         self._told = RobotCommand()
 
     @property
@@ -117,13 +117,13 @@ class Epuck2Driver(Driver):
         """As `Driver.open`; LEDs are as they were told last, dark at first."""
         self._hang_up()
         options = self._options
-        link = Link(self._host, self._port, options.connect_s, self._counts)
+        link = RobotLink(self._host, self._port, options.connect_s, self._counts)
         with self._lock:
             self._link, self._told = link, replace(self._told, left=0, right=0)
         self._counts["connections"] += 1
         self._anew = True
         if self._calibrate:
-            self._exchange(link, options.connect_s + CALIBRATION_S, Settings.CALIBRATE)
+            self._exchange(link, options.connect_s + CALIBRATION_S, RobotSettingsBits.CALIBRATE)
             self._calibrate = False
         if not self._exchange(link, options.connect_s):
             raise self._lose(DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer"))
@@ -175,7 +175,7 @@ class Epuck2Driver(Driver):
             self._counts["not_stopped"] += 1
         self._hang_up()
 
-    def _tell(self, link: Link, left: int, right: int, command: Command) -> None:
+    def _tell(self, link: RobotLink, left: int, right: int, command: Command) -> None:
         """Send speeds and LEDs, which the robot keeps to; any thread may."""
         with self._lock:
             lights = self._told.lights
@@ -184,20 +184,22 @@ class Epuck2Driver(Driver):
             self._told = RobotCommand(left, right, lights)
             link.send(self._told.encoded())
 
-    def _exchange(self, link: Link, timeout_s: float, settings: Settings = Settings.NONE) -> bool:
+    def _exchange(
+        self, link: RobotLink, timeout_s: float, settings: RobotSettingsBits = RobotSettingsBits.NONE
+    ) -> bool:
         """Ask for a reading and wait for it; false if it did not come in time, though earlier ones may have."""
         try:
             link.drain()
             self._take(link)
             with self._lock:
-                link.send(replace(self._told, request=Request.SENSORS, settings=settings).encoded())
+                link.send(replace(self._told, request=PacketRequest.SENSORS, settings=settings).encoded())
             in_time = self._await(link, timeout_s, reading=True)
         except DriverLost as lost:
             raise self._lose(lost) from lost
         self._take(link)
         return in_time
 
-    def _await(self, link: Link, timeout_s: float, *, reading: bool) -> bool:
+    def _await(self, link: RobotLink, timeout_s: float, *, reading: bool) -> bool:
         """Whether all that is owed comes in that time, a reading among it if one is; else it is not owed any more."""
         owed, until_ns = link.sent, self.clock.now_ns() + to_ns(timeout_s)
         while link.answered < owed or (reading and link.newest is None):
@@ -207,7 +209,7 @@ class Epuck2Driver(Driver):
                 return False
         return True
 
-    def _take(self, link: Link) -> None:
+    def _take(self, link: RobotLink) -> None:
         """The newest reading that came, if one did."""
         payload, link.newest = link.newest, None
         if payload is None:
@@ -221,7 +223,7 @@ class Epuck2Driver(Driver):
             self._odometer.read(*steps)
         self._told_sensors, self._received_ns, self._anew = told, now_ns, False
 
-    def _connected(self) -> Link:
+    def _connected(self) -> RobotLink:
         if self._link is None:
             raise DriverLost(f"the e-puck2 at {self.address} is not connected")
         return self._link

@@ -39,7 +39,7 @@ _AT_ONCE = 65536  # bytes read in one call
 _MAX_DRAINED = 100  # calls: whoever sends more than that at once is no robot
 
 
-class Link:
+class RobotLink:
     """One connection. `send` is called under the driver's lock, everything else by the driver's thread.
 
     Attributes:

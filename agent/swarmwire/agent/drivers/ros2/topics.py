@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
@@ -157,7 +157,7 @@ class BatteryReader(Reader):
     kind = BATTERY_STATE
     is_steady = False
 
-    def __init__(self, spec: Battery) -> None:
+    def __init__(self, spec: BatterySpec) -> None:
         self._spec = spec
         self.fields = _numbers("battery", charge=np.nan, voltage_v=np.nan)
 
@@ -204,7 +204,7 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
     if "imu" in body.sensors or body.compass:
         readers[options.imu_topic] = ImuReader(options.north_deg)
     battery = body.sensors.get("battery")
-    if isinstance(battery, Battery):
+    if isinstance(battery, BatterySpec):
         readers[options.battery_topic] = BatteryReader(battery)
     if body.light:
         value = np.zeros((1, len(body.light.angle_rad)))

@@ -12,7 +12,7 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.truth import Finished
+from swarmwire.comms.truth import ReceptionRecords
 
 SPOT_M = (2.0, 2.0)
 LATE_S = 0.5  # after the last packet that counts, its reception does too
@@ -64,5 +64,5 @@ def contention(
     return Contention(counted, received / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
 
 
-def _packets(finished: Finished, which: BoolArray) -> int:
+def _packets(finished: ReceptionRecords, which: BoolArray) -> int:
     return int(np.count_nonzero(which & (finished.receiver < 0)))

@@ -18,11 +18,11 @@ from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 from swarmwire.comms.radio.config.phy import Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.losses import passing_share
-from swarmwire.comms.radio.phy.params import rules_of
+from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
 from swarmwire.comms.radio.propagation.decibels import to_db
-from swarmwire.comms.radio.propagation.fading import fading_gain, fading_law
+from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.radio.propagation.path_loss import loss_between_db, rssi_dbm
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 
@@ -96,13 +96,13 @@ class Coverage:
     def _delivery_by_power(self, key: np.uint64, bits: int) -> tuple[FloatArray, FloatArray]:
         """Mean power in dBm, rising, and the delivery at each."""
         assert self.sensitivity_dbm is not None
-        rules = rules_of(self._radio, 1)
+        rules = phy_params_of(self._radio, 1)
         middle_dbm = self._radio.noise_or_default.power_dbm
         least, most = min(middle_dbm, self.sensitivity_dbm) - DEEP_DB, max(middle_dbm, self.sensitivity_dbm) + DEEP_DB
         mean_dbm = np.arange(least, most, STEP_DB)
         if self._radio.fading is None:
             return mean_dbm, lone_deliveries(rules, mean_dbm, bits)
-        gain_db = _gains_db(fading_law(self._radio.fading, self._radio.frequency_hz), key)
+        gain_db = _gains_db(fading_model(self._radio.fading, self._radio.frequency_hz), key)
         return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
 
 

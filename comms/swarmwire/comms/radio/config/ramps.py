@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from typing import Any, cast
 
-from swarmwire.comms.config import fault_of, limits_of, one_of
+from swarmwire.comms.config import bounds_of, did_you_mean, fault_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.radio import Radio
 
@@ -14,7 +14,7 @@ TABLE = "radio"
 
 
 @dataclass(frozen=True, slots=True)
-class Slope:
+class ParameterRamp:
     """From `start_ns` on a number of the radio moves to `to`, evenly over `lasts_ns`, and stays there."""
 
     key: str  # within the scenario: "radio.loss"
@@ -27,7 +27,7 @@ class Slope:
         return 1.0 if at_ns >= self.start_ns + self.lasts_ns else (at_ns - self.start_ns) / self.lasts_ns
 
 
-def radio_at(radio: Radio, slopes: Iterable[Slope], at_ns: int) -> Radio:
+def radio_at(radio: Radio, slopes: Iterable[ParameterRamp], at_ns: int) -> Radio:
     """The radio at a time under slopes that have begun; each sets out from what those before it make of its number."""
     for slope in slopes:
         before, share = number_of(radio, slope.key), slope.share(at_ns)
@@ -66,7 +66,7 @@ def check_number(radio: Radio, key: str, value: float) -> None:
         raise BadInput("", "what", f"expected a number; {key} is {_kind(got)}")
     if isinstance(got, int) and value != round(value):
         raise BadInput("", "to", f"expected a whole number for {key}, got {value!r}")
-    if fault := fault_of(value, limits_of(of)):
+    if fault := fault_of(value, bounds_of(of)):
         raise BadInput("", "to", f"{fault} for {key}")
 
 
@@ -84,7 +84,7 @@ def _place(radio: Radio, key: str) -> tuple[object, "Field[Any]"]:
             raise BadInput("", "what", f"expected a key of [radio]; {path} holds no keys")
         found = {of.name: of for of in fields(holder)}
         if name not in found:
-            raise BadInput("", "what", f"unknown key {key}; expected {one_of(found, key)} in {path}")
+            raise BadInput("", "what", f"unknown key {key}; expected {did_you_mean(found, key)} in {path}")
         if depth == len(names) - 1:
             return holder, found[name]
         holder = getattr(holder, name)

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.phy import reception
 from swarmwire.comms.radio.phy.event_queue import LISTENED, SEND, TIMER, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF, LISTENING, SILENT, TURNING
@@ -14,7 +14,7 @@ from swarmwire.comms.radio.phy.state import BACKING_OFF, LISTENING, SILENT, TURN
 BACKOFF = purpose("csma backoff")
 
 
-@borrowing()
+@kernel()
 def want(rules, state, queue, r, now_ns):
     """The robot wants to send the packet that it serves."""
     me = state.robot[r]
@@ -22,7 +22,7 @@ def want(rules, state, queue, r, now_ns):
     _back_off(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def listen(rules, state, queue, r, now_ns):
     """The backoff is over."""
     state.robot[r].stage = LISTENING
@@ -30,7 +30,7 @@ def listen(rules, state, queue, r, now_ns):
     schedule(queue, LISTENED, r, now_ns + rules.listen_ns)
 
 
-@borrowing()
+@kernel()
 def gives_up(rules, state, queue, r, now_ns):
     """The radio has listened: it sends, or backs off anew, or gives up (True), if the medium was busy too often.
 
@@ -50,7 +50,7 @@ def gives_up(rules, state, queue, r, now_ns):
     return False
 
 
-@borrowing()
+@kernel()
 def _back_off(rules, state, queue, r, now_ns):
     """Wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and busy times)."""
     me = state.robot[r]

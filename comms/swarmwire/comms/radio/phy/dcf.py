@@ -11,17 +11,17 @@ import numpy as np
 
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy.event_queue import SEND, cancel, due_ns, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 DCF = METHODS.index("dcf")
 SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")
 
 
-@borrowing()
+@kernel()
 def want(rules, state, queue, r, now_ns):
     """The robot wants to send the packet that it serves."""
     me = state.robot[r]
@@ -33,17 +33,17 @@ def want(rules, state, queue, r, now_ns):
     schedule(queue, SEND, r, max(now_ns, counted_ns) + rules.difs_ns)
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def sense(rules, state, queue, r, now_ns):
     """What is on air at the robot may have changed; nothing to other methods."""
     if rules.method == DCF:
         it = state.reception[r]
-        is_busy = it.is_deaf or it.locked_to != NOBODY or it.power_mw + it.jam_mw >= rules.busy_mw
+        is_busy = it.is_deaf or it.locked_to != NO_ROBOT or it.power_mw + it.jam_mw >= rules.busy_mw
         if is_busy != (it.is_busy != 0):
             _change(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def _change(rules, state, queue, r, now_ns):
     """The medium at the robot has become busy, or free."""
     me, reception = state.robot[r], state.reception[r]
@@ -60,21 +60,21 @@ def _change(rules, state, queue, r, now_ns):
             schedule(queue, SEND, r, me.free_from_ns + rules.difs_ns + me.slots * rules.slot_ns)
 
 
-@borrowing()
+@kernel()
 def wait_after(rules, state, r):
     """The robot's frame is off air: new slots, keyed by (robot, sequence, attempt)."""
     me = state.robot[r]
     me.slots = _slots(rules, state, r, SLOTS)
 
 
-@borrowing()
+@kernel()
 def _wait_if_none_left(rules, state, r):
     me = state.robot[r]
     if me.slots == 0:
         me.slots = _slots(rules, state, r, SLOTS_BEFORE)
 
 
-@borrowing()
+@kernel()
 def _slots(rules, state, r, what_for):
     me = state.robot[r]
     packet = state.packet[me.packet]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 
 # In the order in which events of one moment happen: a frame that ends makes room for one that starts.
 OFF_AIR, LISTENED, TIMER, SEND, ANSWER, ENTER = range(6)
@@ -35,7 +35,7 @@ def event_queue(rows: int) -> EventQueue:
     )
 
 
-@borrowing()
+@kernel()
 def schedule(queue, kind, row, at_ns):
     """The robot's event of this kind is due at `at_ns`, whenever it was due before."""
     event = kind * (len(queue.at_ns) // KINDS) + row
@@ -48,7 +48,7 @@ def schedule(queue, kind, row, at_ns):
     _sink(queue, _rise(queue, place))
 
 
-@borrowing()
+@kernel()
 def cancel(queue, kind, row):
     """The robot's event of this kind is not due any more, if it was."""
     event = kind * (len(queue.at_ns) // KINDS) + row
@@ -63,19 +63,19 @@ def cancel(queue, kind, row):
         _sink(queue, _rise(queue, place))
 
 
-@borrowing()
+@kernel()
 def due_ns(queue, kind, row):
     """When the robot's event of this kind is due, in ns; -1 if it is not."""
     event = kind * (len(queue.at_ns) // KINDS) + row
     return queue.at_ns[event] if queue.place[event] != ABSENT else -1
 
 
-@borrowing()
+@kernel()
 def _earlier(queue, a, b):
     return queue.at_ns[a] < queue.at_ns[b] or (queue.at_ns[a] == queue.at_ns[b] and a < b)
 
 
-@borrowing()
+@kernel()
 def _rise(queue, place):
     event = queue.heap[place]
     while place > 0:
@@ -89,7 +89,7 @@ def _rise(queue, place):
     return place
 
 
-@borrowing()
+@kernel()
 def _sink(queue, place):
     event, size = queue.heap[place], queue.size[0]
     while True:

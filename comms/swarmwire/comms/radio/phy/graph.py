@@ -9,11 +9,11 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.phy.jamming import JamHeld
-from swarmwire.comms.radio.phy.link_table import LinksHeld
+from swarmwire.comms.radio.phy.jamming import JammerTable
+from swarmwire.comms.radio.phy.link_table import LinkTable
 from swarmwire.comms.radio.phy.losses import MeasuredLinks, passing_share
 from swarmwire.comms.radio.phy.pairs import Pairs
-from swarmwire.comms.radio.phy.params import Rules
+from swarmwire.comms.radio.phy.params import PhyParams
 from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.unit_disk.model import ROUNDING
@@ -25,12 +25,17 @@ class RadioGraph:
     """Joins pairs of links held; jammers and measured ratios count, carrier sense does not."""
 
     def __init__(
-        self, context: ChannelContext, rules: Rules, links: LinksHeld, jam: JamHeld, measured: MeasuredLinks | None
+        self,
+        context: ChannelContext,
+        rules: PhyParams,
+        links: LinkTable,
+        jam: JammerTable,
+        measured: MeasuredLinks | None,
     ):
         self._disruption, self._links, self._jam, self._measured = context.disruption, links, jam, measured
         self.tune(context.radio, rules)
 
-    def tune(self, radio: Radio, rules: Rules) -> None:
+    def tune(self, radio: Radio, rules: PhyParams) -> None:
         """The radio has these numbers from now on."""
         self._rules, self._bits = rules, 8 * (radio.max_payload_bytes + radio.overhead_bytes)
         others = passing_share(radio)

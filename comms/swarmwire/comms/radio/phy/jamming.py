@@ -9,10 +9,10 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
-from swarmwire.comms.radio.phy.propagation import Surroundings
+from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.reception import count_chunk
 from swarmwire.comms.radio.phy.state import Jam
 from swarmwire.comms.radio.propagation.decibels import from_db
@@ -20,7 +20,7 @@ from swarmwire.comms.radio.propagation.path_loss import loss_between_db
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
-class JamHeld:
+class JammerTable:
     """What jammers do to robots, and when."""
 
     def __init__(self, context: ChannelContext) -> None:
@@ -32,7 +32,7 @@ class JamHeld:
         """Whether there are jammers."""
         return len(self._jammers.arena) > 0
 
-    def move(self, pose: FloatArray, around: Surroundings) -> None:
+    def move(self, pose: FloatArray, around: PropagationParams) -> None:
         """Robots stand at `pose` (rows, 3) from now on, and jammers are those of the disruption that holds."""
         self._jammers = self._context.disruption.jammers
         if not self.anything:
@@ -70,7 +70,7 @@ class JamHeld:
 
 
 def powers_of(
-    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, around: Surroundings
+    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, around: PropagationParams
 ) -> FloatArray:
     """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
@@ -100,14 +100,14 @@ def _powers(jammers, place, x, y, robots, obstacles, around):
     return power_mw
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def refresh(rules, state, queue, now_ns):
     """Jammers, what they do, or the radio's rules have changed: every robot's noise is what it should be."""
     for arena in range(len(state.keys)):
         _refresh_arena(rules, state, queue, arena, now_ns)
 
 
-@borrowing()
+@kernel()
 def toggle(rules, state, queue):
     """The next jammer that goes on or off does."""
     jam = state.jam
@@ -118,7 +118,7 @@ def toggle(rules, state, queue):
     _refresh_arena(rules, state, queue, jam.arena[which], jam.at_ns[at])
 
 
-@borrowing()
+@kernel()
 def _refresh_arena(rules, state, queue, arena, now_ns):
     jam = state.jam
     for i in range(rules.robots):

@@ -7,22 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.phy.losses import MeasuredLinks
 from swarmwire.comms.radio.phy.pairs import Pairs, pairs_of
-from swarmwire.comms.radio.phy.propagation import Surroundings
+from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.stage import ChannelContext
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED = int(Fate.RECEIVED)
 LEFT_OUT, WEAK, STRONG = range(3)
 
 
-class Levels(NamedTuple):
+class Thresholds(NamedTuple):
     """What power makes of a link."""
 
     listed_dbm: float  # listed from this mean on
@@ -31,7 +31,7 @@ class Levels(NamedTuple):
 
 
 def links_by_sender(
-    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Levels, kept: Table
+    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, levels: Thresholds, kept: Table
 ) -> tuple[Table, LinkPlaces]:
     """The links of pairs, both ways, after those kept, and where they are.
 
@@ -54,7 +54,7 @@ def links_by_sender(
     return link[:links], LinkPlaces(first, weak, stop)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receive_dbi, fate, levels):
     """What each link is, 4 more if it is listed, its power, and how many of each kind each robot has."""
     a, b, there_db, back_db, gain, _ = pairs
@@ -75,7 +75,7 @@ def _find_kinds(kind, power_mw, counts, own, pairs, both_alike, send_dbm, receiv
         counts[r, np.uint64(back & 3)] += 1
 
 
-@borrowing()
+@kernel()
 def _kind(mean_dbm, power_mw, is_open, levels):
     is_listed = mean_dbm >= levels.listed_dbm
     is_strong = is_listed | (is_open & (power_mw >= levels.received_mw))
@@ -83,7 +83,7 @@ def _kind(mean_dbm, power_mw, is_open, levels):
     return STRONG * is_strong + WEAK * is_weak + 4 * is_listed
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
     """Put in the links of one way; `next_place` (rows, 3), where each robot's next of a kind goes, moves on."""
     for i in range(len(kind)):
@@ -103,7 +103,7 @@ def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
 # --- The links under the poses held, by sender, after those of frames that went on air under earlier poses.
 
 
-class LinksHeld:
+class LinkTable:
     """A table of links that frames on air keep theirs in while robots move.
 
     Attributes:
@@ -114,7 +114,7 @@ class LinksHeld:
     """
 
     def __init__(
-        self, context: ChannelContext, around: Surroundings, levels: Levels, measured: MeasuredLinks | None
+        self, context: ChannelContext, around: PropagationParams, levels: Thresholds, measured: MeasuredLinks | None
     ) -> None:
         """`measured` are the links of the radio's trace, kept up to date by others."""
         self._context, self._measured = context, measured
@@ -136,7 +136,7 @@ class LinksHeld:
         there, back = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
         return there - pairs.loss_db, back - pairs.back_db
 
-    def tune(self, around: Surroundings, levels: Levels) -> None:
+    def tune(self, around: PropagationParams, levels: Thresholds) -> None:
         """The radio or its antennas are others from the next `move` on."""
         self.around, self._levels = around, levels
 
@@ -169,7 +169,7 @@ class LinksHeld:
         moved[on_air] = np.cumsum(counts) - counts - first
         for place in ("first_link", "weak_link", "stop_link"):
             robot[place] += moved
-        locked = np.flatnonzero(reception["locked_to"] != NOBODY)
+        locked = np.flatnonzero(reception["locked_to"] != NO_ROBOT)
         reception["link"][locked] += moved[reception["locked_to"][locked]].astype(np.int32)
         return self.link[index]
 

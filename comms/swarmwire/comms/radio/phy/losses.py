@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.reception.bursts import Bursting, BurstStates, takes
@@ -53,13 +53,13 @@ def passing_share(radio: Radio) -> float:
     return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
 
 
-@borrowing()
+@kernel()
 def takes_none(losses):
     """Whether there is nothing that could take a frame."""
     return losses.loss == 0.0 and len(losses.traced.link) == 0 and not losses.has_bursts
 
 
-@borrowing()
+@kernel()
 def taken_by(losses, key, robots, link, s, r, sequence, attempt, is_answer, at_ns):
     """The fate that a loss gives to a frame from s to r, indices in the arena, or RECEIVED.
 
@@ -78,7 +78,7 @@ def taken_by(losses, key, robots, link, s, r, sequence, attempt, is_answer, at_n
     return RECEIVED
 
 
-@borrowing()
+@kernel()
 def _ratio(traced, link):
     """The delivery ratio of a link (indices in the arena: sender x robots + receiver); 1 where none was measured."""
     low, high = 0, len(traced.link)

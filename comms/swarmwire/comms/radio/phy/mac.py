@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import ENTER, LISTENED, OFF_AIR, SEND, TIMER, cancel, schedule
@@ -19,13 +19,13 @@ from swarmwire.comms.radio.phy.state import (
     SILENT,
     TURNING,
 )
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
 IS_ACKNOWLEDGED, FOUND_BUSY = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)
 
 
-@borrowing()
+@kernel()
 def timer(rules, state, queue, told, r, now_ns):
     """What the robot waited for has passed."""
     me = state.robot[r]
@@ -37,7 +37,7 @@ def timer(rules, state, queue, told, r, now_ns):
         tx_queue.serve(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def listened(rules, state, queue, told, r, now_ns):
     """CSMA: the radio has listened whether the medium is free."""
     if not csma.gives_up(rules, state, queue, r, now_ns):
@@ -51,7 +51,7 @@ def listened(rules, state, queue, told, r, now_ns):
     tx_queue.serve(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def send(rules, state, queue, told, r, now_ns):
     """The packet being served goes on air."""
     me = state.robot[r]
@@ -75,7 +75,7 @@ def send(rules, state, queue, told, r, now_ns):
     reception.put_on_air(rules, state, queue, r, now_ns, packet.airtime_ns, packet.bits)
 
 
-@borrowing()
+@kernel()
 def sent(rules, losses, state, queue, told, r, now_ns):
     """What the robot had on air ends."""
     me = state.robot[r]
@@ -84,7 +84,7 @@ def sent(rules, losses, state, queue, told, r, now_ns):
     if kind == ACKNOWLEDGEMENT:
         _acknowledged(rules, state, queue, told, r, now_ns)
         return
-    if me.packet == NOBODY:
+    if me.packet == NO_ROBOT:
         return  # it died meanwhile, and what it sent has been told
     packet = state.packet[me.packet]
     if packet.fate != RECEIVED:
@@ -92,17 +92,17 @@ def sent(rules, losses, state, queue, told, r, now_ns):
         tx_queue.pause(rules, state, queue, r, packet.pause_ns, now_ns)
         return
     results.report(rules, state, queue, told, r, now_ns)
-    if packet.to != NOBODY and rules.acknowledged and packet.result != NOT_LEARNED:
+    if packet.to != NO_ROBOT and rules.acknowledged and packet.result != NOT_LEARNED:
         me.stage = AWAITING
         schedule(queue, TIMER, r, now_ns + rules.patience_ns)
         return
-    if packet.to != NOBODY and not packet.is_settled:
+    if packet.to != NO_ROBOT and not packet.is_settled:
         results.settle(state, told, r, now_ns)
     packet.is_done = 1
     tx_queue.pause(rules, state, queue, r, packet.pause_ns, now_ns)
 
 
-@borrowing()
+@kernel()
 def fail(rules, state, queue, told, r, now_ns):
     """No acknowledgement came: once more, or the last attempt's fate is the packet's."""
     me = state.robot[r]
@@ -119,7 +119,7 @@ def fail(rules, state, queue, told, r, now_ns):
     tx_queue.keep_newest(rules, state, queue, told, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def answer(rules, state, queue, r, now_ns):
     """The robot acknowledges what it received, unless it is about to send."""
     me = state.robot[r]
@@ -130,14 +130,14 @@ def answer(rules, state, queue, r, now_ns):
     reception.put_on_air(rules, state, queue, r, now_ns, rules.acknowledgement_ns, rules.acknowledgement_bits)
 
 
-@borrowing()
+@kernel()
 def _take_links(state, r):
     """What the robot puts on air goes over its links under the poses held."""
     me, places = state.robot[r], state.places
     me.first_link, me.weak_link, me.stop_link, me.hold = places.first[r], places.weak[r], places.stop[r], state.hold
 
 
-@borrowing()
+@kernel()
 def _acknowledged(rules, state, queue, told, r, now_ns):
     """An acknowledgement ends: its sender's packet is over, if it was received there."""
     me = state.robot[r]
@@ -151,7 +151,7 @@ def _acknowledged(rules, state, queue, told, r, now_ns):
             state.packet[it.packet].result = IS_ACKNOWLEDGED
             results.settle(state, told, receiver, now_ns)
             tx_queue.pause(rules, state, queue, receiver, state.packet[it.packet].pause_ns, now_ns)
-    me.answers_to = NOBODY
+    me.answers_to = NO_ROBOT
 
 
 # --- The run of events: what is due before a time happens, in order of (time, kind, robot row).
@@ -161,14 +161,14 @@ SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_
 FEW = 64  # rows that any one event tells beyond a frame's links
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def line_up(state, queue, start):
     """Before events run: the packets of robot r are order[start[r]:start[r + 1]], those done taken out."""
     for r in range(len(state.robot)):
         me = state.robot[r]
         at, stop = start[r], start[r + 1]
         me.stop = stop
-        me.packet = NOBODY
+        me.packet = NO_ROBOT
         if me.stage >= BACKING_OFF:
             me.packet = state.order[at]
             at += 1
@@ -181,7 +181,7 @@ def line_up(state, queue, start):
             schedule(queue, ENTER, r, state.packet[state.order[at]].sent_at_ns)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def run_until(rules, losses, state, queue, told, most_links, until_ns):
     """Let happen what is due before `until_ns`; False if `told` has no more room: then take it out and call again.
 
@@ -217,7 +217,7 @@ def run_until(rules, losses, state, queue, told, most_links, until_ns):
     return True
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def stop_the_dead(state, queue, told, alive, now_ns):
     """The queues of robots that are not alive (rows,) end; after `line_up`."""
     for r in range(len(state.robot)):
@@ -225,7 +225,7 @@ def stop_the_dead(state, queue, told, alive, now_ns):
             tx_queue.stop(state, queue, told, r, now_ns, SENDER_DEAD)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def cut_off(rules, state, queue, alive, radio_on, now_ns):
     """Robots that are dead (rows,), or whose radio is off, do not hear the frames on air to their end."""
     for s in range(len(state.robot)):

@@ -5,18 +5,27 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, UNTOLD, Fate, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_TX_STATUSES,
+    NOT_MEASURED,
+    NOWHERE,
+    Fate,
+    SentPackets,
+    TxResult,
+    TxStatuses,
+)
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.phy.state import NOT_LEARNED, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 
 def learned(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     """Of packets that are done, what senders learn who ask; those that died before are not there to learn it."""
     died = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NOT_LEARNED)
-    asked = (packet["is_done"] > 0) & (tx_status_id != UNTOLD) & ~died
+    asked = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~died
     index = np.flatnonzero(asked)
     if not len(index):
         return NO_TX_STATUSES
@@ -25,7 +34,7 @@ def learned(packet: Table, tx_status_id: IntArray) -> TxStatuses:
 
 def sent_in_vain(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
     """Of packets to robots that are not there, what senders learn who ask: nobody answers."""
-    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_ids != UNTOLD))
+    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_ids != NOT_MEASURED))
     if not len(index):
         return NO_TX_STATUSES
     return TxStatuses(
@@ -44,7 +53,7 @@ def result_at_first(size_bytes: IntArray, max_payload_bytes: int) -> IntArray:
 HEADER_BYTES = 6  # of IEEE 802.15.4 before its PSDU
 
 
-class PacketsHeld:
+class PacketTable:
     """The packets that are not done yet.
 
     Attributes:
@@ -88,7 +97,7 @@ def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
     frame_bytes = taken.payloads.sizes + radio.overhead_bytes
     packet: Table = np.zeros(len(taken.sender), PACKET)
     packet["sender"], packet["sequence"] = taken.sender, taken.sequence
-    packet["to"] = np.where(taken.to == BROADCAST, NOBODY, taken.sender - taken.sender % robots + taken.to)
+    packet["to"] = np.where(taken.to == BROADCAST, NO_ROBOT, taken.sender - taken.sender % robots + taken.to)
     packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
     packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
     packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)

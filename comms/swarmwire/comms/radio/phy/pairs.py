@@ -16,9 +16,9 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.phy.losses import MeasuredLinks
-from swarmwire.comms.radio.phy.propagation import Surroundings
+from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
 from swarmwire.comms.radio.propagation.fading import gain_of
 from swarmwire.comms.radio.propagation.obstruction import bodies_between, wall_loss_db
@@ -44,7 +44,7 @@ def pairs_of(
     keys,
     running: BoolArray,
     obstacles: Obstacles,
-    around: Surroundings,
+    around: PropagationParams,
     measured: MeasuredLinks | None = None,
 ) -> Pairs:
     """All pairs above the cut-off of robots that stand at `pose` (rows, 3), and those of measured strength.
@@ -97,7 +97,7 @@ def _near(x, y, robots, cells, around):
     return a[:found], b[:found], loss[:found]
 
 
-@borrowing()
+@kernel()
 def _look_ahead(ahead, x, y, robots, cells):
     """Whom the robot at each place in the grid's order makes pairs with, and how many pairs there are at most.
 
@@ -115,7 +115,7 @@ def _look_ahead(ahead, x, y, robots, cells):
     return most
 
 
-@borrowing()
+@kernel()
 def _join(a, b, loss, order, x, y, ahead, around, near, metres2):
     """Put in the pairs, and say how many; `x` and `y` are in the grid's order."""
     found, square_m2, curve = np.uint64(0), around.reach_m * around.reach_m, around.curve
@@ -145,7 +145,7 @@ def _add_shadows(loss, x, y, robots, rows, field, amplitude_db, a, b):
     _add_between(loss, x, y, robots, field.astype(single), amplitude_db, a, b, height, np.empty(SUMS, single))
 
 
-@borrowing()
+@kernel()
 def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
     for i in range(len(a)):
         s, r = a[i], b[i]
@@ -166,7 +166,7 @@ def _add_bodies(loss, x, y, robots, cells, radius_m, most_radius_m, body_db, a, 
         loss[i] += body_db * bodies_between(x, y, radius_m, most_radius_m, cells, robots, a[i], b[i])
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
     """Put pairs in which either hears the other with so much power before the others, and say how many there are."""
     kept = np.uint64(0)
@@ -177,7 +177,7 @@ def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
     return kept
 
 
-@borrowing()
+@kernel()
 def _best_dbm(send_dbm, receive_dbi, s, r):
     """The power with which the better of both would hear the other, without losses."""
     s, r = np.uint64(s), np.uint64(r)
@@ -194,7 +194,7 @@ def _fade(gain, x, y, robots, keys, rows, scatter, law, a, b):
     _gains(gain, x, y, at, number, law, a, b, parts[0], parts[1])
 
 
-@borrowing()
+@kernel()
 def _gains(gain, x, y, at, number, law, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]

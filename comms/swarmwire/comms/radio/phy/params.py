@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
-from swarmwire.comms.radio.phy.link_table import Levels
+from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sensitivity_of
 from swarmwire.comms.radio.phy.reception import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
@@ -21,7 +21,7 @@ SURE = 1.0 - 1e-12
 DCF_OF = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}
 
 
-class Rules(NamedTuple):
+class PhyParams(NamedTuple):
     """The radio in numbers; powers in mW, times in ns."""
 
     robots: int  # in each arena
@@ -57,7 +57,7 @@ class Rules(NamedTuple):
     log_success: FloatArray  # by SINR, as `log_success_table` has it
 
 
-def rules_of(radio: Radio, robots: int) -> Rules:
+def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     """What events go by."""
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
     csma, dcf = IEEE_802_15_4, DCF_OF.get(radio.frame, IEEE_802_11B)
@@ -75,7 +75,7 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     # The standard's at its bit rate, and as long as an answer takes at a lower one.
     csma_patience_ns = max(csma.acknowledgement_wait_ns, short_space_ns + answer_ns + csma.backoff_ns)
     most_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-    return Rules(
+    return PhyParams(
         robots=robots,
         method=METHODS.index(access.method),
         acknowledged=access.acknowledges,
@@ -107,8 +107,8 @@ def rules_of(radio: Radio, robots: int) -> Rules:
     )
 
 
-def levels_of(radio: Radio, rules: Rules) -> Levels:
+def thresholds_of(radio: Radio, rules: PhyParams) -> Thresholds:
     """What power makes of a link."""
     received_mw = max(rules.least_mw, rules.least_sinr * rules.noise_mw)
     disturbs = radio.access_or_default.method != "none"
-    return Levels(sensitivity_of(radio), received_mw, cut_off_dbm(radio) if disturbs else np.inf)
+    return Thresholds(sensitivity_of(radio), received_mw, cut_off_dbm(radio) if disturbs else np.inf)

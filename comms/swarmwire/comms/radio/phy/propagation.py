@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, LossCurve
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.propagation.fading import FadingLaw, fading_law, scatter_waves
+from swarmwire.comms.radio.propagation.fading import FadingModel, fading_model, scatter_waves
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sensitivity_dbm
@@ -59,7 +59,7 @@ def cut_off_dbm(radio: Radio) -> float:
 SHADOWS_CUT_OFF = 2.5  # deviations of shadowing by which a link may be better than its path loss
 
 
-class Surroundings(NamedTuple):
+class PropagationParams(NamedTuple):
     """Propagation in numbers."""
 
     send_dbm: FloatArray  # (rows,) transmit power and antenna gain
@@ -80,21 +80,21 @@ class Surroundings(NamedTuple):
     radius_m: FloatArray  # (rows,)
     most_radius_m: float
     fades: bool
-    law: FadingLaw
+    law: FadingModel
     scatter: FloatArray  # (arenas, 5, n), as `scatter_waves` has them
 
 
-def surroundings_of(radio: Radio, context: ChannelContext) -> Surroundings:
+def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationParams:
     """What links go by: a radio, which may have other numbers than the medium's, under events."""
     send_dbm, receive_dbi = _antennas_of(radio, context)
     keys, radius_m = context.keys, context.radius_m
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve = radio.loss_model.curve(radio.frequency_hz)
-    law = fading_law(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
+    law = fading_model(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
     spread_db = max(SHADOWS_CUT_OFF * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
     best_dbm = float(send_dbm.max() + receive_dbi.max())
     far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
-    return Surroundings(
+    return PropagationParams(
         send_dbm=send_dbm,
         receive_dbi=receive_dbi,
         curve=curve,

@@ -14,7 +14,7 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
@@ -23,7 +23,7 @@ from swarmwire.comms.radio.phy.losses import taken_by, takes_none
 from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, DATA, RECEIVING, SILENT, TURNING
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
 LEAST, MOST = 2.0**MIN_OCTAVE, 2.0**MAX_OCTAVE
@@ -42,7 +42,7 @@ def log_success_table(receiver: Receiver) -> FloatArray:
     return _table(receiver, sinr)
 
 
-@borrowing()
+@kernel()
 def log_success(table, receiver, sinr, bits):
     """The logarithm of the probability that so many bits are right at this SINR, a ratio."""
     if receiver.model == THRESHOLD:
@@ -74,7 +74,7 @@ RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowl
 RECEIVED, TOO_WEAK, COLLIDED, JAMMED = int(Fate.RECEIVED), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 
 
-@borrowing()
+@kernel()
 def fate_of_frame(rules, losses, state, s, i, log_right):
     """What becomes of the frame that robot s has on air, on link i, if it is right with this probability's logarithm.
 
@@ -102,7 +102,7 @@ def fate_of_frame(rules, losses, state, s, i, log_right):
     return taken_by(losses, key, rules.robots, link, a, b, sequence, attempt, is_answer, me.on_air_ns)
 
 
-@borrowing()
+@kernel()
 def alone_log_success(rules, power_mw, bits):
     """The logarithm of the probability that a frame is right without interference."""
     if power_mw < rules.least_mw or power_mw < rules.least_sinr * rules.noise_mw:
@@ -112,7 +112,7 @@ def alone_log_success(rules, power_mw, bits):
     return log_success(rules.log_success, rules.receiver, power_mw / rules.noise_mw, bits)
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def lone_delivery(rules, mean_dbm, bits):
     """The probability that a lone frame of so many bits is right at this power."""
     return math.exp(alone_log_success(rules, from_db(mean_dbm), bits))
@@ -127,11 +127,11 @@ def lone_deliveries(rules, mean_dbm, bits):
     return found
 
 
-@borrowing()
+@kernel()
 def _is_answer(state, s, r):
     """Whether the acknowledgement that robot s has on air is for robot r, which waits for it."""
     it = state.robot[r]
-    return state.robot[s].answers_to == r and it.packet != NOBODY and state.packet[it.packet].to == s
+    return state.robot[s].answers_to == r and it.packet != NO_ROBOT and state.packet[it.packet].to == s
 
 
 # --- Frames on air: who receives them, what they do to the reception of others, and how that ends.
@@ -145,7 +145,7 @@ HOPELESS = -50.0  # a logarithm below that of the least draw
 ALONE = METHODS.index("none")
 
 
-@borrowing()
+@kernel()
 def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
     """The frame of robot s, `on_air`, starts; its links are those from `first_link` to `stop_link`."""
     me = state.robot[s]
@@ -176,7 +176,7 @@ def put_on_air(rules, state, queue, s, now_ns, airtime_ns, bits):
         dcf.sense(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def take_off_air(rules, losses, state, queue, s, now_ns):
     """The frame of robot s ends: each of its links that may be told of has a fate in `now`."""
     me = state.robot[s]
@@ -217,23 +217,23 @@ def take_off_air(rules, losses, state, queue, s, now_ns):
     dcf.sense(rules, state, queue, s, now_ns)
 
 
-@borrowing()
+@kernel()
 def turn_away(state, r):
     """Robot r does not listen any more: what it was receiving is lost to it."""
     it = state.reception[r]
     it.is_deaf = 1
-    if it.locked_to != NOBODY:
+    if it.locked_to != NO_ROBOT:
         state.link[it.link].now = COLLIDED
         let_go(it)
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def let_go(it):
     """A robot receives no frame any more."""
-    it.locked_to, it.signal_mw = NOBODY, np.inf
+    it.locked_to, it.signal_mw = NO_ROBOT, np.inf
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def _add(it, power_mw):
     """A frame's power comes to a robot."""
     it.power_mw += power_mw
@@ -241,25 +241,25 @@ def _add(it, power_mw):
     it.peak_mw = max(it.peak_mw, it.power_mw)
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def _remove(it, power_mw):
     """A frame's power goes."""
     it.signals -= 1
     it.power_mw = it.power_mw - power_mw if it.signals > 0 else 0.0  # no rounding piles up
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def _arrive(rules, robot, it, link, s, i, now_ns):
     """Frame s comes to a robot on link i; it locks to the frame, or takes it for noise."""
     power_mw, noise_mw = link[i].power_mw, rules.noise_mw + it.jam_mw
     could = (power_mw >= rules.least_mw) & (power_mw >= rules.least_sinr * rules.noise_mw)
     does = could & (power_mw >= rules.least_sinr * (noise_mw + it.power_mw)) & (it.is_deaf == 0)
     link[i].now = COLLIDED if could else TOO_WEAK
-    if it.jam_mw > 0.0 and could and not (does or it.is_deaf) and it.locked_to == NOBODY:
+    if it.jam_mw > 0.0 and could and not (does or it.is_deaf) and it.locked_to == NO_ROBOT:
         would = power_mw >= rules.least_sinr * (rules.noise_mw + it.power_mw)
         link[i].now = JAMMED if would else COLLIDED
     _add(it, power_mw)
-    if it.locked_to != NOBODY:
+    if it.locked_to != NO_ROBOT:
         if now_ns - robot[it.locked_to].on_air_ns > rules.take_over_ns:
             does = False
         else:
@@ -274,7 +274,7 @@ def _arrive(rules, robot, it, link, s, i, now_ns):
         it.log_success = it.jam_log = 0.0
 
 
-@borrowing(inline="always")
+@kernel(inline="always")
 def count_chunk(rules, robot, it, now_ns):
     """The interference at a robot is about to change: what it received so far counts."""
     # Without a branch for robots that receive nothing, which would be guessed wrong often: their signal is infinite.

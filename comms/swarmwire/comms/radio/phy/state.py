@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 # What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
 NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
@@ -129,7 +129,7 @@ class Jam(NamedTuple):
     next: IntArray  # (1,) the first of them that has not come yet
 
 
-class State(NamedTuple):
+class PhyState(NamedTuple):
     """All that events read and change."""
 
     keys: KeyArray
@@ -147,7 +147,7 @@ class State(NamedTuple):
 def robots_at_rest(rows: int) -> Table:
     """A table of dtype ROBOT: nobody has a packet, and the medium has been free for long."""
     robot: Table = np.zeros(rows, ROBOT)
-    robot["packet"] = robot["answers_to"] = NOBODY
+    robot["packet"] = robot["answers_to"] = NO_ROBOT
     robot["free_from_ns"] = LONG_AGO_NS
     return robot
 
@@ -155,5 +155,5 @@ def robots_at_rest(rows: int) -> Table:
 def receptions_of_nothing(rows: int) -> Table:
     """A table of dtype RECEPTION: nothing is on air."""
     reception: Table = np.zeros(rows, RECEPTION)
-    reception["locked_to"], reception["signal_mw"] = NOBODY, np.inf
+    reception["locked_to"], reception["signal_mw"] = NO_ROBOT, np.inf
     return reception

@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
@@ -24,13 +24,13 @@ from swarmwire.comms.radio.phy.state import (
     SILENT,
     TURNING,
 )
-from swarmwire.comms.truth import NOBODY
+from swarmwire.comms.truth import NO_ROBOT
 
 QUEUE_FULL, FOUND_FULL = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")
 
 
-@borrowing()
+@kernel()
 def enter(rules, state, queue, told, r, now_ns):
     """The robot's radio is handed what was sent by now: it waits, or is refused."""
     me = state.robot[r]
@@ -54,7 +54,7 @@ def enter(rules, state, queue, told, r, now_ns):
         schedule(queue, ENTER, r, state.packet[state.order[me.entry]].sent_at_ns)
 
 
-@borrowing()
+@kernel()
 def _is_full(rules, state, r):
     """Whether no packet more may wait at the robot's radio."""
     me = state.robot[r]
@@ -63,11 +63,11 @@ def _is_full(rules, state, r):
     return me.stage != NOTHING and me.waiting >= rules.queue_limit
 
 
-@borrowing()
+@kernel()
 def serve(rules, state, queue, r, now_ns):
     """The robot's radio is free: it takes up the next packet, if one waits."""
     me = state.robot[r]
-    me.stage, me.packet = NOTHING, NOBODY
+    me.stage, me.packet = NOTHING, NO_ROBOT
     while me.next < me.entry and state.packet[state.order[me.next]].is_done:
         me.next += 1
     if me.next == me.entry:
@@ -76,11 +76,11 @@ def serve(rules, state, queue, r, now_ns):
     me.next += 1
     me.waiting -= 1
     me.attempt = me.exponent = 0
-    me.last_fate = NOBODY
+    me.last_fate = NO_ROBOT
     begin(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def begin(rules, state, queue, r, now_ns):
     """An attempt at the packet being served, unless the radio is off and keeps it back."""
     me = state.robot[r]
@@ -95,7 +95,7 @@ def begin(rules, state, queue, r, now_ns):
         schedule(queue, SEND, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def pause(rules, state, queue, r, pause_ns, now_ns):
     """A packet is over: silence, or new slots, then the next one."""
     me = state.robot[r]
@@ -105,11 +105,11 @@ def pause(rules, state, queue, r, pause_ns, now_ns):
     if pause_ns == 0:
         serve(rules, state, queue, r, now_ns)
         return
-    me.stage, me.packet = PAUSING, NOBODY
+    me.stage, me.packet = PAUSING, NO_ROBOT
     schedule(queue, TIMER, r, now_ns + pause_ns)
 
 
-@borrowing()
+@kernel()
 def keep_newest(rules, state, queue, told, r, now_ns):
     """If the robot's radio is off and keeps the newest packet alone: what waits before it ends."""
     me = state.robot[r]
@@ -120,7 +120,7 @@ def keep_newest(rules, state, queue, told, r, now_ns):
             serve(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def stop(state, queue, told, r, now_ns, fate):
     """The robot died: its queue ends; what it has on air stays there."""
     me = state.robot[r]
@@ -140,7 +140,7 @@ def stop(state, queue, told, r, now_ns, fate):
     me.next = me.entry = me.stop
     me.waiting = 0
     if not sending:
-        me.stage, me.packet = NOTHING, NOBODY
+        me.stage, me.packet = NOTHING, NO_ROBOT
         state.reception[r].is_deaf = me.on_air != SILENT
 
 
@@ -155,7 +155,7 @@ def fate_of_sending(held: Disruption) -> IntArray:
     return np.where(held.alive, np.where(held.radio_on, int(Fate.RECEIVED), off), int(Fate.SENDER_DEAD))
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def switch(rules, state, queue, told, now_ns):
     """Radios are off or on from now on, as `state.off` says; after `line_up`.
 
@@ -170,7 +170,7 @@ def switch(rules, state, queue, told, now_ns):
             begin(rules, state, queue, r, now_ns)
 
 
-@borrowing()
+@kernel()
 def _hold_back(state, queue, r):
     me = state.robot[r]
     if BACKING_OFF <= me.stage <= TURNING:

@@ -10,7 +10,7 @@ from numba import njit
 
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.radio.config.phy import FADINGS, Fading
 from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total
@@ -190,7 +190,7 @@ def signs_of(number_a, number_b):
     return z ^ (z >> np.uint64(31))
 
 
-@borrowing(error_model="numpy")
+@kernel(error_model="numpy")
 def scattered(signs, at, a, b, real, imaginary):
     """Real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
 
@@ -205,7 +205,7 @@ def scattered(signs, at, a, b, real, imaginary):
     return total(real) * SCALE, total(imaginary) * SCALE
 
 
-@borrowing(error_model="numpy")
+@kernel(error_model="numpy")
 def _wave(half, at, a, b, n):
     sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
     u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
@@ -230,7 +230,7 @@ def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
 RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
 
 
-class FadingLaw(NamedTuple):
+class FadingModel(NamedTuple):
     """A distribution's numbers, as kernels take them."""
 
     distribution: int
@@ -239,10 +239,10 @@ class FadingLaw(NamedTuple):
     wave_number: float  # 1 / wavelength, in cycles per m
 
 
-def fading_law(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingLaw:
+def fading_model(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingModel:
     """The law at this frequency of waves with this speed."""
     kind = FADINGS.index(fading.distribution)
-    return FadingLaw(kind, fading.k, fading.m, frequency_hz / speed_mps)
+    return FadingModel(kind, fading.k, fading.m, frequency_hz / speed_mps)
 
 
 @njit(cache=True)
@@ -255,7 +255,7 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
     return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
 
 
-@borrowing()
+@kernel()
 def gain_of(law, h, distance_m):
     """The gain by the law, of `scattered`'s h between robots so many m apart; a ratio, mean 1."""
     real, imaginary = h

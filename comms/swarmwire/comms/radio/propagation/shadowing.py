@@ -12,7 +12,7 @@ from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.phy import Shadowing
 
 SUMS = 16  # that `total` adds up: it is written out for so many
@@ -41,7 +41,7 @@ def cosine(turns):
     return _series(0.25 - abs(turns - np.rint(turns)))
 
 
-@borrowing(error_model="numpy")
+@kernel(error_model="numpy")
 def total(s):
     """The sum of SUMS numbers by halves, s[n] + s[n + 8] first: loops that end so leave sums of every 16th, n apart."""
     even = ((s[0] + s[8]) + (s[4] + s[12])) + ((s[2] + s[10]) + (s[6] + s[14]))
@@ -106,7 +106,7 @@ def heights(waves, x, y, out):
         out[n] = sine(waves[0, n] * x + waves[1, n] * y + waves[2, n])
 
 
-@borrowing(error_model="numpy")
+@kernel(error_model="numpy")
 def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
     """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a.
 
@@ -124,7 +124,7 @@ def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
     return total(parts) * (amplitude_db / (2.0 * math.pi)) * math.sqrt(math.sqrt(dx * dx + dy * dy))
 
 
-@borrowing(error_model="numpy")
+@kernel(error_model="numpy")
 def _mean(link, wave):
     field, arena, height, a, b, dx, dy = link
     n = np.uint64(wave)

@@ -18,7 +18,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.impairments import Bursts
 
 # Beyond this many relaxation times 1 / (a + b) the past counts for nothing: exp(-40) is lost in a draw's 53 bits.
@@ -155,7 +155,7 @@ def _lost(bursting, keys, robots, rows, sender, receiver, sequence, at_ns):
     return ends
 
 
-@borrowing()
+@kernel()
 def takes(bursting, link, key, s, r, sequence, attempt, at_ns):
     """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`."""
     at = _place(bursting.link, link)

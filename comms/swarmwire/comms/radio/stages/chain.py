@@ -18,12 +18,12 @@ with reception there: what weakens signals belongs to `signal/pairs.py`, what ta
 
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
-from swarmwire.comms.radio.stages.losses import BurstLoss, FixedLoss, Replay
+from swarmwire.comms.radio.stages.losses import BurstLoss, FixedLoss, TraceReplay
 from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 AFTER_RECEPTION: tuple[type[Stage], ...] = (
-    Replay,
+    TraceReplay,
     MeasuredRange,
     MeasuredBearing,
     MeasuredRssi,

@@ -22,7 +22,7 @@ MAX_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
 SMALLEST_TAIL = 2.0**-54  # half a step of a draw, so that no quantile is infinite
 
 
-class DelayLaw(NamedTuple):
+class DelayDistribution(NamedTuple):
     """A distribution's numbers, as kernels take them."""
 
     distribution: int
@@ -31,7 +31,7 @@ class DelayLaw(NamedTuple):
     third: float
 
 
-def delay_law(delays: Delays) -> DelayLaw:
+def delay_distribution(delays: Delays) -> DelayDistribution:
     """The law with this mean and deviation.
 
     Uniform: lowest (s) and width (s). Normal: mean (s), deviation (s), share that is cut off. Lognormal: mean and
@@ -41,14 +41,14 @@ def delay_law(delays: Delays) -> DelayLaw:
     kind = DISTRIBUTIONS.index(delays.distribution)
     if kind == UNIFORM:
         half_s = math.sqrt(3.0) * deviation_s
-        return DelayLaw(kind, mean_s - half_s, 2.0 * half_s, 0.0)
+        return DelayDistribution(kind, mean_s - half_s, 2.0 * half_s, 0.0)
     if kind == NORMAL:
-        return DelayLaw(kind, mean_s, deviation_s, 0.5 * math.erfc(mean_s / (deviation_s * math.sqrt(2.0))))
+        return DelayDistribution(kind, mean_s, deviation_s, 0.5 * math.erfc(mean_s / (deviation_s * math.sqrt(2.0))))
     if kind == LOGNORMAL:
         variance = math.log1p((deviation_s / mean_s) ** 2)
-        return DelayLaw(kind, math.log(mean_s) - 0.5 * variance, math.sqrt(variance), 0.0)
+        return DelayDistribution(kind, math.log(mean_s) - 0.5 * variance, math.sqrt(variance), 0.0)
     shape = 1.0 + math.sqrt(1.0 + (mean_s / deviation_s) ** 2)
-    return DelayLaw(kind, mean_s * (shape - 1.0) / shape, -1.0 / shape, 0.0)
+    return DelayDistribution(kind, mean_s * (shape - 1.0) / shape, -1.0 / shape, 0.0)
 
 
 @njit(cache=True)
@@ -141,7 +141,7 @@ class VaryingDelay(Stage):
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.radio.delays is not None
-        self._law, self._keys, self._robots = delay_law(context.radio.delays), context.keys, context.robots
+        self._law, self._keys, self._robots = delay_distribution(context.radio.delays), context.keys, context.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""

@@ -99,7 +99,7 @@ class BurstLoss(Stage):
 TRACE = purpose("trace")
 
 
-class Replay(Stage):
+class TraceReplay(Stage):
     """A Bernoulli trial with the measured delivery ratio for each packet and receiver, then the measured delay.
 
     The values are those at the end of the airtime. Links without any are out of range, unless the model is to decide.
@@ -111,7 +111,7 @@ class Replay(Stage):
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
         """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
-        return None if context.traces is None else Replay(context)
+        return None if context.traces is None else TraceReplay(context)
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.traces is not None

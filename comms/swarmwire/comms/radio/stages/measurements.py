@@ -25,7 +25,7 @@ def to_sender_m(pose, sender, receiver, wrap_m):
 # --- What a receiver learns of where a sender was, whichever column it is.
 
 
-class Given(Stage):
+class Measurement(Stage):
     """Fills a column of what is given with what a kernel measures between two poses, with its error.
 
     Args:
@@ -54,7 +54,7 @@ class Given(Stage):
 RANGE_NOISE = purpose("range noise")
 
 
-class MeasuredRange(Given):
+class MeasuredRange(Measurement):
     """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
 
     name = "measured_range"
@@ -92,7 +92,7 @@ BEARING_NOISE = purpose("bearing noise")
 TURN = 2.0 * np.pi
 
 
-class MeasuredBearing(Given):
+class MeasuredBearing(Measurement):
     """Where the sender was, seen from the receiver's body when the packet went on air, plus a normal error.
 
     In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].

@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import Lives
+from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.model import Decided, RadioModel
@@ -15,7 +15,7 @@ from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import Reach, links_in_reach, pairs_in_reach, reach, reach_on_torus
-from swarmwire.comms.radio.unit_disk.tx_queue import Senders
+from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
 
 # 1 - 0.9 is a hair below 0.1.
 ROUNDING = 1e-9
@@ -40,7 +40,7 @@ class Channel:
             if type(stage) in before:
                 stage.go_on_from(before[type(stage)], at_ns)
 
-    def decide(self, packets: Transmissions, pose: FloatArray, lives: Lives) -> Links:
+    def decide(self, packets: Transmissions, pose: FloatArray, lives: LivenessHistory) -> Links:
         """What becomes of packets that go on air, or are refused, while robots stand at `pose`."""
         # No geometry for what is too large; for a full queue it tells how many it would have reached.
         tried = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
@@ -108,7 +108,7 @@ class UnitDisk(RadioModel):
 
     def __init__(self, context: ChannelContext) -> None:
         self._context = context
-        self._senders = Senders(context.radio, len(context.keys) * context.robots)
+        self._senders = TxQueues(context.radio, len(context.keys) * context.robots)
         self._channel = Channel(context)
         self._pose = np.zeros((len(context.keys) * context.robots, 3))
         self._held, self._columns = context.disruption, len(context.radio.measures.columns)
@@ -132,12 +132,12 @@ class UnitDisk(RadioModel):
         """Queue packets: when they will go on air, or be refused, is known at once."""
         return self._senders.accept(sent_at_ns, sent, others_alive, epoch)
 
-    def pass_time(self, until_ns: int, lives: Lives) -> Decided:
+    def pass_time(self, until_ns: int, lives: LivenessHistory) -> Decided:
         """What goes on air, or is refused, before `until_ns`."""
         self._now_ns = until_ns
         return self._decided(self._senders.leave(until_ns, self._held), lives)
 
-    def disrupt(self, at_ns: int, coming: Disruption, lives: Lives) -> Decided:
+    def disrupt(self, at_ns: int, coming: Disruption, lives: LivenessHistory) -> Decided:
         """The queues of the dead end, those of radios that are off may wait; what is on air has its fates already."""
         decided = self._decided(self._senders.die(at_ns, coming.alive), lives)
         self._senders.switch(at_ns, coming)
@@ -151,7 +151,7 @@ class UnitDisk(RadioModel):
         """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
         return self._channel.edges(pose, alive, self._now_ns)
 
-    def _decided(self, packets: Transmissions, lives: Lives) -> Decided:
+    def _decided(self, packets: Transmissions, lives: LivenessHistory) -> Decided:
         if not packets:
             return packets, Links.none(self._columns)
         return packets, self._channel.decide(packets, self._pose, lives)

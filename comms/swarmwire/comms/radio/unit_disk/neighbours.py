@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import BROADCAST
 
 # Two robots exactly `range_m` apart must not fall two cells apart by rounding.
@@ -115,7 +115,7 @@ def _strips(x, y, robots, cells):
     return first, stop
 
 
-@borrowing()
+@kernel()
 def strip(x, y, arena, cells, row):
     """First and stop in the grid's order of the three cells side by side that are `row` rows above (x, y) in m.
 

@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import Intake, Transmissions
+from swarmwire.comms.radio.transmissions import Admission, Transmissions
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 
@@ -61,7 +61,7 @@ def enter(
 FAR_NS = 2**62
 
 
-def held_back(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> tuple[Transmissions, IntArray]:
+def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> tuple[Transmissions, IntArray]:
     """The queue in which what waits at radios `which` (rows,) waits for them; and when their last airtime ends.
 
     `free_at_ns` (rows,) is when all that waits would have been sent.
@@ -71,7 +71,9 @@ def held_back(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> 
     return queued._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
 
 
-def let_go(queued: Transmissions, which: BoolArray, free_at_ns: IntArray, at_ns: int) -> tuple[Transmissions, IntArray]:
+def release_queue(
+    queued: Transmissions, which: BoolArray, free_at_ns: IntArray, at_ns: int
+) -> tuple[Transmissions, IntArray]:
     """The queue in which what waited for radios `which` (rows,) goes on air from `at_ns` on, one after the other.
 
     `free_at_ns` (rows,) is when their last airtime ended; also returned, as it is then.
@@ -139,12 +141,12 @@ NOTHING = Transmissions.none()
 NO_LIMIT = 2**31  # where all but the newest packet end anyway
 
 
-class Senders:
+class TxQueues:
     """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
 
     def __init__(self, radio: Radio, rows: int) -> None:
         self._radio = radio
-        self._intake = Intake(rows)
+        self._intake = Admission(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
         self._backlog = np.full(rows, DROP)
         self.queued = Transmissions.none()
@@ -185,9 +187,9 @@ class Senders:
         before, self._backlog = self._backlog, now.backlog_now
         held, free = self._backlog != DROP, (before != DROP) & (self._backlog == DROP)
         if free.any():
-            self.queued, self._free_at_ns = let_go(self.queued, free, self._free_at_ns, at_ns)
+            self.queued, self._free_at_ns = release_queue(self.queued, free, self._free_at_ns, at_ns)
         if (held & (before == DROP)).any():
-            self.queued, self._free_at_ns = held_back(self.queued, held & (before == DROP), self._free_at_ns)
+            self.queued, self._free_at_ns = hold_queue(self.queued, held & (before == DROP), self._free_at_ns)
         self.queued = newest_only(self.queued, self._backlog == NEWEST, np.full(len(held), at_ns))
 
     def die(self, at_ns: int, alive: BoolArray) -> Transmissions:

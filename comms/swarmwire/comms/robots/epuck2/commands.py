@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels
-from swarmwire.comms.bodies.ranging_specs import Light, Proximity, Scan
-from swarmwire.comms.bodies.sensor_specs import GroundColour
+from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec, ScanSpec
+from swarmwire.comms.bodies.sensor_specs import GroundSpec
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import (
     COMMAND_BYTES,
     COMMAND_HEADER,
     PAYLOAD_BYTES,
     Header,
-    Request,
-    Settings,
+    PacketRequest,
+    RobotSettingsBits,
 )
 
 STEPS_PER_TURN = 1000
@@ -119,8 +119,8 @@ class RobotCommand:
     left: int = 0  # steps/s, or what the counter is to show; -32768 to 32767
     right: int = 0
     lights: Lights = ALL_DARK
-    request: Request = Request.NOTHING
-    settings: Settings = Settings.NONE
+    request: PacketRequest = PacketRequest.NOTHING
+    settings: RobotSettingsBits = RobotSettingsBits.NONE
     sound: int = 0  # a bit each: three melodies, two sounds, and silence
 
     def encoded(self) -> bytes:
@@ -138,7 +138,9 @@ class RobotCommand:
             expected = f"expected {COMMAND_BYTES} bytes from {COMMAND_HEADER:#x} on"
             raise BadFrame("malformed_commands", f"{expected}, got {packet[:COMMAND_BYTES].hex()}")
         _, request, settings, left, right, switched, colours, sound = _LAYOUT.unpack(packet)
-        return cls(left, right, Lights(switched, colours), Request(request & 3), Settings(settings & 7), sound)
+        return cls(
+            left, right, Lights(switched, colours), PacketRequest(request & 3), RobotSettingsBits(settings & 7), sound
+        )
 
 
 # --- Which bodies an e-puck2 can be.
@@ -153,13 +155,13 @@ def check_fits(body: Body) -> None:
     sensors = body.sensors
     proximity, light, scan, ground = (sensors.get(name) for name in ("proximity", "light", "scan", "ground"))
     _check(body, "drive.kind", isinstance(body.drive, Wheels), "wheels")
-    if isinstance(proximity, Proximity):
+    if isinstance(proximity, ProximitySpec):
         _check(body, "sensors.proximity.angles_deg", len(proximity.angles_deg) == 8, "8 angles")
-    if isinstance(light, Light):
+    if isinstance(light, LightSpec):
         _check(body, "sensors.light.angles_deg", len(light.angles_deg) == 8, "8 angles")
-    if isinstance(scan, Scan):
+    if isinstance(scan, ScanSpec):
         _check(body, "sensors.scan.rays", scan.rays == 1, "1 ray")
-    if isinstance(ground, GroundColour):
+    if isinstance(ground, GroundSpec):
         _check(body, "sensors.ground.points_m", len(ground.points_m) == 3, "3 points")
     _check(body, "leds", body.led_count in {0, COUNT}, f"{COUNT} LEDs")
 

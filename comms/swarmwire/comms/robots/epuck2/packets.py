@@ -4,14 +4,14 @@ from enum import IntFlag
 
 import numpy as np
 
-from swarmwire.comms.config import Explained
+from swarmwire.comms.config import ExplainedEnum
 
 PORT = 1000  # of TCP, on the robot
 COMMAND_BYTES = 21
 COMMAND_HEADER = 0x80
 
 
-class Header(Explained):
+class Header(ExplainedEnum):
     """What the first byte of an answer announces."""
 
     IMAGE = 1, "an image, 160 x 120 points of 2 bytes"
@@ -19,7 +19,7 @@ class Header(Explained):
     EMPTY = 3, "nothing: the command asked for nothing"
 
 
-class Request(IntFlag):
+class PacketRequest(IntFlag):
     """What a command asks for; the image is answered first."""
 
     NOTHING = 0
@@ -27,7 +27,7 @@ class Request(IntFlag):
     SENSORS = 2
 
 
-class Settings(IntFlag):
+class RobotSettingsBits(IntFlag):
     """What a command tells beside speeds and lights."""
 
     NONE = 0

@@ -10,8 +10,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import Scan, within_a_turn
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.ranging_specs import ScanSpec, within_a_turn
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP
 
 PROXIMITY_FULL = 4095  # 12 bits
@@ -56,13 +56,13 @@ def to_shade(value: FloatArray) -> AnyArray:
     return _whole(GROUND_BLACK + value * (GROUND_WHITE - GROUND_BLACK), GROUND_BLACK, GROUND_WHITE)
 
 
-def distance_m(raw: AnyArray, spec: Scan) -> FloatArray:
+def distance_m(raw: AnyArray, spec: ScanSpec) -> FloatArray:
     """The distance from where the sheet has the scanner; inf beyond its range."""
     range_m = raw / 1000.0 + (DISTANCE_AHEAD_M - spec.at_m)
     return np.where(range_m > spec.range_m, np.inf, np.maximum(range_m, spec.range_min_m))
 
 
-def to_distance(range_m: FloatArray, spec: Scan) -> AnyArray:
+def to_distance(range_m: FloatArray, spec: ScanSpec) -> AnyArray:
     """The inverse of `distance_m`; inf: what the sensor tells that sees nothing."""
     seen_m = np.minimum(range_m, 0.001 * SEES_NOTHING_MM) - (DISTANCE_AHEAD_M - spec.at_m)
     return np.where(np.isinf(range_m), SEES_NOTHING_MM, _whole(1000.0 * seen_m, 0, SEES_NOTHING_MM))
@@ -83,7 +83,7 @@ def to_voltage(value_v: FloatArray) -> AnyArray:
     return _whole(value_v * PER_V, 0, 4095)
 
 
-def charge(voltage_v: FloatArray, spec: Battery) -> FloatArray:
+def charge(voltage_v: FloatArray, spec: BatterySpec) -> FloatArray:
     """The share that is left in a battery of this voltage, which falls evenly with it."""
     return np.clip((voltage_v - spec.empty_v) / max(spec.full_v - spec.empty_v, 1e-9), 0.0, 1.0)
 
@@ -237,6 +237,6 @@ class Epuck2Readings:
 
     def _battery(self, told: AnyArray) -> Fields:
         spec = self._body.sensors["battery"]
-        assert isinstance(spec, Battery)
+        assert isinstance(spec, BatterySpec)
         voltage_v = told["battery"] / PER_V
         return {"battery.charge": charge(voltage_v, spec), "battery.voltage_v": voltage_v}

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import ProximitySpec, ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
@@ -69,7 +69,7 @@ def returns_m(message: Any) -> FloatArray:
     return np.where(none, np.inf, np.where(near, float(message.range_min), range_m))
 
 
-def laser_scan(messages: Messages, spec: Scan, range_m: FloatArray, stamp_ns: int) -> Any:
+def laser_scan(messages: Messages, spec: ScanSpec, range_m: FloatArray, stamp_ns: int) -> Any:
     """The message of a reading (rays,) of the sheet's scanner, all of whose rays were taken at once."""
     first_rad = float(np.deg2rad(spec.first_deg))
     return messages.make(
@@ -105,7 +105,7 @@ WIDEST_RAD = np.pi / 4.0  # to either side: further off, a thing is beside a sen
 class LaserAsProximity:
     """Measures each sensor of the sheet the nearest return before it, measured from the rim."""
 
-    def __init__(self, spec: Proximity, radius_m: float, at_m: float, scanner_rad: float) -> None:
+    def __init__(self, spec: ProximitySpec, radius_m: float, at_m: float, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
         self._spec, self._radius_m, self._at_m, self._scanner_rad = spec, radius_m, at_m, scanner_rad
         self._geometry: Geometry | None = None
@@ -147,7 +147,7 @@ class LaserAsScan:
     look there, and the ray meets nothing.
     """
 
-    def __init__(self, spec: Scan, scanner_rad: float) -> None:
+    def __init__(self, spec: ScanSpec, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
         self._spec, self._scanner_rad = spec, scanner_rad
         self._geometry: Geometry | None = None

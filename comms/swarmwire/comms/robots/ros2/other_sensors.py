@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
 from swarmwire.comms.robots.ros2.messages import Messages
 
@@ -13,7 +13,7 @@ FRAME = ""
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
 
 
-def charge_of(message: Any, spec: Battery) -> float:
+def charge_of(message: Any, spec: BatterySpec) -> float:
     """The charge, 0 to 1: as told, else as the voltage lies between the sheet's when empty and when full; nan: neither.
 
     `percentage` is a share by its definition. A base that tells more than 1 means per cent, and 1 could be either: then

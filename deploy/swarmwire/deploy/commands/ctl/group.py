@@ -5,7 +5,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from swarmwire.comms.config import one_of
+from swarmwire.comms.config import did_you_mean
 from swarmwire.deploy.commands.access_options import Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.commands.ctl.chosen_run import Chosen, Endpoint
 from swarmwire.deploy.commands.ctl.given import end_command, event_command, events_command
@@ -56,7 +56,7 @@ class CtlGroup(TyperGroup):
             rest = args[place : place + 1]
             if not rest or (rest[0] not in self.commands and not rest[0].startswith("-")):
                 got = rest[0] if rest else chosen.run
-                ctx.fail(f"expected {one_of(self.commands, got)}, after the run if one is named; got {got!r}")
+                ctx.fail(f"expected {did_you_mean(self.commands, got)}, after the run if one is named; got {got!r}")
         ctx.obj = chosen
         return super().parse_args(ctx, args)
 

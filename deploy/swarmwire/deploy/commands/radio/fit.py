@@ -127,12 +127,12 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
     """The antenna that the robots had; BadInput for one that no scenario takes."""
     from dataclasses import fields
 
-    from swarmwire.comms.config import fault_of, limits_of
+    from swarmwire.comms.config import bounds_of, fault_of
     from swarmwire.comms.radio.config.phy import Antenna
 
     antenna = Antenna(power_dbm, gain_dbi)
     for of in fields(antenna):
-        fault = fault_of(getattr(antenna, of.name), limits_of(of))
+        fault = fault_of(getattr(antenna, of.name), bounds_of(of))
         if fault is not None:
             raise BadInput(f"--{of.name.replace('_', '-')}", "", fault)
     return antenna

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.config import fault_of, limits_of
+from swarmwire.comms.config import bounds_of, fault_of
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.presets import PRESETS
@@ -170,7 +170,7 @@ PARAMETERS = {
 @pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
 def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
     for field in fields(kind):
-        limits = limits_of(field)
+        limits = bounds_of(field)
         if "limits" not in field.metadata:
             continue
         assert limits.help, field.name

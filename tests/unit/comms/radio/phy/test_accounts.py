@@ -12,11 +12,11 @@ from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
+from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.model import Decided
 from swarmwire.comms.radio.phy import model
-from swarmwire.comms.radio.phy.model import Reports
-from swarmwire.comms.radio.phy.results import Told
+from swarmwire.comms.radio.phy.model import Reporter
+from swarmwire.comms.radio.phy.results import ResultBuffer
 from tests.support.comms.radio.phy.radios import ALL_GIVEN, METHODS, with_access
 from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, random_traffic
@@ -114,7 +114,7 @@ def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
     period_ns = rng.integers(10**5, 10**8, k)
     return Jammers(
         arena=np.zeros(k, np.int64),
-        carrier=rng.integers(NO_ROBOT, robots, k),
+        carrier=rng.integers(NO_ROBOTS, robots, k),
         x_m=rng.normal(0.0, 20.0, k),
         y_m=rng.normal(0.0, 20.0, k),
         power_dbm=rng.uniform(-60.0, 20.0, k),
@@ -183,13 +183,13 @@ def finished(told: Run) -> list[tuple[int, ...]]:
 
 
 def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyPatch):
-    at_once, goes, decided = finished(crowded()), set[int](), Reports.decided
+    at_once, goes, decided = finished(crowded()), set[int](), Reporter.decided
 
-    def counted(self: Reports, parts: list[Told], *more: Any) -> Decided:
+    def counted(self: Reporter, parts: list[ResultBuffer], *more: Any) -> Decided:
         goes.add(len(parts))
         return decided(self, parts, *more)
 
-    monkeypatch.setattr(Reports, "decided", counted)
+    monkeypatch.setattr(Reporter, "decided", counted)
     for room in (1, 200, 300, 400):
         monkeypatch.setattr(model, "MIN_ROOM", room)
         assert finished(crowded()) == at_once

@@ -14,7 +14,7 @@ from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.losses import passing_share
-from swarmwire.comms.radio.phy.params import rules_of
+from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
 from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
 from tests.support.comms.radio.runs import Run, at, everybody, make_medium, packets, run, scattered
@@ -143,7 +143,7 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
     told = run(make_medium(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
     arena, sender, sequence = (of.ravel() for of in np.meshgrid(range(2), range(2), range(ticks), indexing="ij"))
     rssi_dbm = [on_air(told, "rssi_dbm")[on_air(told, "arena") == of][0] for of in range(2)]
-    likely = lone_deliveries(rules_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
+    likely = lone_deliveries(phy_params_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
     is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
     assert 0 < np.count_nonzero(is_right) < len(is_right)
     received = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
@@ -155,7 +155,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     """A packet is sent up to three times, until an answer to it is right; it is received if one of its frames is."""
     radio = with_access("csma-802154")
     radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
-    rules, ticks, frame_bits = rules_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
+    rules, ticks, frame_bits = phy_params_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     rssi_dbm = on_air(told, "rssi_dbm")[:1]
     frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
@@ -237,7 +237,7 @@ def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
     """Of packets whose first frame is lost and whose second is right, all that differs in time are two backoffs."""
     radio = with_access("csma-802154")
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
-    rules, ticks = rules_of(radio, 2), 60
+    rules, ticks = phy_params_of(radio, 2), 60
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     arena, sequence = on_air(told, "arena"), on_air(told, "sequence")
     lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]

@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
-from swarmwire.comms.radio.disruption import NO_ROBOT, Disruption, Jammers
+from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import with_access
@@ -22,7 +22,7 @@ NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the
 
 def jammers(*rows: dict[str, Any]) -> Jammers:
     """Jammers in the first arena, always on at the origin at 20 dBm unless they say otherwise."""
-    usual = {"arena": 0, "carrier": NO_ROBOT, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
+    usual = {"arena": 0, "carrier": NO_ROBOTS, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
     full = [{**usual, "period_ns": 10**9, "phase_ns": 0, **row} for row in rows]
     return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, NOWHERE, UNTOLD, Fate, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
@@ -29,7 +29,7 @@ class Asking:
         self.asked: list[tuple[int, int]] = []
 
     def __call__(self, sent: SentPackets) -> SentPackets:
-        ids = np.full(len(sent), UNTOLD)
+        ids = np.full(len(sent), NOT_MEASURED)
         for k, (sender, to) in enumerate(zip(sent.sender.tolist(), sent.to.tolist(), strict=True)):
             if to != BROADCAST:
                 ids[k] = self._sent[sender]

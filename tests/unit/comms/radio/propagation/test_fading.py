@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.phy import Fading
 from swarmwire.comms.radio.propagation.fading import (
     WAVES,
     fading_gain,
-    fading_law,
+    fading_model,
     gamma_quantile,
     gamma_tails,
     nakagami_gain,
@@ -23,7 +23,7 @@ from swarmwire.comms.radio.propagation.fading import (
 # which 15 000 pairs do not show.
 KEY = np.uint64(derive_key("fading"))
 PER_M = 2.44e9 / 299_792_458.0
-RAYLEIGH = fading_law(Fading(), 2.44e9)
+RAYLEIGH = fading_model(Fading(), 2.44e9)
 PAIRS = 15_000
 STANDARD_ERRORS = 4.4
 PLACES = np.random.default_rng(5).uniform(-50.0, 50.0, (PAIRS, 4))
@@ -37,7 +37,7 @@ def rayleigh_gain(key: np.uint64, a: int, b: int, per_m: float, *place: float) -
 
 
 def rician_gain(key: np.uint64, a: int, b: int, per_m: float, ax: float, ay: float, bx: float, by: float, k: float):
-    law = fading_law(Fading("rician", k=k), 2.44e9)._replace(wave_number=per_m)
+    law = fading_model(Fading("rician", k=k), 2.44e9)._replace(wave_number=per_m)
     return float(fading_gain(law, key, a, b, ax, ay, bx, by))
 
 
@@ -183,7 +183,7 @@ def test_a_law_takes_the_distribution_that_was_asked_for():
         (Fading("rician", k=2.0), rician_gain(KEY, 3, 8, PER_M, *place, 2.0)),
         (Fading("nakagami", m=0.75), nakagami_gain(gain, 0.75)),
     ):
-        assert fading_gain(fading_law(fading, 2.44e9), KEY, 3, 8, *place) == expected
+        assert fading_gain(fading_model(fading, 2.44e9), KEY, 3, 8, *place) == expected
 
 
 @pytest.mark.parametrize("shape", [0.5, 0.6, 0.75, 1.0, 1.5, 3.0, 10.0, 200.0])

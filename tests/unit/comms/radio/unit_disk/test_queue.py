@@ -9,7 +9,7 @@ from swarmwire.comms.packets import NOWHERE, Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import Intake
+from swarmwire.comms.radio.transmissions import Admission
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.phy.radios import with_access
@@ -247,7 +247,7 @@ def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
 
 
 def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
-    intake = Intake(4)
+    intake = Admission(4)
     for before in (0, 2):
         taken = intake.take(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
         assert taken.sender.tolist() == [1, 1, 3, 3]
@@ -258,7 +258,9 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
 
 
 def test_packets_to_nobody_take_a_number_and_go_nowhere():
-    taken = Intake(2).take(np.zeros(2, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0)
+    taken = Admission(2).take(
+        np.zeros(2, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
+    )
     assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0], [1])
 
 

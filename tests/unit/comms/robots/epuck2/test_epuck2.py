@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.ranging_specs import Scan
+from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
 from swarmwire.comms.robots.epuck2.commands import (
@@ -21,7 +21,7 @@ from swarmwire.comms.robots.epuck2.commands import (
     body_speeds,
     wheel_steps,
 )
-from swarmwire.comms.robots.epuck2.packets import SENSORS, Request, Settings
+from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Odometer
 from tests.support.robots.epuck2 import fact_sheet
 
@@ -32,8 +32,8 @@ COMMANDS = st.builds(
     STEPS,
     STEPS,
     st.builds(Lights, st.integers(0, 63), st.binary(min_size=12, max_size=12)),
-    st.sampled_from([Request(bits) for bits in range(4)]),
-    st.sampled_from([Settings(bits) for bits in range(8)]),
+    st.sampled_from([PacketRequest(bits) for bits in range(4)]),
+    st.sampled_from([RobotSettingsBits(bits) for bits in range(8)]),
     st.integers(0, 63),
 )
 
@@ -150,7 +150,7 @@ SHARES = st.floats(0.0, 1.0)
 BODY = load_body("epuck2")
 
 
-def tof() -> Scan:
+def tof() -> ScanSpec:
     assert BODY.scan is not None
     return BODY.scan
 

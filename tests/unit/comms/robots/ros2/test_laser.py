@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.ranging_specs import Proximity, Scan
+from swarmwire.comms.bodies.ranging_specs import ProximitySpec, ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
@@ -30,7 +30,7 @@ def body(at_m: float = 0.0) -> Body:
     return body_from({"like": "turtlebot3-burger", "sensors": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
 
 
-def proximity_of(of: Body) -> Proximity:
+def proximity_of(of: Body) -> ProximitySpec:
     assert of.proximity
     return of.proximity
 
@@ -49,7 +49,7 @@ def test_the_nearest_angle_is_that_of_a_brute_force_search(of, among):
 
 def scans():
     spec = st.builds(
-        Scan,
+        ScanSpec,
         rays=st.integers(1, 90),
         range_m=st.just(3.5),
         range_min_m=st.just(0.12),
@@ -84,28 +84,28 @@ def test_a_return_that_is_none_reads_inf_and_one_too_near_the_least(told_m, read
 
 def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
     message = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], first_rad=-pi))  # back, right, ahead, left
-    assert LaserAsScan(Scan(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
-    coarse = LaserAsScan(Scan(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
+    assert LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
+    coarse = LaserAsScan(ScanSpec(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
     assert coarse.tolist() == [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]
 
 
 def test_a_scanner_that_turns_clockwise_or_is_mounted_turned_is_read_where_it_looks():
     clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
-    spec = Scan(rays=4, range_m=9.0)
+    spec = ScanSpec(rays=4, range_m=9.0)
     assert LaserAsScan(spec, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
     assert LaserAsScan(spec, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
 
 
 def test_where_a_scanner_does_not_look_nothing_is_met():
     ahead = received(independent.laser_scan([1.0] * 91, first_rad=-pi / 4, step_rad=pi / 180))
-    range_m = LaserAsScan(Scan(rays=8, range_m=9.0), 0.0).range_m(ahead)
+    range_m = LaserAsScan(ScanSpec(rays=8, range_m=9.0), 0.0).range_m(ahead)
     assert range_m.tolist() == [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]
 
 
 @pytest.mark.parametrize("broken", [{"first_rad": nan}, {"step_rad": inf}])
 def test_rays_that_cannot_lie_so_are_a_bad_frame(broken):
     message = received(independent.laser_scan([1.0] * 4, **{"first_rad": 0.0, "step_rad": 0.1, **broken}))
-    for reader in (LaserAsScan(Scan(rays=4, range_m=9.0), 0.0).range_m, near().value):
+    for reader in (LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m, near().value):
         with pytest.raises(BadFrame):
             reader(message)
 
@@ -133,7 +133,7 @@ def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
 def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers_nothing():
     far = np.full(360, 0.105 + 0.41)
     assert not near().value(received(independent.laser_scan(far))).any()
-    spec = Proximity(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
+    spec = ProximitySpec(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
     alone = LaserAsProximity(spec, 0.105, 0.0, 0.0)
     ranges = np.full(360, inf)
     ranges[46:315] = 0.2
@@ -150,7 +150,7 @@ def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m
         half = 0.5 * (low + high)
         inside = hypot(at_m + half * cos(angle_rad), half * sin(angle_rad)) < 0.105
         low, high = (half, high) if inside else (low, half)
-    spec = Proximity(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
+    spec = ProximitySpec(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
     message = received(independent.laser_scan([low + away_m], angle_rad - mounted_rad, 0.1, range_min=0.0))
     value = LaserAsProximity(spec, 0.105, at_m, mounted_rad).value(message)
     assert value == pytest.approx([1.0 - 2.0 * away_m], abs=1e-5)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import Battery
+from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages
@@ -138,9 +138,9 @@ def test_what_is_not_measured_is_told_as_such_and_read_as_nan():
         assert motion_of(received(IMU, theirs), 0.0) == pytest.approx(motion, nan_ok=True)
 
 
-def battery() -> Battery:
+def battery() -> BatterySpec:
     spec = load_body("turtlebot3-burger").sensors["battery"]
-    assert isinstance(spec, Battery)
+    assert isinstance(spec, BatterySpec)
     return spec
 
 

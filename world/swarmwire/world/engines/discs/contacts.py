@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 
 # Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
 LOOK_AHEAD = 0.05
@@ -31,7 +31,7 @@ CONTACT = np.dtype(
 )
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def contacts_of(contacts, robots, pairs, things, old):
     """Fill records (pairs + things,) for what is listed; touch and impulses are carried over from the `old` ones."""
     at = 0
@@ -53,13 +53,13 @@ def contacts_of(contacts, robots, pairs, things, old):
         contact.push_ns, contact.rub_ns = (old[at].push_ns, old[at].rub_ns) if same else (0.0, 0.0)
 
 
-@borrowing()
+@kernel()
 def _turning_per_kg(robot):
     """What a robot's turning adds to how easily its rim gives way along the tangent."""
     return robot.radius_m * robot.radius_m * robot.per_kgm2
 
 
-@borrowing()
+@kernel()
 def _is_before(one, other):
     """Whether a contact stands before another one: robots before fixed things, then by row, kind and number."""
     if (one.kind == ROBOT) != (other.kind == ROBOT):
@@ -72,7 +72,7 @@ def _is_before(one, other):
 
 
 @njit(cache=True)
-def crowd_of(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
+def contact_islands(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
     """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising.
 
     Only rows that are `moving` (rows,), as are all that are listed.
@@ -85,7 +85,7 @@ def crowd_of(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]
     return np.flatnonzero(crowded), np.flatnonzero(moving & ~crowded)
 
 
-@borrowing()
+@kernel()
 def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side):
     """Put the places of the contacts that may meet in this step into `met`, in order; returns how many.
 
@@ -121,7 +121,7 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
     return count
 
 
-@borrowing()
+@kernel()
 def _speed_mps(now):
     return np.sqrt(now[3] * now[3] + now[4] * now[4])
 
@@ -132,7 +132,7 @@ def _speed_mps(now):
 ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
 
-@borrowing()
+@kernel()
 def gap_to_wall(wall, x, y, radius_m, half_size_m):
     """Gap in m from a disc to a wall of the arena, negative if they overlap, and the unit vector towards the wall."""
     if wall == LEFT:
@@ -144,7 +144,7 @@ def gap_to_wall(wall, x, y, radius_m, half_size_m):
     return half_size_m[1] - y - radius_m, 0.0, 1.0
 
 
-@borrowing()
+@kernel()
 def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
     """As `gap_to_wall`, to a circle. Two with one centre part along x."""
     dx, dy = circle_x - x, circle_y - y
@@ -154,7 +154,7 @@ def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
     return apart - radius_m - circle_radius_m, dx / apart, dy / apart
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
     """As `gap_to_wall`, to the side or corner of a convex polygon that is nearest to the disc's centre.
 
@@ -178,7 +178,7 @@ def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
     return outside - radius_m, -nx, -ny
 
 
-@borrowing()
+@kernel()
 def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, side):
     """As `gap_to_wall`, to any thing: circle or polygon number `which`, or a wall."""
     if kind == CIRCLE:
@@ -194,7 +194,7 @@ def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, s
 # All that is fixed counts as one thing.
 
 
-@borrowing()
+@kernel()
 def begin_tick(contacts, robots, touched):
     """What touched in the tick that ends did so before, and nothing has touched yet."""
     for k in range(len(contacts)):
@@ -204,7 +204,7 @@ def begin_tick(contacts, robots, touched):
         touched[row] = 0.0
 
 
-@borrowing()
+@kernel()
 def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets):
     """Note what touches at the end of a step: it was pushed, or its gap is next to nothing.
 
@@ -233,7 +233,7 @@ def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets)
             robots[contact.row].against_fixed |= NOW
 
 
-@borrowing()
+@kernel()
 def _parting_mps(contact, state):
     """How fast the gap grows."""
     parting = -(state[contact.row, 3] * contact.nx + state[contact.row, 4] * contact.ny)

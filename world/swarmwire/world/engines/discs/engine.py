@@ -5,10 +5,10 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.world.engines.discs.contacts import CONTACT, contacts_of, crowd_of
+from swarmwire.world.engines.discs.contacts import CONTACT, contact_islands, contacts_of
 from swarmwire.world.engines.discs.neighbours import fixed_near, obstacle_cells, pairs_near
 from swarmwire.world.engines.discs.step import advance, needed_margin_m
-from swarmwire.world.engines.engine import Setting
+from swarmwire.world.engines.engine import EngineConfig
 
 ROBOT = np.dtype(
     [
@@ -35,7 +35,7 @@ ROBOT = np.dtype(
 )
 
 
-def robots_of(setting: Setting, arenas: int) -> AnyArray:
+def robots_of(setting: EngineConfig, arenas: int) -> AnyArray:
     """Records (arenas x robots,) of robots at rest."""
     motors, step_s = setting.motors, setting.tick_s / setting.steps
     robots = np.zeros(len(setting.radius_m), ROBOT)
@@ -63,7 +63,7 @@ class DiscsEngine:
 
     name: ClassVar[str] = "discs"
 
-    def __init__(self, setting: Setting, pose: FloatArray) -> None:
+    def __init__(self, setting: EngineConfig, pose: FloatArray) -> None:
         arenas, robots = pose.shape[:2]
         self._setting = setting
         self.state: FloatArray = np.zeros((arenas, robots, 6))
@@ -125,5 +125,5 @@ class DiscsEngine:
         old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
         contacts_of(self._contacts, robots, pairs, things, old)
         self._met = np.zeros(len(self._contacts), np.int64)
-        self._crowd, self._loners = crowd_of(np.repeat(self._running, per_arena), self._contacts)
+        self._crowd, self._loners = contact_islands(np.repeat(self._running, per_arena), self._contacts)
         robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]

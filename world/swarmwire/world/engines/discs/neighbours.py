@@ -10,7 +10,7 @@ from numba import njit
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.geometry.robot_index import build, cell_of
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.world.engines.discs.contacts import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 
 CELLS_PER_OBSTACLE = 4
@@ -137,7 +137,7 @@ def fixed_near(
     return things[:count]
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
     """Fill `pairs`, and return how many there are, whether there is room for them or not."""
     count = 0
@@ -162,7 +162,7 @@ def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
     return count
 
 
-@borrowing()
+@kernel()
 def _insert(pairs, begin, count, row, other):
     """Put a pair among those of the same row, pairs[begin:count], so that they rise."""
     place = count
@@ -172,7 +172,7 @@ def _insert(pairs, begin, count, row, other):
     pairs[place, 0], pairs[place, 1] = row, other
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, cells, margin_m, things):
     """Fill `things`, and return how many there are, whether there is room for them or not."""
     half_size_m = (0.5 * size_m[0], 0.5 * size_m[1])
@@ -199,13 +199,13 @@ def _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, ce
     return count
 
 
-@borrowing()
+@kernel()
 def _put_near(things, place, row, kind, which):
     if place < len(things):
         things[place, 0], things[place, 1], things[place, 2] = row, kind, which
 
 
-@borrowing()
+@kernel()
 def _told(obstacles, obstacle):
     """The kind of an obstacle that the cells list, its number among its kind, and its height in m."""
     polygon = obstacle - len(obstacles.circle)
@@ -214,7 +214,7 @@ def _told(obstacles, obstacle):
     return POLYGON, polygon, obstacles.polygon_top_m[polygon]
 
 
-@borrowing()
+@kernel()
 def _gap_m(kind, which, x, y, robot, half_size_m, obstacles):
     circle, side_start, side = obstacles.circle, obstacles.side_start, obstacles.side
     return gap_to_fixed(kind, which, x, y, robot.radius_m, half_size_m, circle, side_start, side)[0]

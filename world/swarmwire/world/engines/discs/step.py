@@ -8,14 +8,14 @@ to the last bit or two: S. Moshier, Cephes mathematical library (1984-2000), sin
 
 import numpy as np
 
-from swarmwire.comms.kernels import borrowing
+from swarmwire.comms.kernels import kernel
 from swarmwire.world.engines.discs.contacts import LOOK_AHEAD, ROBOT, begin_tick, find_contacts, note_touches
 
 QUARTERS_PER_RAD = 2.0 / np.pi
 QUARTER_HIGH, QUARTER_LOW = 1.5707963267341256, 6.077100506506192e-11  # pi / 2; the first has 33 bits
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def sine_cosine(angle_rad):
     """The sine and the cosine of an angle up to some 1e6 rad, within 2e-16."""
     quarters = np.floor(angle_rad * QUARTERS_PER_RAD + 0.5)
@@ -51,7 +51,7 @@ def sine_cosine(angle_rad):
     return (-sine, -cosine) if quarter & 2 else (sine, cosine)
 
 
-@borrowing()
+@kernel()
 def _polynomial(z, a, b, c, d, e, f):
     return a + z * (b + z * (c + z * (d + z * (e + z * f))))
 
@@ -63,7 +63,7 @@ def _polynomial(z, a, b, c, d, e, f):
 # a turning robot is made of chords of its arc.
 
 
-@borrowing()
+@kernel()
 def drive(robot, now, target, braked, dt_s):
     """Let the motors of a robot push its velocity towards its target for a step.
 
@@ -93,7 +93,7 @@ def drive(robot, now, target, braked, dt_s):
     now[4] += dy
 
 
-@borrowing()
+@kernel()
 def look_along(robot, now, dt_s):
     """Set `cos` and `sin` of a robot to those of its heading in the middle of the step to come."""
     middle = now[2] + 0.5 * dt_s * now[5]
@@ -102,7 +102,7 @@ def look_along(robot, now, dt_s):
         robot.sin, robot.cos = sine_cosine(middle)
 
 
-@borrowing()
+@kernel()
 def move(robot, now, travel_m, dt_s):
     """Move state (6,) by one step of its velocity and add to travel (2,) what its wheels roll."""
     if now[5] != robot.unhindered_radps:
@@ -116,7 +116,7 @@ def move(robot, now, travel_m, dt_s):
     now[2] += dt_s * now[5]
 
 
-@borrowing()
+@kernel()
 def follow_targets(rows, steps, dt_s, robots, state, target, braked, travel_m):
     """Move robots that nothing is near by some steps, one robot after the other."""
     for row in rows:
@@ -146,7 +146,7 @@ SEPARATIONS = 20
 STILL_M = 1e-7  # an overlap below is left
 
 
-@borrowing()
+@kernel()
 def solve(contacts, met, robots, state):
     """Change the velocities in `state` (rows, 6) so that contacts neither close faster than allowed nor slide.
 
@@ -178,7 +178,7 @@ def solve(contacts, met, robots, state):
             break
 
 
-@borrowing()
+@kernel()
 def _impulses(contact, excess_mps, sliding_mps):
     """What to add to a contact's impulses along the normal and along the tangent."""
     push, rub = contact.push_ns, contact.rub_ns
@@ -190,7 +190,7 @@ def _impulses(contact, excess_mps, sliding_mps):
     return push - contact.push_ns, min(max(rub, -most), most) - contact.rub_ns
 
 
-@borrowing()
+@kernel()
 def _kick(contact, robots, state, push, rub):
     """Give impulses to both sides of a contact; the tangent is the normal turned left."""
     px, py = push * contact.nx - rub * contact.ny, push * contact.ny + rub * contact.nx
@@ -199,14 +199,14 @@ def _kick(contact, robots, state, push, rub):
         _change(robots[contact.which], state[contact.which], px, py, -rub)
 
 
-@borrowing()
+@kernel()
 def _change(robot, now, px, py, rub):
     now[3] += px * robot.per_kg
     now[4] += py * robot.per_kg
     now[5] += rub * robot.radius_m * robot.per_kgm2
 
 
-@borrowing()
+@kernel()
 def separate(contacts, met, robots, state, dt_s):
     """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows; velocities stay.
 
@@ -237,14 +237,14 @@ def separate(contacts, met, robots, state, dt_s):
                 _shift(robots, state, contacts[k].which)
 
 
-@borrowing()
+@kernel()
 def _part(robot, contact, overlap_m):
     share_m = overlap_m * contact.mass_kg * robot.per_kg
     robot.shift_x_m += share_m * contact.nx
     robot.shift_y_m += share_m * contact.ny
 
 
-@borrowing()
+@kernel()
 def _shift(robots, state, row):
     state[row, 0] += robots[row].shift_x_m
     state[row, 1] += robots[row].shift_y_m
@@ -254,13 +254,13 @@ def _shift(robots, state, row):
 # --- All steps of a tick, for the robots of all arenas. Compiled.
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def needed_margin_m(fastest_mps, widest_m, dt_s, steps):
     """How far robots may get in so many steps, and look ahead after them."""
     return (steps + 1) * dt_s * fastest_mps + LOOK_AHEAD * widest_m
 
 
-@borrowing(from_python=True)
+@kernel(from_python=True)
 def advance(
     step, steps, dt_s, margin_m, widest_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
     contacts, met, crowd, loners, circle, side_start, side, onsets,
@@ -296,7 +296,7 @@ def advance(
     return step, fastest_mps
 
 
-@borrowing()
+@kernel()
 def _fastest_mps(target):
     fastest2 = 0.0
     for row in range(len(target)):
@@ -304,7 +304,7 @@ def _fastest_mps(target):
     return np.sqrt(fastest2)
 
 
-@borrowing()
+@kernel()
 def _spread(rows, robots, state, far_m, fastest_mps):
     """The greatest distance of these rows from where they were listed, and their greatest speed; no less than given."""
     far2, fastest2 = far_m * far_m, fastest_mps * fastest_mps

@@ -9,7 +9,7 @@ from typing import cast
 
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, Request
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, PacketRequest
 
 MAX_HOSTS = 254  # of a network of the last byte
 WHERE = "gateway epuck2"
@@ -80,7 +80,7 @@ class EmulatedRobot:
         self._told, self._answer, self._counts = told, answer, counts
         self._served: Connection | None = None
         self._waiting: deque[Connection] = deque()
-        self._request: Request | None = None  # of the last command of the one that is served
+        self._request: PacketRequest | None = None  # of the last command of the one that is served
         self._alive = True
 
     def knock(self, connection: Connection) -> None:
@@ -148,7 +148,7 @@ class EmulatedRobot:
             self._served, self._request = self._waiting.popleft(), None
             self._served.transport.resume_reading()
 
-    def _reply(self, connection: Connection, request: Request) -> None:
+    def _reply(self, connection: Connection, request: PacketRequest) -> None:
         if connection.transport.is_closing():  # asyncio would complain of each answer
             self._counts["left_unanswered"] += not connection.unanswered
             connection.unanswered = True
@@ -159,10 +159,10 @@ class EmulatedRobot:
             connection.transport.abort()
             return
         image = b""
-        if request & Request.IMAGE:
+        if request & PacketRequest.IMAGE:
             self._counts["images_without_camera"] += 1
             image = _BLACK_IMAGE
-        told = self._answer() if request & Request.SENSORS else b"" if request else _EMPTY
+        told = self._answer() if request & PacketRequest.SENSORS else b"" if request else _EMPTY
         connection.transport.write(image + told)  # at once: it could be gone after the first half
 
 

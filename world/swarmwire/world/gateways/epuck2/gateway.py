@@ -11,13 +11,13 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.ranging_specs import Light, Proximity
+from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
-from swarmwire.world.gateways.epuck2.packets import Received, SensorPackets
+from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets
 from swarmwire.world.gateways.gateway import Commands, Gateway
 
 
@@ -60,13 +60,13 @@ def _looking(body: Body, model: Body) -> list[str]:
     return [
         f"its {name} looks to {_angles(its)}, not {_angles(usual)}"
         for name, its, usual in pairs
-        if isinstance(its, Proximity | Light)
-        and isinstance(usual, Proximity | Light)
+        if isinstance(its, ProximitySpec | LightSpec)
+        and isinstance(usual, ProximitySpec | LightSpec)
         and its.angles_deg != usual.angles_deg
     ]
 
 
-def _angles(spec: Proximity | Light) -> str:
+def _angles(spec: ProximitySpec | LightSpec) -> str:
     return f"{', '.join(f'{angle:g}' for angle in spec.angles_deg[:SHOWN])}, ... deg"
 
 
@@ -104,7 +104,7 @@ class Epuck2Gateway(Gateway):
         self._options: Epuck2GatewayOptions = options
         self._addresses = addresses_of(address, len(self.names))
         self._counts: Counter[str] = Counter()
-        self._received = Received(len(self.names), body, self._counts)
+        self._received = ReceivedCommands(len(self.names), body, self._counts)
         self._packets = SensorPackets(body, len(self.names), options.compass)
         self._answers = self._packets.answers()
         self._alive = np.ones(len(self.names), bool)

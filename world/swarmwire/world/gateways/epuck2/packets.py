@@ -10,13 +10,13 @@ from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
 from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP, RobotCommand, body_speeds
-from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, Settings
+from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
 from swarmwire.comms.tick_io import LedChanges
 from swarmwire.world.gateways.gateway import Commands
 
 
-class Received:
+class ReceivedCommands:
     """The newest speeds of each robot, its LEDs, and its step counters; any thread may add to them."""
 
     def __init__(self, robots: int, body: Body, counts: Counter[str]) -> None:
@@ -30,9 +30,9 @@ class Received:
     def add(self, robot: int, command: RobotCommand) -> None:
         """Keep what a robot is told."""
         with self._lock:
-            if command.settings & Settings.AVOID:
+            if command.settings & RobotSettingsBits.AVOID:
                 self._counts["avoidance_refused"] += 1  # it goes as it is told
-            if command.settings & Settings.SET_STEPS:
+            if command.settings & RobotSettingsBits.SET_STEPS:
                 self._counters[robot] = command.left, command.right
             else:
                 if max(abs(command.left), abs(command.right)) > FASTEST:

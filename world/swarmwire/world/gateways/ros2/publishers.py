@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.ranging_specs import Scan
+from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
@@ -98,7 +98,7 @@ class ScanTeller(Teller):
     reads = ("scan.range_m",)
     topic = "scan"
 
-    def __init__(self, spec: Scan) -> None:
+    def __init__(self, spec: ScanSpec) -> None:
         self._spec, self.rate_hz = spec, spec.rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
