@@ -40,7 +40,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "view-cost": partial(view_cost, robots=1000, ticks=600, neighbours=0.0),
     "view-cost-radio": partial(view_cost, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(AIRS, air_cost),
-    "air-scaling": air_scaling,
+    "radio-scaling": air_scaling,
     "campaign-1000x10": campaign,
     "processes-100": partial(processes, robots=100, ticks=300, agent=FLOCKING),
     "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),

@@ -45,11 +45,11 @@ class Case:
 
 CASES = {
     # Shadowing brings more into range than path loss alone would: 25 by path loss are 30 on average, border included.
-    "air-802154-1000": Case("ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED)),
-    "air-disk-1000": Case("unit-disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
-    "air-wifi-80": Case("wifi-a-6M", 80, 600, 128),
+    "radio-802154-1000": Case("ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED)),
+    "radio-disk-1000": Case("unit-disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
+    "radio-wifi-80": Case("wifi-a-6M", 80, 600, 128),
 }
-SCALING = CASES["air-802154-1000"]
+SCALING = CASES["radio-802154-1000"]
 SIZES = (100, 1000, 10_000)
 
 

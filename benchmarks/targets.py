@@ -49,12 +49,12 @@ TARGETS = {
     "view-cost-radio-size": most(60, "`run.rrd` of that run"),
     "metrics-share": most(20, "what the metrics of every run cost of `inprocess-1000-d1`"),
     "metrics-share-radio": most(20, "the same, of `inprocess-1000-d1-radio`"),
-    "air-802154-1000": Target(
+    "radio-802154-1000": Target(
         20, "1,000 robots, 20 bytes, 29 in range, 802.15.4: shadowing, fading, CSMA, SINR to 10 dB below noise"
     ),
-    "air-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
-    "air-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
-    "air-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
+    "radio-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
+    "radio-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
+    "radio-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
     "campaign-1000x10": most(
         25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),

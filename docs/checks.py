@@ -68,7 +68,7 @@ def code_blocks() -> Problems:
 def behaviour_pages() -> Problems:
     """Each behaviour has a page with its pictures, a scenario and a campaign; its numbers are those of its data."""
     places = of_behaviours.HERE
-    classes = {getattr(behaviours, name).__module__.rpartition(".")[2]: name for name in behaviours.__all__}
+    classes = {re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): name for name in behaviours.__all__}
     stems = [
         sorted(file.stem for file in places.pages.glob("*.md")),
         sorted(file.stem for file in places.data.iterdir()),
