@@ -82,9 +82,9 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
     commands: list[list[float]] = []
     messages = b""
     for group in assignment["groups"]:
-        of = f"sense/{group['name']}"
+        of = f"readings/{group['name']}"
         if f"{of}/rows" in arrays:  # else the group does not act in this tick
-            angles = [math.radians(angle) for angle in group["body"]["senses"]["proximity"]["angles_deg"]]
+            angles = [math.radians(angle) for angle in group["body"]["sensors"]["proximity"]["angles_deg"]]
             headings, values = unpacked(arrays[f"{of}/compass.heading_rad"]), unpacked(arrays[f"{of}/proximity.value"])
             for at, row in enumerate(unpacked(arrays[f"{of}/rows"])):
                 rays = values[at * len(angles) : (at + 1) * len(angles)]

@@ -1,5 +1,6 @@
 """The scenario that a behaviour's page names runs, and the figure of a campaign is drawn from its sweep."""
 
+import re
 import tomllib
 from dataclasses import replace
 from typing import Any
@@ -17,7 +18,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.campaign.sweeping import Means
 
 CLASSES: dict[str, Any] = {
-    getattr(behaviours, name).__module__.rpartition(".")[2]: getattr(behaviours, name) for name in behaviours.__all__
+    re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): getattr(behaviours, name) for name in behaviours.__all__
 }
 OF_EACH = pytest.mark.parametrize("name", CLASSES)
 

@@ -90,7 +90,7 @@ def test_the_events_have_a_section_each(site):
 
 
 def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
-    named = code(site, "senses")
+    named = code(site, "sensors")
     kinds = [kind for kind in vars(readings).values() if isinstance(kind, type) and is_dataclass(kind)]
     read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"sheet", "vector_sum", "of"} <= named
@@ -125,7 +125,7 @@ def test_the_summary_page_names_every_metric_fate_and_key(site):
 def test_every_behaviour_has_a_page_that_names_its_parameters(site):
     for name in behaviours.__all__:
         kind = getattr(behaviours, name)
-        own = kind.__module__.rpartition(".")[2]
+        own = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
         assert f'href="behaviours/{own}.html"' in page(site, "behaviours")
         named = code(site, f"behaviours/{own}")
         assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named

@@ -1,5 +1,6 @@
 """The behaviours that come with swarmwire: a table of all, and what each does, needs and takes."""
 
+import re
 import tomllib
 from inspect import cleandoc
 from pathlib import Path
@@ -47,8 +48,8 @@ def behaviour_details(name: str) -> str:
 
 
 def page_of(kind: type[Any]) -> str:
-    """The name of a behaviour's page, and of its scenario: that of its module."""
-    return kind.__module__.rpartition(".")[2]
+    """The name of a behaviour's page, and of its scenario: PsoSearch's is pso_search."""
+    return re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
 
 
 def _by_radio(kind: type[Any]) -> bool:

@@ -20,7 +20,7 @@ from tests.support.metrics.capture.reading import Capture, read
 
 SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
 SHORT = ["duration_s=0.5", "robots.flock.count=6"]
-MEASURES = "gives={range={},bearing={}}"
+MEASURES = "measures={range={},bearing={}}"
 HEADERS = {"ieee802154": (283, 36 + 9), "wifi-b-1M": (127, 15 + 24 + 8 + 28), "argos-rab": (147, 20)}
 
 

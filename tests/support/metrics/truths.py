@@ -56,7 +56,7 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
         "state": np.zeros(rows, np.int64),
         "states": ("",),
         "leds": np.zeros((rows, of.most_leds), np.int64),
-        "senses": {},
+        "readings": {},
         "contact_onsets": np.zeros((of.arenas, 2), np.int64),
         "edges": None,
         "tally": None,

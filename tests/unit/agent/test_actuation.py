@@ -101,7 +101,7 @@ def test_what_a_body_cannot_do_is_said_clearly(kind: type[Any], fault: str) -> N
 
 def test_a_body_without_leds_says_so() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
-    with pytest.raises(AgentFailed, match="NotFitted: the body epuck has no LEDs"):
+    with pytest.raises(AgentFailed, match="IncompatibleBody: the body epuck has no LEDs"):
         agent_group(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
             (0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES)
         )

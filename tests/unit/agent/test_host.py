@@ -48,7 +48,7 @@ READS = {
 }
 
 
-@pytest.mark.parametrize("sense", sorted(READS))
+@pytest.mark.parametrize("sensor", sorted(READS))
 def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
     class Reads(Agent):
         needs = tuple(READS.keys() - {sensor})

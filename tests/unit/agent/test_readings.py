@@ -132,7 +132,7 @@ def test_one_robot_and_many_read_the_same() -> None:
     assert_rows_independent(VectorMoth, Trial(body="epuck-gps"))
 
 
-@pytest.mark.parametrize("sense", ["light", "bumper", "positioning"])
+@pytest.mark.parametrize("sensor", ["light", "bumper", "positioning"])
 def test_a_sense_that_is_not_declared_is_refused(sensor: str) -> None:
     class Peeks(VectorAgent):
         def step(self, robots, state) -> None:
@@ -145,8 +145,8 @@ def test_a_sense_that_is_not_declared_is_refused(sensor: str) -> None:
 EPUCK = load_body("epuck")
 BODY = replace(
     EPUCK,
-    readings={
-        **EPUCK.readings,
+    sensors={
+        **EPUCK.sensors,
         "gas": CustomSensorSpec(kind="a:B", params={}, fields={"level": 0, "cells": 3}),
         "imu": ImuSpec(),
         "battery": BatterySpec(capacity_wh=1.0),
@@ -195,7 +195,7 @@ def test_one_robot_and_many_do_the_same() -> None:
     [
         (lambda robots: robots.sensor("gas").colour, "the sense gas has the fields level, cells, not colour"),
         (lambda robots: robots.sensor("compass"), "NotDeclared"),
-        (lambda robots: robots.actuate("leg", 1.0), "NotFitted.* no actuator 'leg' of its own: it has horn, arm"),
+        (lambda robots: robots.actuate("leg", 1.0), "IncompatibleBody.* no actuator 'leg' of its own: it has horn, arm"),
         (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.nan), "expected finite numbers, got nan"),

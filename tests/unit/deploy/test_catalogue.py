@@ -46,7 +46,7 @@ HELD = {
     "stages": [kind.name for kind in ORDER],
     "fates": [*FATE_NAMES],
 }
-REGISTRIES = {"drive": DRIVES, "sense": SENSOR_SPECS, "event": EVENTS, "metric": METRICS}
+REGISTRIES = {"drive": DRIVES, "sensor": SENSOR_SPECS, "event": EVENTS, "metric": METRICS}
 CLASSES: dict[str, Any] = {
     "radio": Radio,
     "leds": Leds,
@@ -146,7 +146,7 @@ def test_a_body_tells_the_figures_of_its_sheet(name):
     assert all(part in text for part in (body.source, f"{body.radius_m}", f"{body.max_linear_mps:.4g} m/s"))
     for title, sheet in [
         ("drive", body.drive),
-        *((f"sense: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
+        *((f"sensor: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
     ]:
         plain = [of for of in fields(sheet) if not is_dataclass(getattr(sheet, of.name))]
         figures = [(of.name, bounds_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
@@ -241,7 +241,7 @@ def test_a_body_and_an_agent_of_ones_own_are_described_as_those_that_come_along(
         text, [("turn_radps", "rad/s", "0.5", "how fast: # in all"), ("name", "required"), ("needs", "compass")]
     )
     text = printed(find(str(ROOT / "examples" / "gas" / "sniffer.toml")))
-    gas, sealer = (text[text.index(f"\n{title}") :] for title in ("sense: gas", "actuator: sealer"))
+    gas, sealer = (text[text.index(f"\n{title}") :] for title in ("sensor: gas", "actuator: sealer"))
     assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])
     assert_tells(sealer, [("kind", "gas.py:Sealer"), ("arm_m", "m", "0.3")])
 

@@ -11,13 +11,13 @@ from swarmwire.deploy.certificates.certificate_folder import begin_authority
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.commands import LOSSY, called
 
-DO = "blackout, fail, gain, jammer, kill, partition, push, ramp, revive"
+DO = "blackout, fail, gain, impulse, jammer, kill, partition, ramp, revive"
 PRESETS = (
-    "ideal, disk, bernoulli, gilbert, argos-rab, infrared-epuck, ieee802154, wifi-b-1M, wifi-a-6M, ble-1M, "
+    "ideal, unit-disk, bernoulli, gilbert, argos-rab, infrared-epuck, ieee802154, wifi-b-1M, wifi-a-6M, ble-1M, "
     "gz-rfcomms, subt, kilobot, acoustic"
 )
 KINDS = (
-    "bodies, drives, sheets, senses, behaviours, events, metrics, radio, presets, stages, fates, engines, drivers, "
+    "bodies, drives, body-keys, sensors, behaviours, events, metrics, radio, presets, stages, fates, engines, drivers, "
     "gateways, keys"
 )
 PARAMETERS = "speed_mps, separation_m, cohesion, alignment, avoidance, forward, turn_gain_per_s"
@@ -25,11 +25,11 @@ OF_SETTINGS = [
     ("seed", "expected path=value, such as robots.flock.count=30"),
     ("name.x=1", "name.x: name holds no keys"),
     ("duration_s=inf", "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
-    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m), as the model disk has one"),
+    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m), as the model unit disk has one"),
     ("radio.preset='wifi'", f"radio.preset: expected one of {PRESETS} (did you mean wifi-b-1M?), got 'wifi'"),
     (
         "robots.flock.cuont=3",
-        "robots.flock.cuont: unknown key; expected one of body, sheet, count, agent, act_every_ticks, params, radio, "
+        "robots.flock.cuont: unknown key; expected one of body, body_overrides, count, agent, act_every_ticks, params, radio, "
         "place (did you mean count?)",
     ),
     ("events=[{at_s=1}]", f"events.0.do: is missing; expected one of {DO}"),

@@ -11,7 +11,7 @@ SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_flock_runs_over_every_preset(preset: str):
-    radio = f'radio={{preset="{preset}",gives={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
+    radio = f'radio={{preset="{preset}",measures={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
     result = run(SCENARIO, overrides=["duration_s=1", "robots.flock.count=5", radio])
     assert result.radio is not None
     assert result.radio.sent > 40

@@ -180,7 +180,7 @@ FLAGS = (
     Flag("--driver", "driver.name", "how the robot is reached: see `swarmwire-agent drivers`", "NAME", "text"),
     Flag("--address", "driver.address", "where the robot is reached, as its driver says", "ADDRESS", "text"),
     Flag("--option", "driver", "an option of the driver", "K=V", "pairs"),
-    Flag("--radio", "radio.kind", "zenoh: the robots' own network; air: that of a world; none", "KIND", "text"),
+    Flag("--radio", "radio.kind", "zenoh: the robots' own network; world: that of a world; none", "KIND", "text"),
     Flag("--max-payload-bytes", "radio.max_payload_bytes", "largest message, tag included", "N"),
     Flag("--name", "name", "this robot", "NAME", "text"),
     Flag("--swarm", "swarm", "the swarm", "NAME", "text"),

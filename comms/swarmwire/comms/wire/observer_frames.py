@@ -165,9 +165,9 @@ def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
         "values": glimpse.values,
     }
     for name, group in truth.readings.items():
-        arrays[f"sense/{name}/rows"] = group.rows
+        arrays[f"readings/{name}/rows"] = group.rows
         for sensor, column in group.fields.items():
-            arrays[f"sense/{name}/{sensor}"] = column
+            arrays[f"readings/{name}/{sensor}"] = column
     if truth.movable is not None:
         arrays["movable"] = truth.movable.reshape(len(truth.movable), -1)
     if truth.edges is not None:
@@ -297,17 +297,17 @@ def _readings(frame: Frame, static: Static) -> Readings:
     """The senses of some robots; of which groups and in which shapes must agree, which senses is the bodies' affair."""
     found: dict[str, dict[str, AnyArray]] = {}
     for key in frame.arrays:
-        if key.startswith("sense/"):
+        if key.startswith("readings/"):
             _, name, sensor = (*key.split("/", 2), "")[:3]
             found.setdefault(name, {})[sensor] = frame.arrays[key]
     if not found.keys() <= {group.name for group in static.groups}:
         raise BadFrame("malformed", "sense: expected groups of this run")
     readings: Readings = {}
     for name, columns in found.items():
-        rows = checked_array(frame, f"sense/{name}/rows", "<i8", (None,))
-        _within(f"sense/{name}/rows", rows, static.arenas * static.robots)
+        rows = checked_array(frame, f"readings/{name}/rows", "<i8", (None,))
+        _within(f"readings/{name}/rows", rows, static.arenas * static.robots)
         del columns["rows"]
         if any(column.dtype != np.float64 or len(column) != len(rows) for column in columns.values()):
-            raise BadFrame("malformed", f"sense/{name}: expected a row of numbers for each robot")
+            raise BadFrame("malformed", f"readings/{name}: expected a row of numbers for each robot")
         readings[name] = GroupReadings(rows, columns)
     return readings

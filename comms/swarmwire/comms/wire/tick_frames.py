@@ -44,9 +44,9 @@ def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_sta
     """A `tick` frame: what a runner's robots sense and received, and what became of packets that they sent."""
     arrays: dict[str, AnyArray] = {}
     for name, group in readings.items():
-        arrays[f"sense/{name}/rows"] = group.rows
+        arrays[f"readings/{name}/rows"] = group.rows
         for sensor, column in group.fields.items():
-            arrays[f"sense/{name}/{sensor}"] = column
+            arrays[f"readings/{name}/{sensor}"] = column
     return frames.encode("tick", tick, arrays | told_arrays(received, tx_status))
 
 
@@ -75,7 +75,7 @@ def decode_tick(
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
         for key, array in frame.arrays.items():
-            if key.startswith("sense/"):
+            if key.startswith("readings/"):
                 _, name, sensor = key.split("/", 2)
                 groups.setdefault(name, {})[sensor] = array
         readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in groups.items()}
@@ -91,10 +91,10 @@ def check_rows(readings: Readings, received: ReceivedPackets, rows: Mapping[str,
     for name, group in readings.items():
         own, n = group.rows, len(group.rows)
         if own.ndim != 1 or own.dtype != np.int64 or np.count_nonzero(own[1:] <= own[:-1]) or not _own(own, rows[name]):
-            raise BadFrame("malformed", f"sense/{name}/rows: expected robots of this runner, rising")
+            raise BadFrame("malformed", f"readings/{name}/rows: expected robots of this runner, rising")
         for sensor, column in group.fields.items():
             if column.dtype != np.float64 or len(column) != n:
-                raise BadFrame("malformed", f"sense/{name}/{sensor}: expected numbers of {n} robots")
+                raise BadFrame("malformed", f"readings/{name}/{sensor}: expected numbers of {n} robots")
     if len(received):
         last = max(int(of[-1]) for of in rows.values() if len(of))
         if received.receiver[0] < 0 or received.receiver[-1] > last:

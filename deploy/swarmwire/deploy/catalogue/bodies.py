@@ -34,7 +34,7 @@ def _body(body: Body, named: str) -> Entry:
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     sensors = [
-        _custom_sensor(name, of) if isinstance(of, CustomSensorSpec) else _sheet(f"sense: {name}", type(of), asdict(of))
+        _custom_sensor(name, of) if isinstance(of, CustomSensorSpec) else _sheet(f"sensor: {name}", type(of), asdict(of))
         for name, of in body.sensors.items()
     ]
     actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]
@@ -64,7 +64,7 @@ def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTabl
 
 def _custom_sensor(name: str, sheet: CustomSensorSpec) -> ParameterTable:
     shared = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet))
-    return _own(f"sense: {name}, which reads {', '.join(sheet.fields)}", sheet.kind, made_sensor(sheet), shared)
+    return _own(f"sensor: {name}, which reads {', '.join(sheet.fields)}", sheet.kind, made_sensor(sheet), shared)
 
 
 def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:

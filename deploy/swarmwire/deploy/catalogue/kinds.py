@@ -30,10 +30,10 @@ class Kind:
 
 
 KINDS = (
-    Kind("bodies", "body", "kinds of robot: size, drive and senses", bodies),
-    Kind("drives", "drive", "what may move a body, with the keys of its sheet's table", drives),
-    Kind("sheets", "sheet", "keys of a body's data sheet; its drive and senses are kinds of their own", sheet_keys),
-    Kind("sensors", "sense", "what an agent may read of its robot and of packets, if its needs name it", sensors),
+    Kind("bodies", "body", "kinds of robot: size, drive and sensors", bodies),
+    Kind("drives", "drive", "what may move a body, with the keys of its table", drives),
+    Kind("body-keys", "body-key", "keys of a body's file; its drive and sensors are kinds of their own", sheet_keys),
+    Kind("sensors", "sensor", "what an agent may read of its robot and of packets, if its needs name it", sensors),
     Kind("behaviours", "behaviour", "agents that come with swarmwire, with their parameters", behaviours),
     Kind("events", "event", "what may happen to robots and radios on the way", events),
     Kind("metrics", "metric", "what can be measured of a run; the standard ones are in every run", metrics),

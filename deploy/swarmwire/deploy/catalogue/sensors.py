@@ -35,7 +35,7 @@ def _of_packets() -> Iterator[Entry]:
         kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
         (column,) = Measures(**{of.name: kind()}).columns
         told = first_line(getattr(Packet, column).__doc__)
-        yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] gives.{of.name}"))
+        yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] measures.{of.name}"))
 
 
 def _of_outcomes() -> Entry:
@@ -46,13 +46,13 @@ def _of_outcomes() -> Entry:
         ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
     )
     told = "The sender learns what became of a packet to one robot, as far as its own radio knows."
-    return Entry(kind="sense", name=OUTCOMES, help=told, facts=(*facts, *results))
+    return Entry(kind="sensor", name=OUTCOMES, help=told, facts=(*facts, *results))
 
 
 def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:
     parameters = parameters_of_dataclass(sheet)
     return Entry(
-        kind="sense",
+        kind="sensor",
         name=name,
         help=first_line(sheet.__doc__),
         facts=(("in an agent", f'needs = ("{name}", …)'), ("read as", read), where),

@@ -14,7 +14,7 @@ def sheet_keys() -> list[Entry]:
     keys = [key for key in parameters_of_dataclass(Body) if key.name.partition(".")[0] not in TABLES]
     places = [
         Entry(
-            kind="sheet",
+            kind="body-key",
             name=key.name,
             help=key.help,
             facts=(("in a body's sheet", f"{key.name}, before the first table"),),
@@ -23,7 +23,7 @@ def sheet_keys() -> list[Entry]:
         for key in keys
     ]
     leds = Entry(
-        kind="sheet",
+        kind="body-key",
         name="leds",
         help=first_line(Leds.__doc__),
         facts=(("in a body's sheet", "the table [leds]"),),

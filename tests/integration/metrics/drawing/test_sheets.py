@@ -66,7 +66,7 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
 
     readings = {"scan": {"rays": 1, "range_m": range_m}}
     axes = Figure().add_axes((0, 0, 1, 1))
-    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "senses": readings}, "a.toml"))
+    draw_from_above(axes, body_from({"like": "epuck", "name": "a", "sensors": readings}, "a.toml"))
     drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
     assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
     legend = axes.get_legend()
@@ -94,7 +94,7 @@ def test_each_fact_has_a_name_of_its_own():
 
 def test_own_senses_and_actuators_are_facts_by_their_class():
     sheet = {"like": "epuck", "name": "sealer", "actuators": {"sealer": {"kind": "gas.py:Sealer"}}}
-    sheet["senses"] = {"gas": {"kind": "gas.py:Sniffer"}}
+    sheet["sensors"] = {"gas": {"kind": "gas.py:Sniffer"}}
     facts = dict(facts_of(body_from(sheet, "sealer.toml")))
     assert [facts[name].split()[-1] for name in ("gas", "sealer")] == ["gas.py:Sniffer", "gas.py:Sealer"]
 

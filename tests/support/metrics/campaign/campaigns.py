@@ -116,7 +116,7 @@ def _about(
         "points": [dict(point) for point in points],
         "overrides": [],
         "duration_s": limit_s,
-        "tx_status": outcomes,
+        "outcomes": outcomes,
     }
 
 

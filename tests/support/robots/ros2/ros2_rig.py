@@ -54,7 +54,7 @@ class Ros2Rig(Rig):
 
     def made_body(self) -> Body:
         readings = {"scan": {"rate_hz": 0.0}, "light": {"angles_deg": [0, 180]}}
-        return body_from({"like": "turtlebot3-burger", "senses": readings}, "turtlebot.toml")
+        return body_from({"like": "turtlebot3-burger", "sensors": readings}, "turtlebot.toml")
 
     def made_gateway(self, address: str) -> Gateway:
         options = Ros2GatewayOptions(stamped=self.stamped, north_deg=30.0)

@@ -31,7 +31,7 @@ class ScriptedGateway(Gateway):
     """Robots at "scripted:1" and so on, which drive as `drive` says."""
 
     options: ClassVar[type] = ScriptedOptions
-    readings: ClassVar[frozenset[str]] = frozenset({"proximity", "odometry", "imu"})
+    sensors: ClassVar[frozenset[str]] = frozenset({"proximity", "odometry", "imu"})
     made: ClassVar[list["ScriptedGateway"]] = []
 
     def __init__(self, names, body, address, options, clock) -> None:

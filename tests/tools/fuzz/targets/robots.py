@@ -158,7 +158,7 @@ class Ros2Sensors(ByteTarget):
 
     def make_samples(self) -> list[Any]:
         self.messages = Messages("jazzy")
-        self.body = body_from({"like": "turtlebot3-burger", "senses": SENSORS}, "turtlebot.toml")
+        self.body = body_from({"like": "turtlebot3-burger", "sensors": SENSORS}, "turtlebot.toml")
         fields = {**AT_START, "proximity.value": np.zeros((1, 4))}
         samples: list[Ros2Message] = []
         for tick in range(3):

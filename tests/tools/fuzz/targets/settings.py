@@ -109,7 +109,7 @@ class Bodies(TomlTarget):
     """Body files of the package and of the scenarios; written again, they say the same."""
 
     name = "bodies"
-    inner = ("senses", "drive")
+    inner = ("sensors", "drive")
 
     def make_samples(self) -> Sequence[File]:
         shipped = sorted(Path(str(body_module.__file__)).parent.glob("*.toml"))

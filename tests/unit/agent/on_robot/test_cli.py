@@ -91,7 +91,7 @@ REFUSED = {
     "--address nowhere": "--address: expected the path of a file; got 'nowhere'",
     "--driver writen": "--driver: expected a driver: one of",
     "--driver lacking": "pip install 'written-driver[lacking]'",
-    "--radio smoke": "--radio: expected one of zenoh, air, none; got 'smoke'",
+    "--radio smoke": "--radio: expected one of zenoh, world, none; got 'smoke'",
     "--radio zenoh": "command line: --listen: expected --listen, --connect or --multicast: radio and tracker",
     "--radio zenoh --connect nowhere": 'expected endpoints such as "tls/10.0.0.5:7447", got "nowhere"',
     "--radio zenoh --listen tcp/0.0.0.0:0": "expected --ca, --certificate and --key, or --insecure",

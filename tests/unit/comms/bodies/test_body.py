@@ -242,7 +242,7 @@ def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> 
     spec = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
     drone = body_from(spec, "drone.toml")
     assert set(load_body("epuck").sensors) - set(drone.sensors) == {"odometry", "ground"}
-    with pytest.raises(BadInput, match=r"drone\.toml: senses\.ground: expected altitude_m = 0"):
+    with pytest.raises(BadInput, match=r"drone\.toml: sensors\.ground: expected altitude_m = 0"):
         body_from({**spec, "sensors": {"ground": {"noise": 0.1}}}, "drone.toml")
 
 

@@ -127,5 +127,5 @@ def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
 
 
 def test_a_disk_without_a_range_is_refused():
-    with pytest.raises(ValueError, match="range_m: expected a range, as a disk has one"):
+    with pytest.raises(ValueError, match="range_m: expected a range, as a unit disk has one"):
         make_medium(Radio(None), 2)

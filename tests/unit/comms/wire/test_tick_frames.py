@@ -188,7 +188,7 @@ def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measure
 )
 def test_tx_status_that_are_none_are_refused(wrong: Any) -> None:
     frame = telling(NO_TX_STATUSES)
-    with pytest.raises(BadFrame, match="from 0 to 4$|outcomes: expected <i8") as caught:
+    with pytest.raises(BadFrame, match="from 0 to 4$|tx_status: expected <i8") as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, "tx_status": wrong}), (), {"flock"})
     assert caught.value.fault == "malformed"
 

@@ -214,9 +214,9 @@ def one_finished(**given: int) -> ReceptionRecords:
         ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
         ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
         ("events", {"events": (EventRecord(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
-        ("groups of this run", {"senses": {"c": GroupReadings(np.zeros(1, np.int64), {})}}),
-        ("sense/a/rows", {"senses": {"a": GroupReadings(np.array([ROWS]), {"x": np.zeros(1)})}}),
-        ("sense/a", {"senses": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
+        ("groups of this run", {"readings": {"c": GroupReadings(np.zeros(1, np.int64), {})}}),
+        ("readings/a/rows", {"readings": {"a": GroupReadings(np.array([ROWS]), {"x": np.zeros(1)})}}),
+        ("readings/a", {"readings": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
     ],
 )
 def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):

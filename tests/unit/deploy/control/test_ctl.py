@@ -81,7 +81,7 @@ def test_an_event_is_any_table_of_a_scenario(going_run):
 
 
 @pytest.mark.parametrize(
-    "command", ["status", "pause", "step", "speed", "kill", "push", "partition", "jam", "set", "event"]
+    "command", ["status", "pause", "step", "speed", "kill", "impulse", "partition", "jam", "set", "event"]
 )
 def test_the_help_of_each_command_has_an_example(command):
     assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl 3f2a", "swarmwire ctl")

@@ -119,7 +119,7 @@ def test_a_run_is_stopped_with_its_summary(tmp_path):
     assert (simulation.result.ended, simulation.result.ticks) == ("interrupted", 2)
 
 
-SIGNALS = ["radio={preset='ieee802154', gives={range={}, bearing={}}}", SHORT]
+SIGNALS = ["radio={preset='ieee802154', measures={range={}, bearing={}}}", SHORT]
 
 
 def test_a_jammer_put_up_and_taken_down_is_repeated(tmp_path):

@@ -103,7 +103,7 @@ def test_an_agent_that_senses_nothing_has_no_rays(tmp_path):
 
 
 def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
-    blind = replace(EPUCK, readings={})
+    blind = replace(EPUCK, sensors={})
     of = static(4)
     mixed = replace(of, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
     assert selected_robot(mixed, None, "here") == "flock-2"

@@ -35,7 +35,7 @@ def test_a_class_that_bodies_name_is_listed_once(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sheet", "said"),
+    ("spec", "said"),
     [(None, "swarm.toml: robots.flock.body: expected a readable file"), ("mass_kg =", "mine.toml: expected TOML")],
 )
 def test_a_sheet_that_cannot_be_read_is_named_by_whoever_names_it(tmp_path, spec, said):
@@ -59,7 +59,7 @@ def bodies(tmp_path: Path, body: str, spec: dict[str, object]):
 @pytest.mark.parametrize("body", ["epuck", "mine.toml"])
 def test_a_scenario_changes_a_body_for_one_group(tmp_path, body):
     (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 1.0\n')
-    found = bodies(tmp_path, body, {"senses": {"proximity": {"drop_out": 0.5}}})
+    found = bodies(tmp_path, body, {"sensors": {"proximity": {"drop_out": 0.5}}})
     worn, new = found["worn"], found["new"]
     assert new.proximity is not None
     assert worn.proximity == replace(new.proximity, drop_out=0.5)
@@ -68,11 +68,11 @@ def test_a_scenario_changes_a_body_for_one_group(tmp_path, body):
 
 
 @pytest.mark.parametrize(
-    ("sheet", "key"),
+    ("spec", "key"),
     [
-        ({"senses": {"proximity": {"drop_out": 2}}}, "robots.worn.body_overrides.sensors.proximity.drop_out"),
+        ({"sensors": {"proximity": {"drop_out": 2}}}, "robots.worn.body_overrides.sensors.proximity.drop_out"),
         ({"weight_kg": 1.0}, "robots.worn.body_overrides.weight_kg"),
-        ({"senses": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}, "robots.worn.body_overrides"),
+        ({"sensors": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}, "robots.worn.body_overrides"),
     ],
 )
 def test_what_a_scenario_may_not_change_is_named(tmp_path, spec, key):
@@ -85,9 +85,9 @@ def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_
     point = EntryPoint("painted", "tests.support.world.custom_code:Paint", "swarmwire.sensors")
     monkeypatch.setattr(loading, "entry_points_of", lambda _: [point])
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsenses.paint.kind = "painted"\n')
-    worn = bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 2}}})["worn"]
+    worn = bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 2}}})["worn"]
     assert custom_code_of([worn]) == ("tests.support.world.custom_code:Paint",)
     with pytest.raises(BadInput, match="at least 1") as caught:
-        bodies(tmp_path, "mine.toml", {"senses": {"paint": {"cells": 0}}})
+        bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 0}}})
     assert caught.value.key == "robots.worn.body_overrides.sensors.paint.cells"
     assert caught.value.where == str(tmp_path / "swarm.toml")

@@ -22,14 +22,14 @@ HOLONOMIC = body_from(
         "like": "epuck",
         "drive": {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, "max_force_n": 1.0}
         | {"max_torque_nm": 1.0},
-        "senses": {"battery": {"capacity_wh": 0.01, "drive_w_per_mps": 20.0}},
+        "sensors": {"battery": {"capacity_wh": 0.01, "drive_w_per_mps": 20.0}},
     },
     "holonomic.toml",
 )
 
 
 def with_battery(spec: BatterySpec) -> Body:
-    return replace(EPUCK, readings={**EPUCK.readings, "battery": spec})
+    return replace(EPUCK, sensors={**EPUCK.sensors, "battery": spec})
 
 
 def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
@@ -127,6 +127,6 @@ def test_the_gauge_tells_charge_and_a_voltage_that_falls_with_it() -> None:
     ],
 )
 def test_a_negative_battery_is_refused(key: str, value: float, expected: str) -> None:
-    spec = {"like": "epuck", "senses": {"battery": {"capacity_wh": 1.0, key: value}}}
+    spec = {"like": "epuck", "sensors": {"battery": {"capacity_wh": 1.0, key: value}}}
     with pytest.raises(BadInput, match=rf"mine.toml: sensors.battery.{key}: {expected}"):
         body_from(spec, "mine.toml")

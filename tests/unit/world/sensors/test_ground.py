@@ -63,4 +63,4 @@ def test_noise_is_uniform_keyed_and_clipped() -> None:
 )
 def test_points_that_are_not_under_the_body_are_refused(points: Any, text: str) -> None:
     with pytest.raises(BadInput, match=f"^mine.toml: sensors.ground.{text}"):
-        body_from({"like": "epuck", "senses": {"ground": {"points_m": points}}}, "mine.toml")
+        body_from({"like": "epuck", "sensors": {"ground": {"points_m": points}}}, "mine.toml")

@@ -74,4 +74,4 @@ def test_a_lost_ray_reads_as_if_nothing_were_there() -> None:
 def test_a_scanner_that_cannot_be_is_refused(change: dict[str, Any], text: str) -> None:
     table = {"rays": 360, "range_m": 3.5, **change}
     with pytest.raises(BadInput, match=f"^mine.toml: {text}"):
-        body_from({"like": "footbot", "senses": {"scan": table}}, "mine.toml")
+        body_from({"like": "footbot", "sensors": {"scan": table}}, "mine.toml")

@@ -244,7 +244,7 @@ def test_odometry_is_the_same_however_often_an_agent_looks() -> None:
 
 
 def test_the_sheets_of_the_bodies_have_a_sensor_each() -> None:
-    assert EPUCK.readings.keys() == FOOTBOT.readings.keys() == {*SENSORS, "ground", "camera"}
+    assert EPUCK.sensors.keys() == FOOTBOT.sensors.keys() == {*SENSORS, "ground", "camera"}
     assert isinstance(EPUCK.proximity, ProximitySpec)
 
 

@@ -21,7 +21,7 @@ HASHES = {
 PROPER = struct.pack("<qqB", 1, 2, 16) + bytes(16)
 SHEET = {
     "like": "turtlebot3-burger",
-    "senses": {
+    "sensors": {
         "proximity": {
             "angles_deg": [0, 90, 180, -90],
             "range_m": 0.4,

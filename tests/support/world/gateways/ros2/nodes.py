@@ -31,7 +31,7 @@ class DatedStillClock(StillClock):
 
 
 def turtlebot() -> Body:
-    return body_from({"like": "turtlebot3-burger", "senses": {"light": {"angles_deg": [0]}}}, "turtlebot.toml")
+    return body_from({"like": "turtlebot3-burger", "sensors": {"light": {"angles_deg": [0]}}}, "turtlebot.toml")
 
 
 def readings() -> dict[str, np.ndarray]:

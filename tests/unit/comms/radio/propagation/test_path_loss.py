@@ -215,5 +215,5 @@ def test_a_model_without_a_table_has_the_usual_one(radio: Radio, law: object):
 
 
 def test_a_disk_has_no_path_loss():
-    with pytest.raises(ValueError, match="model: a disk has no path loss"):
+    with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
         _ = Radio(2.0).loss_model

@@ -267,5 +267,5 @@ def test_without_a_torus_nothing_is_added() -> None:
 
 @pytest.mark.parametrize("radio", [Radio(model="friis"), Radio(range_m=1.0, bodies_block=True)])
 def test_what_no_torus_can_have_is_refused(radio: Radio) -> None:
-    with pytest.raises(ValueError, match="expected a disk without bodies_block on a torus"):
+    with pytest.raises(ValueError, match="expected a unit disk without bodies_block on a torus"):
         torus(radio, 2)

@@ -35,7 +35,7 @@ def test_a_push_is_a_velocity_that_motors_take_back(engine):
     assert np.allclose(seen[2].velocity[0], [0.0, 0.4, 0.0], atol=1e-12)
     assert not seen[2].velocity[1].any()
     [happened] = seen[2].events
-    assert (happened.do, happened.ended, happened.changed.tolist()) == ("push", False, [True, False])
+    assert (happened.do, happened.ended, happened.changed.tolist()) == ("impulse", False, [True, False])
     assert seen[-1].pose[0, 1] > 0.0005
     assert np.allclose(seen[-1].velocity, 0.0, atol=1e-9)
 
