@@ -195,7 +195,10 @@ def test_one_robot_and_many_do_the_same() -> None:
     [
         (lambda robots: robots.sensor("gas").colour, "the sense gas has the fields level, cells, not colour"),
         (lambda robots: robots.sensor("compass"), "NotDeclared"),
-        (lambda robots: robots.actuate("leg", 1.0), "IncompatibleBody.* no actuator 'leg' of its own: it has horn, arm"),
+        (
+            lambda robots: robots.actuate("leg", 1.0),
+            "IncompatibleBody.* no actuator 'leg' of its own: it has horn, arm",
+        ),
         (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.nan), "expected finite numbers, got nan"),

@@ -34,7 +34,9 @@ def _body(body: Body, named: str) -> Entry:
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     sensors = [
-        _custom_sensor(name, of) if isinstance(of, CustomSensorSpec) else _sheet(f"sensor: {name}", type(of), asdict(of))
+        _custom_sensor(name, of)
+        if isinstance(of, CustomSensorSpec)
+        else _sheet(f"sensor: {name}", type(of), asdict(of))
         for name, of in body.sensors.items()
     ]
     actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]

@@ -29,7 +29,7 @@ def test_a_sheet_may_start_from_a_body_that_comes_with_swarmwire(tmp_path):
 
 def test_a_class_that_bodies_name_is_listed_once(tmp_path):
     kind = "tests.support.world.custom_code:Alone"
-    (tmp_path / "mine.toml").write_text(f'like = "epuck"\nsenses.x.kind = "{kind}"\nsenses.y.kind = "{kind}"\n')
+    (tmp_path / "mine.toml").write_text(f'like = "epuck"\nsensors.x.kind = "{kind}"\nsensors.y.kind = "{kind}"\n')
     body = read_body(tmp_path / "mine.toml", "swarm.toml", "robots.flock.body")
     assert custom_code_of([load_body("epuck"), body, body]) == (kind,)
 
@@ -49,7 +49,7 @@ def test_a_sheet_that_cannot_be_read_is_named_by_whoever_names_it(tmp_path, spec
 def bodies(tmp_path: Path, body: str, spec: dict[str, object]):
     """The bodies of two groups, of which only the first has a `spec`."""
     group = {"body": body, "count": 1, "agent": "a:A"}
-    robots = {"worn": {**group, "sheet": spec}, "new": group}
+    robots = {"worn": {**group, "body_overrides": spec}, "new": group}
     arena = {"size_m": [2.0, 2.0]}
     mapping = {"format": 1, "name": "s", "duration_s": 1.0, "arena": arena, "robots": robots}
     where = str(tmp_path / "swarm.toml")
@@ -84,7 +84,7 @@ def test_what_a_scenario_may_not_change_is_named(tmp_path, spec, key):
 def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_names(tmp_path, monkeypatch):
     point = EntryPoint("painted", "tests.support.world.custom_code:Paint", "swarmwire.sensors")
     monkeypatch.setattr(loading, "entry_points_of", lambda _: [point])
-    (tmp_path / "mine.toml").write_text('like = "epuck"\nsenses.paint.kind = "painted"\n')
+    (tmp_path / "mine.toml").write_text('like = "epuck"\nsensors.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 2}}})["worn"]
     assert custom_code_of([worn]) == ("tests.support.world.custom_code:Paint",)
     with pytest.raises(BadInput, match="at least 1") as caught:
