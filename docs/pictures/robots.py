@@ -33,7 +33,7 @@ def draw(to: Path = TO) -> None:
         text(
             WIDTH / 2,
             WORLD_Y + 21,
-            "In a rehearsal, swarmwire run --gateway is robots, tracker and the radio's air; the agents are the same.",
+            "In a rehearsal, swarmwire run --gateway is robots, tracker and radio medium; the agents are the same.",
             anchor="middle",
         ),
     ]

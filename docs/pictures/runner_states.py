@@ -1,4 +1,4 @@
-"""Draws docs/runner-states.svg from the table of moves: how a runner comes, is asked, answers and goes."""
+"""Draws docs/runner-states.svg from the table of state transitions in `world.backends.allocation`."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Draws docs/stages.svg: one sense on its way from the truth to what an agent reads."""
+"""Draws docs/stages.svg: one sensor from the truth to its reading."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -46,20 +46,20 @@ def draw(to: Path = TO) -> None:
     """Write the figure."""
     figure, row = panels(len(SENSOR_SPECS), 2.1)
     at_s = TICK_S * np.arange(TICKS)
-    truth = told("as it is")
+    truth = readings_of("as it is")
     for i, (axes, title) in enumerate(zip(row, SENSOR_SPECS, strict=True)):
         axes.plot(at_s, truth, color=FAINT, lw=1.2)
-        axes.plot(at_s, told(title), ".", ms=2.6, color=line_color(i))
+        axes.plot(at_s, readings_of(title), ".", ms=2.6, color=line_color(i))
         axes.set_ylim(-0.05, 1.05)
         say(axes, title, "time in s", "reading" if i == 0 else "")
     save(figure, to)
 
 
-def told(name: str) -> FloatArray:
-    """What is read in each tick, nan where it is lost, (ticks,)."""
-    sheet, field = SENSOR_SPECS[name]
+def readings_of(name: str) -> FloatArray:
+    """The reading of each tick, NaN where it is lost, (ticks,)."""
+    spec, field = SENSOR_SPECS[name]
     keys = np.array([derive_key("figure of stages")], np.uint64)
-    sensor = Staged("wave", Wave(field), sheet, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
+    sensor = Staged("wave", Wave(field), spec, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
     return np.array([sensor.read(tick)["wave.value"][0] for tick in range(TICKS)])
 
 

@@ -1,4 +1,4 @@
-"""The steps of a tick, read from the source of the loop, so that what is drawn of it is what it does."""
+"""The steps of a tick, read from the source of the loop, so that the drawing cannot differ from the code."""
 
 import ast
 import inspect
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from swarmwire.world.loop import Loop
 
-LANES: tuple[str, ...] = ("events", "air", "world", "mailbox", "backend", "observer")
+LANES: tuple[str, ...] = ("events", "medium", "world", "mailbox", "backend", "observer")
 
 
 @dataclass(frozen=True)
 class Step:
-    """A call in a tick: whose method, and what it takes that others gave, as (name, lane that gave it)."""
+    """A call in a tick: the lane of its object, its method, and its arguments from other lanes as (name, lane)."""
 
     lane: str
     method: str
@@ -54,10 +54,10 @@ def _given(target: ast.expr, value: ast.expr, givers: dict[str, str]) -> dict[st
 def _own_method(value: ast.expr) -> Callable[..., object] | None:
     """The method of the loop that a value is a call of; None if it is none."""
     if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
-        whose = value.func.value
+        owner = value.func.value
         if (
-            isinstance(whose, ast.Name)
-            and whose.id == "self"
+            isinstance(owner, ast.Name)
+            and owner.id == "self"
             and inspect.isfunction(getattr(Loop, value.func.attr, None))
         ):
             return getattr(Loop, value.func.attr)
@@ -88,8 +88,8 @@ def _giver(value: ast.expr, givers: dict[str, str]) -> str:
 
 
 def _lane(node: ast.expr) -> str:
-    """Whose attribute `self.medium.x`, `self._events.x` or `world.x` is; empty where it is nobody's of the tick."""
+    """The lane that `self.medium.x`, `self._events.x` or `world.x` belongs to; empty if there is none."""
     if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Attribute | ast.Name):
         return ""
-    whose = node.value.attr if isinstance(node.value, ast.Attribute) else node.value.id
-    return whose.removeprefix("_") if whose.removeprefix("_") in LANES else ""
+    owner = node.value.attr if isinstance(node.value, ast.Attribute) else node.value.id
+    return owner.removeprefix("_") if owner.removeprefix("_") in LANES else ""
