@@ -1,4 +1,9 @@
-"""Parameters as frozen dataclasses whose fields carry unit, bounds and a line of help in their metadata."""
+"""Configuration basics: dataclass parameters with bounds, explained enums, and readers of JSON and TOML.
+
+A parameter is a field of a frozen dataclass whose metadata carry its unit, its bounds and a line of help. The readers
+turn every fault of a text into `ValueError` or `BadInput`, also the faults that Python's own readers raise as other
+errors. `did_you_mean` names the known keys in an error about an unknown one.
+"""
 
 import json
 import tomllib
@@ -12,10 +17,14 @@ from typing import Any, Self, cast
 
 from swarmwire.comms.errors import BadInput
 
+FORMAT_KEY = "format"  # in a file: the version of its format
+MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # in msgpack
+TOO_DEEP = "lists or tables within one another, too many to be meant"
+
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a parameter means and which values it may take (bounds are inclusive unless they start with `above`)."""
+    """Help text, unit and allowed values of a parameter; `at_least` and `at_most` include the bound."""
 
     help: str
     unit: str = ""
@@ -37,45 +46,42 @@ def parameter(
     below: float | None = None,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field with a `Limits` in its metadata; without default the value must be given."""
-    limits = Bounds(help, unit, at_least, at_most, above, below, choices)
-    return field(default=default, metadata={"limits": limits})
+    """A dataclass field with `Bounds` in its metadata; without a default the parameter is required."""
+    bounds = Bounds(help, unit, at_least, at_most, above, below, choices)
+    return field(default=default, metadata={"bounds": bounds})
 
 
-def bounds_of(of: "Field[Any]") -> Bounds:
-    """The limits of a dataclass field made by `parameter` (empty ones for any other field)."""
-    found = of.metadata.get("limits")
-    return found if isinstance(found, Bounds) else Bounds(help="")
+def bounds_of(parameter_field: "Field[Any]") -> Bounds:
+    """The bounds of a dataclass field made by `parameter` (empty ones for any other field)."""
+    bounds = parameter_field.metadata.get("bounds")
+    return bounds if isinstance(bounds, Bounds) else Bounds(help="")
 
 
-def fault_of(value: float, limits: Bounds) -> str | None:
-    """What was expected of `value`, in words, or None if it is within its limits.
+def fault_of(value: float, bounds: Bounds) -> str | None:
+    """The expectation that `value` does not meet, as a text; None if it is within its bounds.
 
-    >>> fault_of(-1.0, Limits("how long it lasts", unit="s", above=0.0))
+    >>> fault_of(-1.0, Bounds("how long it lasts", unit="s", above=0.0))
     'expected more than 0 s, got -1.0'
     """
-    unit = f" {limits.unit}" if limits.unit else ""
-    if limits.at_least is not None and not value >= limits.at_least:
-        return f"expected at least {limits.at_least:g}{unit}, got {value!r}"
-    if limits.at_most is not None and not value <= limits.at_most:
-        return f"expected at most {limits.at_most:g}{unit}, got {value!r}"
-    if limits.above is not None and not value > limits.above:
-        return f"expected more than {limits.above:g}{unit}, got {value!r}"
-    if limits.below is not None and not value < limits.below:
-        return f"expected less than {limits.below:g}{unit}, got {value!r}"
+    unit = f" {bounds.unit}" if bounds.unit else ""
+    if bounds.at_least is not None and not value >= bounds.at_least:
+        return f"expected at least {bounds.at_least:g}{unit}, got {value!r}"
+    if bounds.at_most is not None and not value <= bounds.at_most:
+        return f"expected at most {bounds.at_most:g}{unit}, got {value!r}"
+    if bounds.above is not None and not value > bounds.above:
+        return f"expected more than {bounds.above:g}{unit}, got {value!r}"
+    if bounds.below is not None and not value < bounds.below:
+        return f"expected less than {bounds.below:g}{unit}, got {value!r}"
     return None
 
 
 @dataclass(frozen=True)
 class NoParameters:
-    """Parameters of what has none."""
-
-
-# --- Enumerations whose members say what they mean.
+    """An empty set of parameters."""
 
 
 class ExplainedEnum(IntEnum):
-    """Integers, each with its meaning: `NAME = 0, "what it means"`."""
+    """Integers, each with its meaning: `NAME = 0, "its meaning"`."""
 
     meaning: str
 
@@ -87,30 +93,21 @@ class ExplainedEnum(IntEnum):
         return member
 
 
-# --- The names that there are, in words: for errors about one that there is not.
+def did_you_mean(known: Iterable[str], name: object = None) -> str:
+    """The text "one of a, b, c" for an error about an unknown `name`, with a suggestion if a known name is close to it.
 
-
-def did_you_mean(known: Iterable[str], given: object = None) -> str:
-    """The words "one of a, b, c", and which of these was probably meant, if what was `given` is near one of them.
-
-    >>> one_of(["range_m", "loss"], "range")
+    >>> did_you_mean(["range_m", "loss"], "range")
     'one of range_m, loss (did you mean range_m?)'
     """
     names = list(known)
     if not names:
         return "none"
-    near = get_close_matches(given, names, n=1) if isinstance(given, str) else []
-    return f"one of {', '.join(names)}" + "".join(f" (did you mean {name}?)" for name in near)
-
-
-# --- JSON and TOML of users and of disks that lie: whatever is wrong with a text is a ValueError.
-
-
-TOO_DEEP = "lists or tables within one another, too many to be meant"
+    close = get_close_matches(name, names, n=1) if isinstance(name, str) else []
+    return f"one of {', '.join(names)}" + "".join(f" (did you mean {match}?)" for match in close)
 
 
 def from_json(text: str | bytes) -> Any:
-    """What the text says; ValueError if it is no JSON, also where Python's own reader gives up."""
+    """The value of a JSON text; ValueError if it is no JSON, also where Python's reader raises another error."""
     try:
         return json.loads(text)
     except RecursionError:
@@ -118,25 +115,38 @@ def from_json(text: str | bytes) -> Any:
 
 
 def from_toml(text: str) -> dict[str, Any]:
-    """The table that the text says; `tomllib.TOMLDecodeError` if it is no TOML, also where Python's reader gives up."""
+    """The table of a TOML text; `tomllib.TOMLDecodeError` if it is no TOML, also where Python raises another error."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:
         raise tomllib.TOMLDecodeError(TOO_DEEP) from None
-    except ValueError as error:  # a number of thousands of digits, a date that there is not
+    except ValueError as error:  # a number of thousands of digits, a date that does not exist
         raise tomllib.TOMLDecodeError(str(error)) from None
 
 
-# --- Values that JSON and msgpack hold, so that run folders and the wire can: numbers, texts, lists, tables of these.
+def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
+    """The content of a TOML file; BadInput if it cannot be read.
 
-
-LEAST, MOST = -(2**63), 2**64 - 1  # of whole numbers in msgpack
+    `named_by` is the (file, key) that refers to this file: the error about a missing file names them.
+    """
+    try:
+        return from_toml(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        if named_by is not None:
+            raise BadInput(*named_by, f"expected a readable file: {path}: {error.strerror}") from None
+        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(str(path), "", f"expected TOML: {error}") from None
 
 
 def check_plain(value: object, where: str, key: str) -> None:
-    """Raise BadInput with `where` and the key within `key` of what is not plain: a date, a number like inf or 2^64."""
+    """Raise BadInput unless JSON and msgpack, and so run folders and frames, can hold the value.
+
+    Plain values are finite numbers, whole numbers of 64 bits, texts, truth values, and lists and tables of these. The
+    error has `where` and the path of the value within `key`.
+    """
     if isinstance(value, Mapping):
         for name, item in cast("Mapping[object, object]", value).items():
             inner = f"{key}.{name}"
@@ -144,27 +154,21 @@ def check_plain(value: object, where: str, key: str) -> None:
                 raise BadInput(where, inner, f"expected a text as the name of a key, got {name!r}")
             check_plain(item, where, inner)
     elif isinstance(value, list | tuple):
-        for place, item in enumerate(cast("list[object]", value)):
-            check_plain(item, where, f"{key}[{place}]")
+        for i, item in enumerate(cast("list[object]", value)):
+            check_plain(item, where, f"{key}[{i}]")
     elif isinstance(value, float) and not isfinite(value):
         raise BadInput(where, key, f"expected a finite number, got {value!r}")
-    elif isinstance(value, int) and not LEAST <= value <= MOST:
+    elif isinstance(value, int) and not MIN_INTEGER <= value <= MAX_INTEGER:
         raise BadInput(where, key, f"expected a whole number of 64 bits, got {value!r}")
     elif not isinstance(value, bool | int | float | str):
         raise BadInput(where, key, f"expected a number, text, true, false, list or table, got {value!r}")
 
 
-# --- The version that a file names as its `format`: any other one, or none, is refused in one line.
-
-
-KEY = "format"
-
-
 def check_format(content: object, known: int, where: str) -> None:
-    """Return if the table in a file names the known format; BadInput if it names another one, or none.
+    """Raise BadInput unless the table of a file has the known version as its `format`.
 
-    Called before anything else of the file is read, since other formats may have other keys. Content that is no table
-    is left to the reader of the rest.
+    Call it before the rest of the file is read, since other formats may have other keys. Content that is no table
+    passes: the reader of the rest refuses it.
 
     >>> check_format({"format": 1}, 1, "a.toml")
     >>> check_format({"format": 2}, 1, "a.toml")
@@ -177,33 +181,15 @@ def check_format(content: object, known: int, where: str) -> None:
     if not isinstance(content, Mapping):
         return
     table = cast("Mapping[str, object]", content)
-    if KEY not in table:
-        raise BadInput(where, KEY, f"is missing: expected {known}")
-    found = table[KEY]
-    if type(found) is int and found == known:
+    if FORMAT_KEY not in table:
+        raise BadInput(where, FORMAT_KEY, f"is missing: expected {known}")
+    version = table[FORMAT_KEY]
+    if type(version) is int and version == known:
         return
-    if type(found) is int and found > known:
-        whose = ": made by a newer swarmwire; upgrade to read it"
-    elif type(found) is int and found > 0:
-        whose = ": made by an older swarmwire; that one reads it"
+    if type(version) is int and version > known:
+        hint = ": made by a newer swarmwire; upgrade to read it"
+    elif type(version) is int and version > 0:
+        hint = ": made by an older swarmwire; that one reads it"
     else:
-        whose = ""
-    raise BadInput(where, KEY, f"expected {known}, got {found!r}{whose}")
-
-
-# --- TOML files of users, read or refused in one line.
-
-
-def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
-    """The content of a file; BadInput if it cannot be read.
-
-    A file that another one names, `named_by` as (file, key), is refused there if it is missing.
-    """
-    try:
-        return from_toml(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        if named_by is not None:
-            raise BadInput(*named_by, f"expected a readable file: {path}: {error.strerror}") from None
-        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadInput(str(path), "", f"expected TOML: {error}") from None
+        hint = ""
+    raise BadInput(where, FORMAT_KEY, f"expected {known}, got {version!r}{hint}")

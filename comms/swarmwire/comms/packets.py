@@ -1,4 +1,9 @@
-"""What may become of a packet for one intended receiver."""
+"""Packets as tables: payloads, sent and received packets, their fates, and the transmit statuses of their senders.
+
+Agents hand `SentPackets` to the radio medium and get `ReceivedPackets`. For every intended receiver a packet ends in
+exactly one `Fate`. The sender of a unicast packet may also get a `TxStatuses` row: the result that its own radio
+knows, which is less than the fate.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -7,9 +12,14 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.config import ExplainedEnum
 
+BROADCAST = -1  # `to` of a packet for every robot within reach
+NOWHERE = -2  # `to` of a packet for a robot that does not exist: it is numbered and never goes on air
+NOT_MEASURED = -1  # the tx status id of a packet whose sender wants no status
+TAG_BYTES = 2  # at the start of a payload: the class of its message
+
 
 class Fate(ExplainedEnum):
-    """One per (packet, intended receiver), with its meaning; the order is that of the tally's columns."""
+    """The final state of a packet at one intended receiver; members stand in the order of the columns of the counts."""
 
     RECEIVED = 0, "reached the receiver"
     OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
@@ -29,16 +39,7 @@ class Fate(ExplainedEnum):
     JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
 
 
-FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, as summaries and tables have them
-
-
-# --- Packets as tables: what agents hand to the medium, and what the medium hands to agents.
-
-
-BROADCAST = -1  # addressed to whoever is within reach
-NOWHERE = -2  # addressed to a robot that is not there: numbered, never on air
-NOT_MEASURED = -1  # the tx status id of a packet whose sender does not ask
-TAG_BYTES = 2  # at the start of a payload: which class of messages it is
+FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, for summaries and tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +70,9 @@ class Payloads:
         return self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
 
     def rows(self, index: IntArray) -> "Payloads":
-        """The rows of `index` (k,), in its order; a row may be taken more than once."""
+        """The rows of `index` (k,), in its order; an index may repeat."""
         sizes = self.sizes
-        if len(index) and (sizes == sizes[0]).all():  # as most often: whole rows at a time
+        if len(index) and (sizes == sizes[0]).all():  # the usual case: copy whole rows
             data = self.data.reshape(len(self), sizes[0]).take(index, axis=0)
             return Payloads(data.reshape(-1), np.arange(len(index) + 1) * sizes[0])
         sizes = sizes[index]
@@ -101,7 +102,7 @@ class Payloads:
 
     @classmethod
     def joined(cls, parts: "list[Payloads]") -> "Payloads":
-        """The rows of all parts, one after the other."""
+        """The rows of all parts, in order."""
         if not parts:
             return _NO_PAYLOADS
         data = np.concatenate([part.data for part in parts])
@@ -109,7 +110,7 @@ class Payloads:
 
 
 def offsets(sizes: IntArray) -> IntArray:
-    """Where rows of the given sizes start, with the end as a last element, (rows + 1,)."""
+    """The start of each row from the rows' sizes, and the end of the last row, (rows + 1,)."""
     out = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=out[1:])
     return out
@@ -121,19 +122,19 @@ _NO_PAYLOADS = Payloads.of([])
 
 @dataclass(frozen=True, slots=True)
 class SentPackets:
-    """Packets that agents sent in one tick; those of one sender stand in the order in which it sent them."""
+    """Packets that agents sent in one tick; the packets of one sender stand in the order of its `send` calls."""
 
     sender: IntArray  # (k,) robot row: arena x robots + index
-    to: IntArray  # (k,) index in the arena of the one receiver, BROADCAST or, between loop and air, NOWHERE
+    to: IntArray  # (k,) index of the one receiver in its arena, BROADCAST or, between loop and medium, NOWHERE
     payloads: Payloads  # (k,)
-    tx_status_id: IntArray | None = None  # (k,) under which a sender is told of a packet, or UNTOLD; None: all UNTOLD
+    tx_status_id: IntArray | None = None  # (k,) id of the packet's tx status, or NOT_MEASURED; None: all NOT_MEASURED
 
     def __len__(self) -> int:
         return len(self.sender)
 
     @property
     def tx_status_ids(self) -> IntArray:
-        """`tx_status_id`, also where nobody asks, (k,)."""
+        """`tx_status_id` as an array in any case, (k,)."""
         return np.full(len(self), NOT_MEASURED) if self.tx_status_id is None else self.tx_status_id
 
     def select(self, index: IntArray) -> "SentPackets":
@@ -172,9 +173,9 @@ class ReceivedPackets:
 
     receiver: IntArray  # (k,) robot row: arena x robots + index
     sender: IntArray  # (k,) index of the sender in the arena
-    sequence: IntArray  # (k,) how many packets the sender had sent before this one
+    sequence: IntArray  # (k,) number of packets that the sender had sent before this one
     received_at_ns: IntArray  # (k,)
-    given: dict[str, FloatArray]  # what the medium tells: "range_m", "bearing_rad", "rssi_dbm", each (k,)
+    given: dict[str, FloatArray]  # the receiver's measurements: "range_m", "bearing_rad", "rssi_dbm", each (k,)
     payload: IntArray  # (k,) row in `payloads`
     payloads: Payloads  # one row per packet, shared by its receivers
 
@@ -183,9 +184,9 @@ class ReceivedPackets:
 
     @classmethod
     def none(cls, measures: tuple[str, ...] = ()) -> "ReceivedPackets":
-        """Nothing received over a medium that gives the named columns."""
-        given = {name: np.empty(0, np.float64) for name in measures}
-        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, given, _NOTHING, _NO_PAYLOADS)
+        """No packets; `measures` are the names of the columns in `given`."""
+        measurements = {name: np.empty(0, np.float64) for name in measures}
+        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, measurements, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "ReceivedPackets":
         """The rows of `index` (k,); the payload table stays shared."""
@@ -200,35 +201,37 @@ class ReceivedPackets:
         )
 
     def merged(self, other: "ReceivedPackets") -> "ReceivedPackets":
-        """Both, in the order that `ReceivedPackets` promises; `other` was received over the same medium."""
+        """The packets of both, in the order of the class; `other` has the same columns in `given`."""
         return ReceivedPackets.joined([self, other])
 
     @classmethod
     def joined(cls, parts: "list[ReceivedPackets]") -> "ReceivedPackets":
-        """All parts, one or more, received over the same medium, in the order that `ReceivedPackets` promises."""
-        some = [part for part in parts if len(part)]
-        if len(some) < 2:
-            return some[0] if some else parts[0]
-        columns = zip(*((part.receiver, part.sender, part.sequence, part.received_at_ns) for part in some), strict=True)
+        """The packets of all parts, one or more with the same columns in `given`, in the order of the class."""
+        filled = [part for part in parts if len(part)]
+        if len(filled) < 2:
+            return filled[0] if filled else parts[0]
+        columns = zip(
+            *((part.receiver, part.sender, part.sequence, part.received_at_ns) for part in filled), strict=True
+        )
         receiver, sender, sequence, received_at_ns = (np.concatenate(column) for column in columns)
-        given = {name: np.concatenate([part.given[name] for part in some]) for name in some[0].given}
-        first = offsets(np.array([len(part.payloads) for part in some]))
-        payload = np.concatenate([part.payload + at for part, at in zip(some, first.tolist(), strict=False)])
-        payloads = Payloads.joined([part.payloads for part in some])
-        both = cls(receiver, sender, sequence, received_at_ns, given, payload, payloads)
-        return both.select(np.lexsort((sequence, sender, received_at_ns, receiver)))
+        measurements = {name: np.concatenate([part.given[name] for part in filled]) for name in filled[0].given}
+        first = offsets(np.array([len(part.payloads) for part in filled]))
+        payload = np.concatenate([part.payload + start for part, start in zip(filled, first.tolist(), strict=False)])
+        payloads = Payloads.joined([part.payloads for part in filled])
+        unsorted = cls(receiver, sender, sequence, received_at_ns, measurements, payload, payloads)
+        return unsorted.select(np.lexsort((sequence, sender, received_at_ns, receiver)))
 
     def compacted(self) -> "ReceivedPackets":
-        """The same with those payloads only that somebody received."""
+        """The same packets without the payloads that no robot received."""
         used, payload = np.unique(self.payload, return_inverse=True)
         return replace(self, payload=payload.reshape(-1), payloads=self.payloads.rows(used))
 
 
-# --- What a sender's radio knows of an addressed packet once it is done with it: all but what became of it elsewhere.
-
-
 class TxResult(ExplainedEnum):
-    """How a radio that waits for acknowledgements is done with a packet, with its meaning."""
+    """The final result of a unicast packet at a sending radio that waits for acknowledgements.
+
+    The radio knows its own part only: a packet without an acknowledgement may have been received.
+    """
 
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
     NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not received, or the answer was not"
@@ -239,10 +242,10 @@ class TxResult(ExplainedEnum):
 
 @dataclass(frozen=True, slots=True)
 class TxStatuses:
-    """Packets that their senders' radios are done with, sorted by (row, id)."""
+    """Unicast packets whose transmission ended at the sender's radio, sorted by (row, id)."""
 
-    row: IntArray  # (k,) sender: to a VectorAgent 0 to n - 1, between backend and air arena x robots + index
-    id: IntArray  # (k,) that `send` returned
+    row: IntArray  # (k,) sender: for a VectorAgent 0 to n - 1, between backend and medium arena x robots + index
+    id: IntArray  # (k,) as `send` returned it
     result: IntArray  # (k,) TxResult
 
     def __len__(self) -> int:
@@ -250,7 +253,7 @@ class TxStatuses:
 
     @property
     def acknowledged(self) -> BoolArray:
-        """Which packets arrived for certain, (k,)."""
+        """The packets that certainly arrived, (k,)."""
         return self.result == TxResult.ACKNOWLEDGED
 
     def select(self, index: IntArray) -> "TxStatuses":
@@ -268,4 +271,4 @@ class TxStatuses:
 
 
 _NOTHING.setflags(write=False)
-NO_TX_STATUSES = TxStatuses(_NOTHING, _NOTHING, _NOTHING)  # nothing to tell
+NO_TX_STATUSES = TxStatuses(_NOTHING, _NOTHING, _NOTHING)

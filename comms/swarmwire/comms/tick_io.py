@@ -1,4 +1,9 @@
-"""Notes: the states that agents name for whoever looks on (`note(state="search")`). They change nothing in the run."""
+"""The arrays that cross between world and agent backend in a tick: readings one way, actions the other.
+
+`Readings` are what the robots' sensors read. `Actions` are the robots' drive commands, packets, notes, LED colours,
+actuator commands and noted values. Notes and values are for observers: they change nothing in the run. Each of the
+last four is a sparse table: a row for each robot that set something, none for the others.
+"""
 
 from dataclasses import dataclass, field
 
@@ -7,16 +12,16 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import SentPackets
 
-MAX_STATE = 64  # characters
-MAX_STATES = 256  # different ones in a run; what a runner names in a tick is bounded by the same number
+MAX_STATE = 64  # characters of a state
+MAX_STATES = 256  # different states in a run, and in one tick of a runner
 
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """The states that some robots named in one tick, a row per robot that did."""
+    """The states that robots named in one tick, such as `note(state="search")`: a row per robot."""
 
     rows: IntArray  # (k,) robot row: arena x robots + index, each once
-    code: IntArray  # (k,) place in `names`
+    code: IntArray  # (k,) index in `names`
     names: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -24,7 +29,7 @@ class Notes:
 
     @classmethod
     def none(cls) -> "Notes":
-        """Nobody named a state."""
+        """No notes."""
         return _NO_NOTES
 
     @classmethod
@@ -34,8 +39,8 @@ class Notes:
         if len(parts) < 2:
             return parts[0] if parts else cls.none()
         names = tuple(dict.fromkeys(name for part in parts for name in part.names))
-        place = {name: code for code, name in enumerate(names)}
-        codes = [np.array([place[name] for name in part.names])[part.code] for part in parts]
+        code_of = {name: code for code, name in enumerate(names)}
+        codes = [np.array([code_of[name] for name in part.names])[part.code] for part in parts]
         return cls(np.concatenate([part.rows for part in parts]), np.concatenate(codes), names)
 
 
@@ -43,21 +48,18 @@ _NO_NOTES = Notes(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 def checked_state(state: object) -> str:
-    """The state; ValueError unless it is a text of 1 to 64 characters."""
+    """Return the state; ValueError unless it is a text of 1 to 64 characters."""
     if not isinstance(state, str) or not 0 < len(state) <= MAX_STATE:
         raise ValueError(f"note(state=…): expected a text of 1 to {MAX_STATE} characters, got {state!r}")
     return state
 
 
-# --- LEDs that agents switched in a tick; all others stay as they are.
-
-
 @dataclass(frozen=True, slots=True)
 class LedChanges:
-    """The LEDs of some robots that got a colour in one tick, a row each; of two rows of an LED the later counts."""
+    """LED colours set in one tick, a row each; the last row of an LED counts, and other LEDs keep their colours."""
 
     rows: IntArray  # (k,) robot row: arena x robots + index
-    which: IntArray  # (k,) place of the LED in the body's sheet
+    which: IntArray  # (k,) index of the LED in the body's spec
     rgb: IntArray  # (k,) 0xRRGGBB; 0: dark
 
     def __len__(self) -> int:
@@ -73,18 +75,15 @@ class LedChanges:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))  # nobody switches any
-
-
-# --- What agents set actuators of the user's own to in a tick; all others are not set anew.
+NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorCommands:
-    """The numbers that some robots set in one tick, a row each; of two rows of a place the later counts."""
+    """Numbers set on custom actuators in one tick, a row each; the last row of a number counts."""
 
     rows: IntArray  # (k,) robot row: arena x robots + index
-    place: IntArray  # (k,) among the numbers of all actuators of the body, in the order of its sheet
+    place: IntArray  # (k,) index among the numbers of all actuators of the body, in the order of its spec
     value: FloatArray  # (k,)
 
     def __len__(self) -> int:
@@ -92,7 +91,7 @@ class ActuatorCommands:
 
     @classmethod
     def joined(cls, parts: "list[ActuatorCommands]") -> "ActuatorCommands":
-        """Those of all parts, in order."""
+        """The commands of all parts, in order."""
         parts = [part for part in parts if len(part)]
         if len(parts) < 2:
             return parts[0] if parts else NO_ACTUATOR_COMMANDS
@@ -103,15 +102,12 @@ class ActuatorCommands:
         )
 
 
-NO_ACTUATOR_COMMANDS = ActuatorCommands(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))  # nobody acts
-
-
-# --- Values: the numbers that agents tell whoever looks on (`note(value=1.25)`). They change nothing in the run.
+NO_ACTUATOR_COMMANDS = ActuatorCommands(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """The numbers that some robots told in one tick, a row each; of two rows of a robot the later counts."""
+    """The numbers that robots noted in one tick, such as `note(value=1.25)`; the last row of a robot counts."""
 
     rows: IntArray  # (k,) robot row: arena x robots + index
     value: FloatArray  # (k,) finite
@@ -121,25 +117,22 @@ class Values:
 
     @classmethod
     def joined(cls, parts: "list[Values]") -> "Values":
-        """Those of all parts, in order."""
+        """The values of all parts, in order."""
         parts = [part for part in parts if len(part)]
         if len(parts) < 2:
             return parts[0] if parts else NO_VALUES
         return cls(np.concatenate([part.rows for part in parts]), np.concatenate([part.value for part in parts]))
 
 
-NO_VALUES = Values(np.empty(0, np.int64), np.empty(0))  # nobody tells any
-
-
-# --- What crosses between world and backend in a tick, as arrays: senses one way, commands and packets the other.
+NO_VALUES = Values(np.empty(0, np.int64), np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
 class GroupReadings:
-    """The senses of the robots of one group, a row per robot."""
+    """The sensor readings of the robots of one group, a row per robot."""
 
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
-    fields: dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width), C-contiguous
+    fields: dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width), C-contiguous
 
 
 Readings = dict[str, GroupReadings]  # by group
@@ -147,17 +140,17 @@ Readings = dict[str, GroupReadings]  # by group
 
 @dataclass(frozen=True, slots=True)
 class Actions:
-    """What the agents of some robots decided in one tick, a row per robot that decided."""
+    """The actions of the robots whose agents stepped in one tick, a row per robot."""
 
     rows: IntArray  # (n,) robot row: arena x robots + index
     drive: BoolArray  # (n,) False: no command in this tick, the last one holds
-    linear_mps: FloatArray  # (n,) forward speed asked for
-    angular_radps: FloatArray  # (n,) turn rate asked for, positive to the left
-    lateral_mps: FloatArray  # (n,) speed to the left asked for; 0 but for holonomic bodies
+    linear_mps: FloatArray  # (n,) commanded forward speed
+    angular_radps: FloatArray  # (n,) commanded turn rate, positive to the left
+    lateral_mps: FloatArray  # (n,) commanded speed to the left; 0 except for holonomic bodies
     sent: SentPackets = field(default_factory=SentPackets.none)
     notes: Notes = field(default_factory=Notes.none)
     leds: LedChanges = NO_LED_CHANGES
-    own: ActuatorCommands = NO_ACTUATOR_COMMANDS  # of actuators of the user's own
+    own: ActuatorCommands = NO_ACTUATOR_COMMANDS  # of custom actuators
     values: Values = NO_VALUES
 
     @classmethod

@@ -171,7 +171,7 @@ PARAMETERS = {
 def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
     for field in fields(kind):
         limits = bounds_of(field)
-        if "limits" not in field.metadata:
+        if "bounds" not in field.metadata:
             continue
         assert limits.help, field.name
         if isinstance(field.default, int | float):
