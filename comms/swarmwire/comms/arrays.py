@@ -1,4 +1,4 @@
-"""Type names for the arrays that cross the contract; shapes, units and frames stand with each field."""
+"""Type names for numpy arrays; each field that has one states its shape, unit and frame."""
 
 from typing import Any
 

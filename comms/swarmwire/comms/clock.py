@@ -1,15 +1,18 @@
-"""Time: integer nanoseconds, tick arithmetic, and the one place that reads the wall clock or sleeps."""
+"""Time: integer nanoseconds, tick arithmetic, and the clocks. Only this module reads the wall clock or sleeps.
+
+Clocks are injected, so that tests and lockstep runs need no wall clock.
+"""
 
 import time
 from datetime import UTC, datetime
 from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
-LATE_WAKE_NS = 100_000  # by how much a sleep ends late, before it is known
-MAX_AWAKE_NS = 500_000  # the longest that is waited awake: a machine that wakes later is busy, and others need it
-FADES_IN = 16  # sleeps, about
-SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # the first of January 2026: when all scaled clocks show the same date
-SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they show it again: dates of ROS 2 end in 2038
+DEFAULT_WAKE_LATENCY_NS = 100_000  # by how much a sleep ends late, before it is measured
+MAX_BUSY_WAIT_NS = 500_000  # a machine that wakes later is busy: other processes need the time
+WAKE_LATENCY_DECAY = 16  # sleeps until the measured latency has faded, about
+SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # 1 January 2026: all scaled clocks agree at this date
+SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they begin again: dates of ROS 2 end in 2038
 
 
 def tick_start_ns(tick: int, rate_hz: int) -> int:
@@ -32,7 +35,7 @@ def to_s(ns: int) -> float:
 
 
 class Clock(Protocol):
-    """Whatever can tell the time and wait; injected, so that tests and lockstep need no wall clock."""
+    """A source of time that can also wait."""
 
     def now_ns(self) -> int:
         """Monotonic time in ns from an arbitrary origin."""
@@ -44,10 +47,10 @@ class Clock(Protocol):
 
 
 class DatedClock(Clock, Protocol):
-    """A clock that knows the date, too: what stamps made on several machines are compared by."""
+    """A clock that also has the date, by which time stamps of several machines are compared."""
 
     def utc_ns(self) -> int:
-        """Time in ns since 1970, UTC; it may be set, and jump."""
+        """Time in ns since 1970, UTC; it jumps when the machine's clock is set."""
         ...
 
 
@@ -65,7 +68,7 @@ class WallClock:
             time.sleep(left_ns / NS_PER_S)
 
     def utc_stamp(self) -> str:
-        """The date and time now as 20261121T030405Z: for names of folders, never for a run."""
+        """The present date and time as 20261121T030405Z, for the names of folders; no run depends on it."""
         return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
     def utc_ns(self) -> int:
@@ -74,43 +77,43 @@ class WallClock:
 
 
 class PreciseClock:
-    """A clock whose sleeps end on time: it sleeps for less by what the machine takes to wake, and waits out the rest.
+    """A clock whose sleeps end on time: it sleeps shorter by the machine's wake latency, and busy-waits for the rest.
 
-    What a wake takes is measured at each: the longest of late, which fades, so that one hiccup does not make every
-    later sleep a busy wait.
+    It measures the wake latency at each sleep and uses the longest recent one. The maximum decays, so that one delay
+    does not turn every later sleep into a busy wait.
     """
 
     def __init__(self, clock: Clock) -> None:
-        self._clock, self._wakes_late_ns = clock, LATE_WAKE_NS
+        self._clock, self._wake_latency_ns = clock, DEFAULT_WAKE_LATENCY_NS
         self.now_ns = clock.now_ns
 
     def sleep_until(self, at_ns: int) -> None:
-        """Return once the clock shows `at_ns`, and hardly later."""
-        early_ns = at_ns - self._wakes_late_ns
+        """Return at `at_ns`, with little delay."""
+        early_ns = at_ns - self._wake_latency_ns
         if self.now_ns() < early_ns:
             self._clock.sleep_until(early_ns)
             late_ns = self.now_ns() - early_ns
-            faded_ns = self._wakes_late_ns - self._wakes_late_ns // FADES_IN
-            self._wakes_late_ns = min(max(faded_ns, late_ns), MAX_AWAKE_NS)
+            faded_ns = self._wake_latency_ns - self._wake_latency_ns // WAKE_LATENCY_DECAY
+            self._wake_latency_ns = min(max(faded_ns, late_ns), MAX_BUSY_WAIT_NS)
         while self.now_ns() < at_ns:
             continue
 
 
 class ScaledClock:
-    """A clock that runs `factor` times as fast as another: for agents of emulated robots in a world that does so."""
+    """A clock that runs `factor` times as fast as another, for agents of emulated robots in a world at that speed."""
 
     def __init__(self, clock: DatedClock, factor: float) -> None:
         self._clock, self._factor = clock, factor
         self._began_ns = clock.now_ns()
 
     def now_ns(self) -> int:
-        """Monotonic time in ns, which began with this object."""
+        """Monotonic time in ns since this object was made."""
         return round((self._clock.now_ns() - self._began_ns) * self._factor)
 
     def utc_ns(self) -> int:
-        """A date in ns since 1970 that runs as fast, and is the same for all clocks of the same factor.
+        """A date in ns since 1970 that runs at `factor` and is equal for all clocks of the same factor.
 
-        It lies within ten years from 2026 on, and then begins anew: at 10 times the pace once in a year.
+        It covers ten years from 2026 on and then begins again: at a factor of 10 once a year.
         """
         return SCALED_FROM_NS + round((self._clock.utc_ns() - SCALED_FROM_NS) * self._factor) % SCALED_SPAN_NS
 

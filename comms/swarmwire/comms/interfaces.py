@@ -1,4 +1,8 @@
-"""The seams of the loop: a backend decides for the robots, observers look on, a judge says which arenas are over."""
+"""The interfaces of the simulation loop: agent backends, observers and stop conditions.
+
+`AgentBackend` is the interface of every backend. `TimedBackend` adds ticks in real time, within which agents send and
+receive through a `SubtickMedium`; `ReceivingBackend` adds agents in this process that read between ticks.
+"""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -9,18 +13,18 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 
 class AgentBackend(Protocol):
-    """All agents of a run as the loop sees them: in this process, or runners behind the network."""
+    """All agents of a run, in this process or in runners on the network."""
 
     def start(self) -> None:
         """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
     def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        """What every robot does in this tick; AgentFailed or RunnerLost ends the run."""
+        """Return the actions of every robot that acts in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 
     def counts(self) -> dict[str, int]:
-        """Faults on the way between loop and agents, by name, since the start."""
+        """Faults between loop and agents since the start, by name."""
         ...
 
     def close(self) -> None:
@@ -29,62 +33,61 @@ class AgentBackend(Protocol):
 
 
 class Observer(Protocol):
-    """Whatever looks at a run without taking part: metrics, recorders, progress."""
+    """A passive part of a run: a metric, a recorder, a progress display. It cannot change the run."""
 
     def begin(self, static: Static) -> None:
-        """The run is about to start."""
+        """Called once before the first tick."""
         ...
 
     def see(self, truth: Truth) -> None:
-        """One tick is over; the arrays may be kept but not written to."""
+        """Called after each tick; an observer may keep the arrays, but not write to them."""
         ...
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The run is over; `last` counts what was in flight. Returns this observer's part of the summary."""
+        """Called after the last tick; `last` counts the packets in flight. Return this observer's summary entries."""
         ...
 
 
 class StopConditions(Protocol):
-    """Says when an arena has come to its end before the run has. It judges by what observers saw, as one of them."""
+    """Ends an arena before the end of the run, by the values that observers measure; it is itself an observer."""
 
-    def over(self) -> BoolArray | None:
-        """Which arenas are over after the tick that observers saw last, (arenas,); None: none is."""
+    def done(self) -> BoolArray | None:
+        """The arenas that are done after the last observed tick, (arenas,); None: none is."""
         ...
 
 
-# --- The seam within a tick: backends that keep to the wall clock send while it goes on, and hand over what is
-# received.
-
-
 class SubtickPackets(NamedTuple):
-    """Packets that came from agents in the middle of a tick."""
+    """Packets that agents sent in the middle of a tick."""
 
-    at_ns: int  # when they came, simulated time
-    tick: int | None  # whose step sent them: a robot sends no sooner than in its turn; None: they go out at once
+    at_ns: int  # arrival, simulated time
+    tick: int | None  # tick of the step that sent them, before which they do not go out; None: they go out at once
     sent: SentPackets
 
 
 class SubtickMedium(Protocol):
-    """The medium while a tick goes on, with the poses of its start."""
+    """The radio medium during a tick, with the robots' poses at the tick's start."""
 
     def send(self, put: SubtickPackets) -> None:
-        """Take packets that came no sooner than those before them, and within the tick."""
+        """Accept packets; their times must not fall from call to call, and lie within the tick."""
         ...
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
+        """Advance to `until_ns`; return the packets received and the tx statuses since the last call."""
         ...
 
 
 class TimedBackend(AgentBackend, Protocol):
-    """A backend whose tick takes its time: all that is received goes through it, whether or not the robot acts."""
+    """A backend whose ticks last for wall-clock time; it gets every received packet, also for robots that do not act.
+
+    It sends the agents' packets while the tick lasts, and delivers packets as they are received.
+    """
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """What every robot does in this tick, but for packets, which were put on air.
+        """Return the actions of this tick without their packets, which went out through `medium`.
 
-        `received` and `tx_status` are what came since the last tick, for robots that do not act in this one as well.
+        `received` and `tx_status` are those since the last tick, also of robots that do not act in this one.
         """
         ...
 
@@ -93,9 +96,9 @@ class ReceivingBackend(AgentBackend, Protocol):
     """A backend in this process whose agents can read between ticks."""
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Keep this until the robots that it is for step, or hear."""
+        """Keep packets and statuses until their robots step, or until `on_receive`."""
         ...
 
     def on_receive(self, tick: int, at_ns: int) -> SentPackets:
-        """Let agents that read between ticks read, at a time in this tick; what they sent."""
+        """Let the agents that read between ticks read, at a time in this tick; return the packets that they send."""
         ...

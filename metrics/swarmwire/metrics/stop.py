@@ -72,7 +72,7 @@ class StopConditions:
             self._stop_ns[new] = self._since_ns[self._by[new], new]
             self._over[new] = True
 
-    def over(self) -> BoolArray | None:
+    def done(self) -> BoolArray | None:
         """Which arenas have been found over so far, (arenas,); None: none."""
         return self._over if self._over.any() else None
 

@@ -129,7 +129,7 @@ class Stops:
         self._ticks = np.array([over.get(seed, TICKS + 1) for seed in seeds])
         self._done = 0
 
-    def over(self) -> BoolArray | None:
+    def done(self) -> BoolArray | None:
         self._done += 1
         found = self._done >= self._ticks
         return found if found.any() else None

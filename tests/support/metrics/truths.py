@@ -55,7 +55,7 @@ def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
         "command": np.zeros((rows, 3)),
         "state": np.zeros(rows, np.int64),
         "states": ("",),
-        "leds": np.zeros((rows, of.most_leds), np.int64),
+        "leds": np.zeros((rows, of.max_leds), np.int64),
         "readings": {},
         "contact_onsets": np.zeros((of.arenas, 2), np.int64),
         "edges": None,

@@ -57,7 +57,7 @@ def judged(values, *conditions, kind=Script):
     for tick in range(len(values)):
         for observer in (metrics, stop_conditions):
             observer.see(truth(of, tick))
-        over = stop_conditions.over()
+        over = stop_conditions.done()
         for arena in range(of.arenas):
             if over is not None and over[arena] and found[arena] is None:
                 found[arena] = tick

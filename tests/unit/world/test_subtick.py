@@ -198,7 +198,7 @@ class OverAfter:
     def __init__(self, ticks: int) -> None:
         self.ticks = ticks
 
-    def over(self) -> np.ndarray[Any, np.dtype[np.bool_]] | None:
+    def done(self) -> np.ndarray[Any, np.dtype[np.bool_]] | None:
         self.ticks -= 1
         return np.array([False, True]) if self.ticks == 0 else None
 

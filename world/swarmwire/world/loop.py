@@ -155,7 +155,7 @@ class Loop:
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
-        over = self._stop_conditions.over() if self._stop_conditions else None
+        over = self._stop_conditions.done() if self._stop_conditions else None
         if over is not None:
             self._leave(over & self._running)
         return truth

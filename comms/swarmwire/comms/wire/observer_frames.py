@@ -192,7 +192,7 @@ def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
     states = _states(frame)
     state = checked_array(frame, "state", "<i8", (n,))
     _within("state", state, len(states))
-    leds = checked_array(frame, "leds", "<i8", (n, static.most_leds))
+    leds = checked_array(frame, "leds", "<i8", (n, static.max_leds))
     _within("leds", leds, BRIGHTEST + 1)
     truth = Truth(
         tick=_least(frame.tick, 0, "tick"),

@@ -43,7 +43,7 @@ class RealRun:
         """
         motion, robots = self._motion, self.static.robots
         everyone, here = np.ones(robots, np.bool_), np.ones(1, np.bool_)
-        leds = np.zeros((robots, self.static.most_leds), np.int64)
+        leds = np.zeros((robots, self.static.max_leds), np.int64)
         unknown = cast("IntArray", np.full((1, 2), np.nan))  # not 0: nobody counted
         for tick in range(self.base.ticks if ticks is None else ticks):
             yield Truth(
