@@ -23,7 +23,7 @@ from swarmwire.agent.on_robot.settings import (
     RobotSettings,
     add_flags,
     by_flag,
-    given_flags,
+    flags_in,
     read_settings,
 )
 from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
@@ -84,7 +84,7 @@ def _told(error: BadInput, parsed: argparse.Namespace) -> BadInput:
     """The fault, told of the flag that it came by, if it did."""
     if parsed.command in ("drivers", "join") or error.where != _where(parsed):
         return error
-    return by_flag(error, error.where, given_flags(parsed))
+    return by_flag(error, error.where, flags_in(parsed))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -202,7 +202,7 @@ _COMMANDS = {"join": _join, "run": _run, "check": _check, "stop-motors": _stop_m
 
 
 def _settings(parsed: argparse.Namespace, needs_agent: bool = True) -> RobotSettings:
-    flags = dict(given_flags(parsed))
+    flags = dict(flags_in(parsed))
     if not needs_agent:
         flags["agent"] = AGENT, "none:None"
     return read_settings(parsed.config, flags)

@@ -1,4 +1,10 @@
-"""The robot's side of the robots' network: one session, which radio, tracker and control share."""
+"""Assembles and runs one robot: from its resolved configuration to the exit code of its agent.
+
+`network_parts` opens the robots' network: one session, shared by radio, tracker and control. `run_robot` takes the
+robot's lock, starts log, status file, watchdog and driver, runs the loop, and closes everything in reverse order,
+motors first. The heartbeats begin before the driver opens, so that the guard is there before a motor can move, and
+the watchdog's thread ends last, so that the guard also notices an agent that does not finish closing.
+"""
 
 import platform
 import threading
@@ -33,35 +39,40 @@ if TYPE_CHECKING:
 
 Say = Callable[[str], None]
 
+LOG_FORMAT = 1  # of `robot.json`
+NO_ACTUATOR_DRIVER = "no driver moves actuators of your own: what the agent tells them is counted, and does nothing"
+ENDED_BY = {AgentFailed: "agent failed", DriverLost: "no driver"}
+GUARD_GONE = "the guard is gone"
 
-def nowhere() -> Pose | None:
-    """Where a robot without a tracker is."""
+
+def no_pose() -> Pose | None:
+    """The pose of a robot without a tracker."""
     return None
 
 
 @dataclass(frozen=True)
 class NetworkParts:
-    """What of a robot stands on its network, open; of a robot without one nobody hears, sees or asks."""
+    """The open parts of a robot on its network; the defaults are those of a robot without a network."""
 
     radio: RobotRadio = field(default_factory=NoRadio)
-    own_pose: Callable[[], Pose | None] = nowhere
-    look: Callable[[], None] = lambda: None  # once a second: tell whether others are received, and poses come
-    counts: Callable[[], dict[str, int]] = dict  # what came to tracker and control and was of no use
-    listen: Callable[[Control], None] = lambda _: None  # let the robot be controlled from now on
+    own_pose: Callable[[], Pose | None] = no_pose
+    look: Callable[[], None] = lambda: None  # once a second: report whether other robots and poses are received
+    counts: Callable[[], dict[str, int]] = dict  # unusable messages at tracker and control
+    listen: Callable[[Control], None] = lambda _: None  # accept control requests from now on
 
 
 def network_parts(
     plan: RobotConfig, clock: DatedClock, log: RadioLog | None, say: Say, closing: ExitStack
 ) -> NetworkParts:
-    """Radio, tracker and control as the settings say; `closing` is given what is to be closed at the end.
+    """Radio, tracker and control of the settings; `closing` gets the callbacks that close them.
 
-    BadInput if an endpoint is taken, or there is no world whose air is to be joined, or it has not this robot.
+    BadInput if an endpoint is taken, no world with a radio medium answers, or that world lacks this robot.
     """
     settings = plan.settings
     network = settings.network
     if network is None:
         return NetworkParts()
-    # zenoh costs memory and time, and is of no use to a robot by itself.
+    # Imported here: zenoh costs memory and time, and a robot without a network does not use it.
     from swarmwire.agent.radios.control import ControlPoint
     from swarmwire.comms.wire.access_control import access_of
     from swarmwire.comms.wire.robot_network import SwarmKeys, open_swarm
@@ -100,7 +111,7 @@ def network_parts(
 def _opened_tracker(
     settings: RobotSettings, session: "zenoh.Session", keys: "SwarmKeys", closing: ExitStack
 ) -> "Tracker | None":
-    """Poses of all robots, or only its own: the medium of a world tells range and bearing itself."""
+    """Poses of all robots, or only the robot's own: the radio medium of a world measures range and bearing itself."""
     from swarmwire.agent.radios.tracker import Tracker
 
     if not settings.tracker:
@@ -126,28 +137,19 @@ def _made_radio(
 
     robots, own, radio = plan.settings.robots, plan.settings.name, plan.settings.radio
     if radio.kind == "zenoh":
-        asks_pose = any(need in OF_POSES for need in plan.agent.needs)
-        return ZenohRadio(session, keys, robots, own, radio.max_payload_bytes, clock, tracker, asks_pose, log, say)
+        needs_pose = any(need in OF_POSES for need in plan.agent.needs)
+        return ZenohRadio(session, keys, robots, own, radio.max_payload_bytes, clock, tracker, needs_pose, log, say)
     return WorldRadio(session, keys, robots, own, clock, log) if radio.kind == "world" else NoRadio()
 
 
 def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Callable[[], list[str]]]:
-    """Whom the robot is to hear, and what tells whom it has received so far: known of the robots' own network alone."""
+    """The other robots, and a call that lists the senders received so far; both empty but for a ZenohRadio."""
     from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 
     if not isinstance(radio, ZenohRadio):
         return [], list
     others = [robot for robot in settings.robots if robot != settings.name]
     return others, lambda: [settings.robots[sender] for sender in list(radio.links)]
-
-
-# --- Runs the agent of one robot, from its settings to its exit code; what is opened is closed, motors off first.
-
-
-LOG_FORMAT = 1  # of `robot.json`
-NO_CALL = "no driver moves actuators of your own: what the agent tells them is counted, and does nothing"
-ENDED_BY = {AgentFailed: "agent failed", DriverLost: "no driver"}
-GUARD_GONE = "the guard is gone"
 
 
 def run_robot(
@@ -158,22 +160,22 @@ def run_robot(
     duration_s: float | None = None,
     pipe: int | None = None,
 ) -> int:
-    """The exit code of one robot's agent, which ran until something ended it.
+    """Run the agent of one robot to its end; returns the exit code.
 
-    In the main thread, it is the only process of this machine that may drive the robot, and others may ask it to stop
-    that for good. `stamp` names the log's folder; heartbeats go into the `pipe`, if there is a guard. AgentFailed,
-    DriverLost or BadInput comes after everything is closed.
+    In the main thread the process holds the robot's lock: no other process of this machine drives the robot, and others
+    can request an emergency stop. `stamp` names the log's folder; heartbeats go into the `pipe`, if there is a guard.
+    AgentFailed, DriverLost or BadInput is raised after everything is closed.
     """
     motors = Motors(plan.driver)
-    with ExitStack() as alone:
-        if threading.current_thread() is threading.main_thread():  # where signals come in
+    with ExitStack() as locked:
+        if threading.current_thread() is threading.main_thread():  # which alone can handle signals
             lock = RobotLock(plan.settings.driver.name, plan.driver, WallClock())
-            alone.enter_context(stop_requests(motors.control.estop, lock.tell))
-            alone.enter_context(lock.held(plan.where))
-        return _run_alone(plan, clock, end, motors, stamp, duration_s, pipe)
+            locked.enter_context(stop_requests(motors.control.estop, lock.tell))
+            locked.enter_context(lock.held(plan.where))
+        return _run_locked(plan, clock, end, motors, stamp, duration_s, pipe)
 
 
-def _run_alone(
+def _run_locked(
     plan: RobotConfig,
     clock: DatedClock,
     end: StopFlag,
@@ -190,33 +192,33 @@ def _run_alone(
         log.begin(robot_facts(plan, clock))
     facts = {"format": LOG_FORMAT, "name": settings.name, "swarm": settings.swarm, "log": log and str(log.folder)}
     file = StatusFile(status_path(settings.log, settings.name))
-    onlookers = RobotObservers(clock, settings.pace, terminal, file, motors.control, facts, log)
+    observers = RobotObservers(clock, settings.pace, terminal, file, motors.control, facts, log)
     ended, cause = "error", None
     if plan.body.actuators:
-        onlookers.say(f"{', '.join(plan.body.actuators)}: {NO_CALL}")
+        observers.say(f"{', '.join(plan.body.actuators)}: {NO_ACTUATOR_DRIVER}")
     try:
         with ExitStack() as closing:
-            loop = _assembled(plan, clock, end, motors, onlookers, log, pipe, closing)
-            onlookers.attach(loop.status)
+            loop = _assembled(plan, clock, end, motors, observers, log, pipe, closing)
+            observers.attach(loop.status)
             reporting.notify(reporting.READY)
             loop.run(duration_s)
             reporting.notify(reporting.STOPPING)
         ended = end.reason or ended
     except BaseException as error:
-        ended = next((told for kind, told in ENDED_BY.items() if isinstance(error, kind)), ended)
+        ended = next((text for kind, text in ENDED_BY.items() if isinstance(error, kind)), ended)
         cause = _cause(error)
         raise
     finally:
         if not motors.reachable:
-            onlookers.say(OUT_OF_REACH)
-        onlookers.end(ended, "" if ended == GUARD_GONE else cause)
+            observers.say(OUT_OF_REACH)
+        observers.end(ended, "" if ended == GUARD_GONE else cause)
     if not motors.reachable:
         return FAILED
     return INTERRUPTED if ended == "SIGINT" else FAILED if ended == GUARD_GONE else ENDED
 
 
 def _cause(error: BaseException) -> str:
-    """What was raised, in a line: of an agent, the last one of its traceback, less the note of when it was."""
+    """The error in one line: for an agent, the last line of its traceback without the note of its time."""
     lines = str(error).splitlines() or [type(error).__name__]
     notes = ("in tick ", " ") if isinstance(error, AgentFailed) else ()
     return next((line for line in reversed(lines) if not line.startswith(notes)), lines[-1])
@@ -227,38 +229,38 @@ def _assembled(
     clock: DatedClock,
     end: StopFlag,
     motors: Motors,
-    onlookers: RobotObservers,
+    observers: RobotObservers,
     log: RobotLog | None,
     pipe: int | None,
     closing: ExitStack,
 ) -> RobotLoop:
-    """The loop of a robot that is connected, its motors at rest; `closing` gets what is to be closed, motors first."""
+    """The loop of a connected robot, its motors at rest; `closing` closes its parts, motors first."""
     settings = plan.settings
     beat = Heartbeats(pipe, lambda: motors.control.stopped, lambda: end.ask(GUARD_GONE))
-    watchdog = Watchdog(settings.watchdog_s, motors.stop, clock, settings.pace, beat, onlookers.silent)
-    closing.callback(watchdog.end)  # the last of all: the guard hears of an agent that takes its time to close
-    network = network_parts(plan, clock, log, onlookers.say, closing)
-    onlookers.look = network.look
-    offer = plan.offer
+    watchdog = Watchdog(settings.watchdog_s, motors.stop, clock, settings.pace, beat, observers.silent)
+    closing.callback(watchdog.end)  # the last of all: the guard notices an agent that does not finish closing
+    network = network_parts(plan, clock, log, observers.say, closing)
+    observers.look = network.look
+    capabilities = plan.capabilities
     if settings.radio.kind == "world":
-        offer = replace(offer, radio_gives=network.radio.needs)
-        check_needs(plan.agent.__name__, plan.agent.needs, offer, plan.where)
+        capabilities = replace(capabilities, radio_measures=network.radio.needs)
+        check_needs(plan.agent.__name__, plan.agent.needs, capabilities, plan.where)
     group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, settings.seed)
     measures = None if settings.radio.kind == "none" else network.radio.measures
-    mind = Controller(group, settings.rate_hz, measures, plan.limits)
+    controller = Controller(group, settings.rate_hz, measures, plan.limits)
     needs = frozenset(need for need in plan.agent.needs if not need.startswith("radio."))
-    sensors = RobotSensors(plan.driver, needs, tracked(plan.agent.needs, offer), network.own_pose)
-    parts = RobotParts(plan.driver, network.radio, mind, sensors, motors, watchdog, clock)
-    watchdog.start()  # before the driver, so that the guard is there when motors can move
+    sensors = RobotSensors(plan.driver, needs, tracked(plan.agent.needs, capabilities), network.own_pose)
+    parts = RobotParts(plan.driver, network.radio, controller, sensors, motors, watchdog, clock)
+    watchdog.start()  # before the driver, so that the guard is there before a motor can move
     closing.callback(plan.driver.close)
     plan.driver.open()
     network.listen(motors.control)
     closing.callback(motors.stop)
-    return RobotLoop(parts, settings.rate_hz, end, onlookers, network.counts)
+    return RobotLoop(parts, settings.rate_hz, end, observers, network.counts)
 
 
 def robot_facts(plan: RobotConfig, clock: DatedClock) -> dict[str, Any]:
-    """What `robot.json` says of a robot."""
+    """The contents of `robot.json`."""
     settings, limits = plan.settings, plan.limits
     return {
         "format": LOG_FORMAT,

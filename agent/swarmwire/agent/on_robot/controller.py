@@ -1,4 +1,8 @@
-"""What a robot's agent senses: from the driver, and from a tracker what the driver does not give."""
+"""The agent of one robot between its sensors and its commands.
+
+`RobotSensors` reads the driver, and a tracker for the sensors that the driver lacks. `Controller` steps the agent with
+these readings and turns its actions into a `Decision`: a command within the speed limits, and packets to send.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,36 +23,36 @@ from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings
 from swarmwire.comms.wire.radio_bridge import Pose
 
-NOT_SEEN = Pose(nan, nan, nan)  # as emulated senses read when a reading is lost
+NO_READING = Pose(nan, nan, nan)  # as emulated sensors read when a reading is lost
 BATTERY = "battery"
 
 
 class RobotSensors:
-    """The senses that the agent needs, and the battery for whoever looks on, if the driver tells it.
+    """The sensors that the agent needs, and for observers the battery, if the driver reads it.
 
     Attributes:
-        pose: where the tracker saw the robot at the last reading; None: it did not, or there is no tracker.
-        charge: the last charge of the battery, 0 to 1; None if it is not known.
-        complete: whether there was a reading in which no sense was lost whole, the battery left out.
+        pose: the tracker's pose of the robot at the last reading; None without a tracker or a recent pose.
+        charge: the last charge of the battery, 0 to 1; None if unknown.
+        complete: whether, in one reading so far, no field but the battery's was lost as a whole.
     """
 
     def __init__(
         self, driver: Driver, needs: frozenset[str], tracked: frozenset[str], own_pose: Callable[[], Pose | None]
     ) -> None:
         self._driver, self._tracked, self._own_pose = driver, tracked, own_pose
-        self._asked = ((needs - tracked) | {BATTERY}) & driver.measures
+        self._sensors = ((needs - tracked) | {BATTERY}) & driver.measures
         self.pose: Pose | None = None
         self.charge: float | None = None
         self.complete = False
 
     def read(self) -> dict[str, FloatArray]:
-        """The fields of the senses, a row each; DriverLost if the robot does not answer."""
-        fields = self._driver.sense(self._asked)
-        if BATTERY in self._asked:
+        """The fields of the sensors, one row each; DriverLost if the robot does not answer."""
+        fields = self._driver.sense(self._sensors)
+        if BATTERY in self._sensors:
             charge = float(fields["battery.charge"][0])
             self.charge = charge if isfinite(charge) else None
         self.pose = self._own_pose()
-        x_m, y_m, heading_rad = self.pose or NOT_SEEN
+        x_m, y_m, heading_rad = self.pose or NO_READING
         if "positioning" in self._tracked:
             fields |= {"positioning.x_m": np.array([x_m]), "positioning.y_m": np.array([y_m])}
         if "compass" in self._tracked:
@@ -60,41 +64,38 @@ class RobotSensors:
 
 
 def _read_only(column: FloatArray) -> FloatArray:
-    """As in emulation: a reading is the driver's, and no agent writes to it."""
+    """A view that agents cannot write to, as in emulation: the reading belongs to the driver."""
     view = column.view()
     view.flags.writeable = False
     return view
 
 
-# --- The agent of one robot: what it senses and hears goes in, what the robot is to do comes out.
-
-
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What one robot does from this step on."""
+    """The actions of one robot from this step on."""
 
     command: Command  # within the limits, with the LEDs that were switched in this step
-    drive: bool  # whether the agent gave a command in this step; else the last one holds
+    drive: bool  # whether the agent commanded a speed in this step; otherwise the last command holds
     sent: SentPackets
 
 
 class Controller:
-    """The host of one agent, and what of its deeds holds beyond the step.
+    """Steps one agent, and keeps the actions that hold beyond a step.
 
     Attributes:
-        state: the last state that the agent named.
-        value: the last number that it told.
+        state: the last state that the agent noted.
+        value: the last number that it noted.
         leds: the colour of each LED that it ever switched.
         clipped: commands above the limits so far.
-        nan: commands that were none.
-        actuations: numbers told to actuators of the user's own, of which no driver knows.
+        nan: commands with nan so far.
+        actuations: numbers so far for custom actuators, which no driver moves.
     """
 
     def __init__(
         self, group: GroupAssignment, rate_hz: int, measures: tuple[str, ...] | None, limits: SpeedLimits
     ) -> None:
         """AgentFailed if the agent cannot be made."""
-        self._host = AgentExecutor(Assignment((group,), rate_hz, measures))
+        self._executor = AgentExecutor(Assignment((group,), rate_hz, measures))
         self._group, self._limits = group, limits
         self._sideways = isinstance(group.body.drive, Holonomic)
         self._command = STOP
@@ -108,10 +109,10 @@ class Controller:
     ) -> Decision:
         """One step of the agent; AgentFailed with its traceback if it raises."""
         readings = {self._group.name: GroupReadings(self._group.rows, fields)}
-        actions = self._host.act(tick, readings, received, tx_status)
+        actions = self._executor.act(tick, readings, received, tx_status)
         drive = bool(actions.drive[0])
         if drive:
-            self._follow(actions)
+            self._take_command(actions)
         self.actuations += len(actions.own)
         if len(actions.notes):
             self.state = actions.notes.names[int(actions.notes.code[-1])]
@@ -122,18 +123,18 @@ class Controller:
         return Decision(self._with_leds(switched), drive, actions.sent)
 
     def all_leds(self) -> Command:
-        """The command that holds, with every LED that the agent ever switched: for a robot that forgot them."""
+        """The current command with every LED that the agent ever switched: for a robot that was off meanwhile."""
         return self._with_leds(self.leds)
 
-    def _follow(self, actions: Actions) -> None:
-        """Take the command of a step; nan is none, and the last one holds."""
+    def _take_command(self, actions: Actions) -> None:
+        """Take the command of a step; one with nan is counted, and the last one holds."""
         lateral = float(actions.lateral_mps[0]) if self._sideways else 0.0
-        asked = Command(float(actions.linear_mps[0]), float(actions.angular_radps[0]), lateral)
-        if any(map(isnan, (asked.linear_mps, asked.angular_radps, asked.lateral_mps))):
+        command = Command(float(actions.linear_mps[0]), float(actions.angular_radps[0]), lateral)
+        if any(map(isnan, (command.linear_mps, command.angular_radps, command.lateral_mps))):
             self.nan += 1
             return
-        self._command = self._limits.clipped(asked)
-        self.clipped += self._command is not asked
+        self._command = self._limits.clipped(command)
+        self.clipped += self._command is not command
 
     def _with_leds(self, leds: dict[int, int]) -> Command:
         command = self._command
@@ -143,6 +144,6 @@ class Controller:
 
 
 def group_of(name: str, index: int, spec: str, params: dict[str, Any], body: Body, seed: int) -> GroupAssignment:
-    """The assignment of one robot of a swarm, with draws of its own."""
+    """The assignment of one robot of a swarm; its draws are keyed by the seed and its index."""
     keys = np.array([derive_key("robot", seed, index)], np.uint64)
     return GroupAssignment("robot", spec, params, body.told, np.array([index]), (name,), keys)

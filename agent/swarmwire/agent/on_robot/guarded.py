@@ -1,4 +1,4 @@
-"""Turns this process into the guard of an agent, which then runs in a process of its own."""
+"""Turns this process into the guard (`guard.py`); the agent then runs in a child process."""
 
 import json
 import os
@@ -8,21 +8,21 @@ from typing import NoReturn
 
 from swarmwire.agent.on_robot.settings import RobotSettings
 
-PIPE_OPTION, STANDBY_OPTION = "--heartbeats", "--standby"  # that people do not need
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # as of runners in emulation: an agent's arrays are small
-SILENT = 2.0  # times the watchdog's time may pass without a heartbeat
-MIN_SILENT_S = 0.2  # so long other processes may hold up one that is well
+PIPE_OPTION, STANDBY_OPTION = "--heartbeats", "--standby"  # hidden from the help
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # as for runners in emulation: an agent's arrays are small
+WATCHDOG_TIMEOUTS = 2.0  # without a heartbeat, until the guard acts
+MIN_HEARTBEAT_TIMEOUT_S = 0.2  # a busy computer can hold up a healthy process for this long
 COMMAND = (sys.executable, "-P", "-m", "swarmwire.agent.cli")
 
 
 def become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[str]) -> NoReturn:
-    """Go on as the guard: the same process, so that signals reach it, but without what this one has imported.
+    """Replace this program by the guard: the same process, so that signals reach it, without the imported modules.
 
-    `run` and `stop` are the arguments of `swarmwire-agent` for the agent, and to stop its motors.
+    `run` and `stop` are the arguments of `swarmwire-agent` that run the agent and stop its motors.
     """
     from swarmwire.agent.on_robot import guard
 
-    orders = {
+    options = {
         "agent": [*COMMAND, *run],
         "stop": [*COMMAND, *stop],
         "silent_s": silent_s(settings.watchdog_s, settings.pace),
@@ -32,13 +32,13 @@ def become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[str
     sys.stdout.flush()
     sys.stderr.flush()
     environment = {**ONE_THREAD, **os.environ}
-    os.execve(sys.executable, [sys.executable, "-I", "-S", guard.__file__, json.dumps(orders)], environment)
+    os.execve(sys.executable, [sys.executable, "-I", "-S", guard.__file__, json.dumps(options)], environment)
 
 
 def silent_s(watchdog_s: float, pace: float) -> float:
-    """How long nothing may be received of the agent, by the wall clock, whose seconds a slow robot's are longer than.
+    """The guard's timeout for heartbeats in s of the wall clock; at a `pace` below 1 it is longer.
 
     >>> silent_s(0.5, 1.0), silent_s(0.5, 0.1), silent_s(0.01, 1.0)
     (1.0, 10.0, 0.2)
     """
-    return max(SILENT * watchdog_s / min(pace, 1.0), MIN_SILENT_S)
+    return max(WATCHDOG_TIMEOUTS * watchdog_s / min(pace, 1.0), MIN_HEARTBEAT_TIMEOUT_S)

@@ -1,6 +1,10 @@
-"""Whether a robot hears the others of its swarm, and is seen by the tracker: told once when it is not, and when it is.
+"""Checks of a robot's network: missing robots and poses at run time, and the certificates before the start.
 
-A wrong endpoint, a firewall or a camera that is off look like a quiet swarm: only time tells.
+`LivenessWatch` reports other robots of the swarm and tracker poses that have not been received for 5 s, once, and
+their return. A wrong endpoint, a firewall or a camera that is off cannot be told from a quiet swarm in another way.
+
+`check_certificates` checks before anything is opened that a robot's certificate goes with its key and its authority.
+Otherwise the network would silently fail to link, for ever.
 """
 
 import ssl
@@ -12,10 +16,11 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import Pose
 
 TIMEOUT_S = 5.0
+NOT_YET_VALID = 9  # X509_V_ERR_CERT_NOT_YET_VALID: a robot without a clock battery gets the date later
 
 
 class LivenessWatch:
-    """Looks when it is told to; without a radio or a tracker there is nothing to be missed."""
+    """Watches the robot's radio and tracker; each call of `look` is one check."""
 
     def __init__(
         self,
@@ -26,61 +31,53 @@ class LivenessWatch:
         pose: Callable[[], Pose | None] | None = None,
         pace: float = 1.0,
     ) -> None:
-        """`others` are to be received, and `received` tells which ever were.
+        """`others` are expected by radio, `received` lists the senders so far, and `pose` is the tracker's newest.
 
-        `pose` is the robot's newest, with a tracker.
+        Without a radio there are no `others`, and without a tracker no `pose`: then nothing is missed.
         """
         self._clock, self._say, self._received, self._pose = clock, say, received, pose
-        self._patience_ns = to_ns(TIMEOUT_S * pace)
+        self._timeout_ns = to_ns(TIMEOUT_S * pace)
         self._silent, self._others = list(others), others
-        self._began_ns = self._looked_ns = self._seen_ns = clock.now_ns()
-        self._told_silent = self._told_unseen = False
+        self._started_ns = self._checked_ns = self._seen_ns = clock.now_ns()
+        self._reported_silent = self._reported_unseen = False
         self._without_pose_ns = 0
 
     def look(self) -> None:
-        """Tell what is missing for too long, and what has come since that was told."""
+        """Report missing robots and poses once, and their return."""
         now_ns = self._clock.now_ns()
-        self._listen(now_ns)
+        self._check_radio(now_ns)
         if self._pose is not None:
-            self._watch(now_ns, self._pose() is not None)
-        self._looked_ns = now_ns
+            self._check_tracker(now_ns, self._pose() is not None)
+        self._checked_ns = now_ns
 
     def counts(self) -> dict[str, int]:
-        """For how many seconds no pose came, by name."""
+        """The seconds without a pose, by name."""
         return {"seconds_without_pose": self._without_pose_ns // NS_PER_S}
 
-    def _listen(self, now_ns: int) -> None:
+    def _check_radio(self, now_ns: int) -> None:
         if not self._silent:
             return
         received = set(self._received())
-        came = [robot for robot in self._silent if robot in received]
+        new = [robot for robot in self._silent if robot in received]
         self._silent = [robot for robot in self._silent if robot not in received]
-        if self._told_silent and came:
-            self._say(f"radio: now hears {', '.join(came)}")
-        if self._silent and not self._told_silent and now_ns - self._began_ns >= self._patience_ns:
-            self._told_silent = True
+        if self._reported_silent and new:
+            self._say(f"radio: now hears {', '.join(new)}")
+        if self._silent and not self._reported_silent and now_ns - self._started_ns >= self._timeout_ns:
+            self._reported_silent = True
             how = "hears none of" if len(self._silent) == len(self._others) else "has never received"
             self._say(f"radio: {how} {', '.join(self._silent)}")
 
-    def _watch(self, now_ns: int, seen: bool) -> None:
+    def _check_tracker(self, now_ns: int, seen: bool) -> None:
         if seen:
             self._seen_ns = now_ns
-            if self._told_unseen:
-                self._told_unseen = False
+            if self._reported_unseen:
+                self._reported_unseen = False
                 self._say("tracker: poses come")
             return
-        self._without_pose_ns += now_ns - self._looked_ns
-        if not self._told_unseen and now_ns - self._seen_ns >= self._patience_ns:
-            self._told_unseen = True
+        self._without_pose_ns += now_ns - self._checked_ns
+        if not self._reported_unseen and now_ns - self._seen_ns >= self._timeout_ns:
+            self._reported_unseen = True
             self._say(f"tracker: no pose of this robot has come for {TIMEOUT_S:g} s")
-
-
-# --- Whether the certificate that a robot shows others goes with its key and its authority, before anything is opened.
-#
-# The network would only fail to link, in silence, for ever.
-
-
-NOT_YET_VALID = 9  # X509_V_ERR_CERT_NOT_YET_VALID: a robot without a battery for its clock learns the date later
 
 
 def check_certificates(network: Network, where: str) -> None:
@@ -88,29 +85,29 @@ def check_certificates(network: Network, where: str) -> None:
     certificate, key, ca = network.certificate, network.key, network.ca
     if certificate is None or key is None or ca is None:
         return
-    shows = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
-        shows.load_cert_chain(certificate, key, password="")  # or it would ask for one at the terminal
+        server.load_cert_chain(certificate, key, password="")  # without it OpenSSL prompts at the terminal
     except (ssl.SSLError, ValueError) as error:
         text = f"expected the key of {certificate}: {key} is none, or of another certificate ({_reason(error)})"
         raise BadInput(where, "network.key", text) from None
-    asks = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    asks.check_hostname = False
+    client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname = False
     try:
-        asks.load_verify_locations(ca)
+        client.load_verify_locations(ca)
     except ssl.SSLError as error:
         raise BadInput(where, "network.ca", f"expected a certificate: {ca} is none ({_reason(error)})") from None
-    fault = _fault(shows, asks)
+    fault = _handshake_fault(server, client)
     if fault:
         raise BadInput(where, "network.certificate", f"expected one that {ca} signed: {certificate}: {fault}")
 
 
-def _fault(shows: ssl.SSLContext, asks: ssl.SSLContext) -> str | None:
-    """Why whoever asks would not take what the other shows; both ends talk in memory."""
-    to_asker, to_shower = ssl.MemoryBIO(), ssl.MemoryBIO()
-    asker = asks.wrap_bio(to_asker, to_shower)
-    shower = shows.wrap_bio(to_shower, to_asker, server_side=True)
-    for end in (asker, shower, asker):
+def _handshake_fault(server: ssl.SSLContext, client: ssl.SSLContext) -> str | None:
+    """Why the client refuses the server's certificate, by a handshake in memory; None if it accepts it."""
+    to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client_end = client.wrap_bio(to_client, to_server)
+    server_end = server.wrap_bio(to_server, to_client, server_side=True)
+    for end in (client_end, server_end, client_end):
         try:
             end.do_handshake()
         except ssl.SSLWantReadError:
@@ -123,6 +120,6 @@ def _fault(shows: ssl.SSLContext, asks: ssl.SSLContext) -> str | None:
 
 
 def _reason(error: Exception) -> str:
-    """What OpenSSL says, in a few words."""
+    """OpenSSL's reason, in a few words."""
     reason = getattr(error, "reason", None) or str(error)
     return str(reason).replace("_", " ").lower()

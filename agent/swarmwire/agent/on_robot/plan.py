@@ -1,4 +1,9 @@
-"""Whether an agent finds what it needs on its robot: on the body, from driver, radio and tracker."""
+"""The resolved configuration of one robot: agent, body, driver and speed limits, loaded and checked.
+
+`robot_config` turns settings into a `RobotConfig` before anything is connected; BadInput names the first wrong key.
+`check_needs` compares the agent's `needs` with the capabilities of body, driver, radio and tracker. `SpeedLimits` cap
+the commands of the agent below the limits of the hardware.
+"""
 
 import hashlib
 import inspect
@@ -22,79 +27,77 @@ from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 
-OF_TRACKER = ("positioning", "compass")  # senses that poses of a tracker stand in for
-OF_POSES = ("radio.range", "radio.bearing")  # what poses add to a real radio
+OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
+OF_POSES = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio
+DEFAULT_SPEED_SHARE = 0.5  # of the body's limits, unless the settings name a speed
+MAX_COMMAND = 1e6  # in place of inf, so that a command keeps its direction
 
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What there is on a robot."""
+    """The sensors and measurements of a robot."""
 
     body: Body
     driver: str  # its name
-    driver_gives: AbstractSet[str]
+    driver_measures: AbstractSet[str]
     radio: str  # its kind
-    radio_gives: AbstractSet[str]
+    radio_measures: AbstractSet[str]
     tracker: bool
 
 
-def check_needs(agent: str, needs: tuple[str, ...], offer: Capabilities, where: str) -> None:
-    """BadInput at `agent` in `where` for the first need that is not met: which, and what would give it."""
+def check_needs(agent: str, needs: tuple[str, ...], capabilities: Capabilities, where: str) -> None:
+    """BadInput at `agent` in `where` for the first unmet need: its name, and what would meet it."""
     for need in needs:
-        fault = _of_radio(need, offer) if need.startswith("radio.") else _of_robot(need, offer)
+        fault = _radio_fault(need, capabilities) if need.startswith("radio.") else _robot_fault(need, capabilities)
         if fault:
             raise BadInput(where, "agent", f"{agent} needs {need!r}, which {fault}")
 
 
-def tracked(needs: tuple[str, ...], offer: Capabilities) -> frozenset[str]:
-    """The senses that the tracker gives: those of the body that the driver does not."""
-    if not offer.tracker:
+def tracked(needs: tuple[str, ...], capabilities: Capabilities) -> frozenset[str]:
+    """The sensors that the tracker replaces: those of the body that the driver does not read."""
+    if not capabilities.tracker:
         return frozenset()
-    return frozenset(need for need in needs if need in OF_TRACKER and need not in offer.driver_gives)
+    return frozenset(need for need in needs if need in OF_TRACKER and need not in capabilities.driver_measures)
 
 
-def _of_robot(need: str, offer: Capabilities) -> str | None:
-    body = offer.body
+def _robot_fault(need: str, capabilities: Capabilities) -> str | None:
+    body = capabilities.body
     if need not in body.sensors:
         return f"the body {body.name} lacks: it has {', '.join(body.sensors) or 'no sensors'}"
-    if need in offer.driver_gives or need in tracked((need,), offer):
+    if need in capabilities.driver_measures or need in tracked((need,), capabilities):
         return None
-    measures = ", ".join(sorted(offer.driver_gives)) or "nothing"
-    cure = ": expected tracker = true" if need in OF_TRACKER else ""
-    return f"the driver {offer.driver} does not give (it gives {measures}){cure}"
+    measures = ", ".join(sorted(capabilities.driver_measures)) or "nothing"
+    hint = ": expected tracker = true" if need in OF_TRACKER else ""
+    return f"the driver {capabilities.driver} does not give (it gives {measures}){hint}"
 
 
-def _of_radio(need: str, offer: Capabilities) -> str | None:
-    if need in offer.radio_gives:
+def _radio_fault(need: str, capabilities: Capabilities) -> str | None:
+    if need in capabilities.radio_measures:
         return None
-    if offer.radio == "none":
+    if capabilities.radio == "none":
         return 'only a radio tells: expected radio.kind "zenoh" or "world"'
-    if need in OF_POSES and offer.radio == "zenoh":
+    if need in OF_POSES and capabilities.radio == "zenoh":
         return "a real radio does not tell: expected tracker = true"
-    measures = ", ".join(sorted(offer.radio_gives)) or "nothing of a packet"
-    return f"the radio {offer.radio} does not tell: it tells {measures}"
-
-
-# --- Speed limits of a robot, below what its hardware can do.
-
-
-SHARE = 0.5  # of what the body can do, unless the settings say otherwise
-FASTEST = 1e6  # in place of inf, so that a command keeps its direction
+    measures = ", ".join(sorted(capabilities.radio_measures)) or "nothing of a packet"
+    return f"the radio {capabilities.radio} does not tell: it tells {measures}"
 
 
 @dataclass(frozen=True)
 class SpeedLimits:
-    """How fast the robot may go: a command above is slowed down as a whole, so that its curve stays."""
+    """The robot's greatest speeds, below those of its hardware.
+
+    A command above a limit is scaled down as a whole, so that the robot keeps to its curve.
+    """
 
     linear_mps: float  # in any direction of the plane
     angular_radps: float
-    wheel_mps: float | None = None  # of each of two wheels, which drive and turn share
+    wheel_mps: float | None = None  # of each of two wheels; driving and turning share it
     wheel_base_m: float = 0.0
 
     def clipped(self, command: Command) -> Command:
-        """The command within the limits, the same object if it is; its numbers may be infinite, but not nan."""
+        """The command within the limits: the same object if it already is. Numbers may be infinite, but not nan."""
         linear, angular, lateral = (
-            max(-FASTEST, min(FASTEST, speed))
+            max(-MAX_COMMAND, min(MAX_COMMAND, speed))
             for speed in (command.linear_mps, command.angular_radps, command.lateral_mps)
         )
         excess = max(hypot(linear, lateral) / self.linear_mps, abs(angular) / self.angular_radps)
@@ -108,7 +111,7 @@ class SpeedLimits:
 
 
 def limits_for(body: Body, max_linear_mps: float | None, max_angular_radps: float | None, where: str) -> SpeedLimits:
-    """The limits that the settings in `where` ask for; BadInput where they are above the body's own."""
+    """The limits of the settings in `where`; BadInput for one above the body's."""
     linear = _limit(max_linear_mps, body.max_linear_mps, where, "max_linear_mps", f"m/s, which the {body.name} can do")
     turn = _limit(
         max_angular_radps, body.max_angular_radps, where, "max_angular_radps", f"rad/s, which the {body.name} can do"
@@ -118,24 +121,21 @@ def limits_for(body: Body, max_linear_mps: float | None, max_angular_radps: floa
     return SpeedLimits(linear, turn)
 
 
-def _limit(given: float | None, most: float, where: str, key: str, unit: str) -> float:
-    if given is None:
-        return SHARE * most
-    if given > most:
-        raise BadInput(where, key, f"expected at most {most:.4g} {unit}; got {given!r}")
-    return given
-
-
-# --- What the settings of a robot come to: agent, body, driver and limits, found and checked at the door.
+def _limit(limit: float | None, body_limit: float, where: str, key: str, unit: str) -> float:
+    if limit is None:
+        return DEFAULT_SPEED_SHARE * body_limit
+    if limit > body_limit:
+        raise BadInput(where, key, f"expected at most {body_limit:.4g} {unit}; got {limit!r}")
+    return limit
 
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """One robot, ready to be run; nothing is connected.
+    """One robot, ready to run; nothing is connected yet.
 
     Attributes:
         where: the file of the settings, for errors.
-        params: the agent's parameters; of lists with a value for each robot, this robot's.
+        params: the agent's parameters; this robot's value of each list per robot.
     """
 
     settings: RobotSettings
@@ -147,31 +147,31 @@ class RobotConfig:
     limits: SpeedLimits
 
     @property
-    def offer(self) -> Capabilities:
-        """What the agent finds; of the world's air, what it tells is known once it was joined."""
+    def capabilities(self) -> Capabilities:
+        """The capabilities before the start; those of a world's radio medium are known once the robot has joined it."""
         settings = self.settings
-        tells = OF_POSES if settings.radio.kind == "zenoh" and settings.tracker else ()
+        measures = OF_POSES if settings.radio.kind == "zenoh" and settings.tracker else ()
         return Capabilities(
             self.body,
             settings.driver.name,
             self.driver.measures,
             settings.radio.kind,
-            frozenset(tells),
+            frozenset(measures),
             settings.tracker,
         )
 
     def __str__(self) -> str:
         settings, limits = self.settings, self.limits
-        at = f" at {settings.driver.address}" if settings.driver.address else ""
+        place = f" at {settings.driver.address}" if settings.driver.address else ""
         return (
-            f"{settings.agent.rpartition('/')[2]} on {self.body.name} by {settings.driver.name}{at}, "
+            f"{settings.agent.rpartition('/')[2]} on {self.body.name} by {settings.driver.name}{place}, "
             f"radio {settings.radio.kind}, {settings.rate_hz} Hz, "
             f"at most {limits.linear_mps:.3g} m/s and {limits.angular_radps:.3g} rad/s"
         )
 
 
 def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> RobotConfig:
-    """What the settings in `where` come to; BadInput names the first key that is wrong."""
+    """The resolved configuration of the settings in `where`; BadInput names the first wrong key."""
     driver, body = driver_of(settings, where, clock)
     agent, params = _agent(settings, where)
     if settings.watchdog_s * settings.rate_hz <= 1.0:
@@ -180,9 +180,9 @@ def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> Robo
     limits = limits_for(body, settings.max_linear_mps, settings.max_angular_radps, where)
     plan = RobotConfig(settings, where, agent, params, body, driver, limits)
     needs = agent.needs
-    if settings.radio.kind == "world":  # what the medium tells is known once it was joined
+    if settings.radio.kind == "world":  # known once the robot has joined the medium
         needs = tuple(need for need in needs if not need.startswith("radio."))
-    check_needs(agent.__name__, needs, plan.offer, where)
+    check_needs(agent.__name__, needs, plan.capabilities, where)
     if settings.network and settings.network.proves:
         from swarmwire.agent.on_robot.network_check import check_certificates  # ssl costs memory
 
@@ -191,7 +191,7 @@ def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> Robo
 
 
 def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:
-    """The driver, not yet connected, and the body that it drives; BadInput names the key that is wrong."""
+    """The driver, not yet connected, and the body that it drives; BadInput names the wrong key."""
     kind = load_driver(settings.driver.name, where, "driver.name")
     options = built(kind.options, settings.driver.options, where, "driver")
     body = _body(settings.body, where) if settings.body else load_body(kind.body_name)
@@ -204,7 +204,7 @@ def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[D
 
 
 def agent_sha256(agent: AgentClass) -> str:
-    """The digest of the file that the agent stands in; empty if it has none."""
+    """The sha256 of the agent's source file; empty if it has none."""
     file = inspect.getsourcefile(agent) if agent.__module__ != "builtins" else None
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
 

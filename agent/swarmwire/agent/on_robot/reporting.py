@@ -1,4 +1,9 @@
-"""Tells systemd how a service of `Type=notify` is: a datagram to the socket that it names, if there is one."""
+"""Reports of one robot: state notifications for systemd, a status file, lines for the terminal, and their schedule.
+
+`RobotObservers` is the loop's observer: it writes the log at each step, log file and status once a second, and the
+terminal every five seconds. No fault of an output stops the robot: a full disk or a closed terminal is counted or
+ignored.
+"""
 
 import json
 import os
@@ -14,11 +19,27 @@ from swarmwire.agent.on_robot.log import RobotLog, TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Control
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
 
-READY, ALIVE, STOPPING = "READY=1", "WATCHDOG=1", "STOPPING=1"
+READY, ALIVE, STOPPING = "READY=1", "WATCHDOG=1", "STOPPING=1"  # states of a systemd service of `Type=notify`
+STATUS_FILE = "status.json"
+NOT_STARTED: Mapping[str, Any] = {
+    "state": "starting",
+    "tick": -1,
+    "late_ticks": 0,
+    "watchdog_stops": 0,
+    "charge": None,
+    "agent_state": "",
+    "counts": {},
+}
+CLOCK_SET = "the clock was set by {:+.3f} s: times in the log before and after do not compare"
+CLOCK_SET_NS = to_ns(0.05)  # per second; a clock that is only synchronised moves by less
+EMERGENCY = "emergency stop at step {}: motors off for good; end the agent, and start it anew, to go on"
+SILENT = "watchdog: nothing was received of the agent for {:.2f} s; motors off until it goes on"
+LOG_FULL = "the log cannot be written, and goes on without what is lost: {}"
+STATUS_INTERVAL_S, TERMINAL_INTERVAL_S = 1.0, 5.0  # of the robot's time
 
 
 def notify(state: str) -> None:
-    """Send a state such as READY; without systemd nothing happens."""
+    """Send systemd a state such as READY, by a datagram to `NOTIFY_SOCKET`; without systemd nothing happens."""
     address = os.environ.get("NOTIFY_SOCKET")
     if not address:
         return
@@ -26,25 +47,19 @@ def notify(state: str) -> None:
         out.sendto(state.encode(), f"\0{address[1:]}" if address.startswith("@") else address)
 
 
-# --- How a robot is, in a file that is always whole: for `swarmwire robots status`, and whoever looks on the robot.
-
-
-NAME = "status.json"  # in a folder of the robot's own
-
-
 def status_path(log: str, robot: str) -> Path | None:
-    """Where the status of a robot stands: in the folder of its logs, else in the user's folder for what runs."""
+    """The path of the status file: in the log folder, else in the user's runtime folder; None without either."""
     if log:
-        return Path(log) / f"{robot}-{NAME}"  # robots may share it
+        return Path(log) / f"{robot}-{STATUS_FILE}"  # robots may share it
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    return Path(runtime) / "swarmwire" / robot / NAME if runtime else None
+    return Path(runtime) / "swarmwire" / robot / STATUS_FILE if runtime else None
 
 
 class StatusFile:
-    """Written anew each time, and put in place of the last one; a disk that is full keeps the last one.
+    """The status of a robot as JSON, replaced atomically, for `swarmwire robots status`; a full disk keeps the old one.
 
     Attributes:
-        lost: how many could not be written so far.
+        lost: statuses that could not be written so far.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -52,7 +67,7 @@ class StatusFile:
         self.lost = 0
 
     def write(self, status: Mapping[str, Any]) -> None:
-        """Put a status, of plain values, in place of the last one."""
+        """Replace the status by this one, of plain values."""
         if self._path is None:
             return
         written = self._path.with_name(f".{self._path.name}.{os.getpid()}")
@@ -64,34 +79,31 @@ class StatusFile:
             self.lost += 1
 
 
-# --- What the agent of a robot tells whoever started it: a line at the start, now and then how it is, and a summary.
-
-
 class Terminal:
-    """Lines for people; how the robot is meanwhile only where somebody can watch.
+    """Lines for people: the start, messages, the status every few seconds on a terminal, and a summary.
 
-    Nobody may be there to read them any more: that stops no robot.
+    A closed terminal or pipe does not stop the robot.
     """
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._watched = sys.stdout.isatty()
+        self._is_terminal = sys.stdout.isatty()
 
     def say(self, line: str) -> None:
-        """Something that the user should know, on standard error."""
+        """A message for the user, on standard error."""
         _write(sys.stderr, f"{self._robot}: {line}\n")
 
     def begin(self, what: str) -> None:
-        """What runs."""
+        """Print the configuration that runs."""
         self._line(what)
 
     def show(self, status: Mapping[str, Any]) -> None:
-        """How the robot is, if somebody watches."""
-        if self._watched:
+        """Print the status, if standard output is a terminal."""
+        if self._is_terminal:
             self._line(short(status))
 
     def end(self, summary: Mapping[str, Any], cause: str | None = None) -> None:
-        """What it came to; with a cause, if only an empty one, it failed."""
+        """Print the summary; with a cause, also an empty one, the run failed."""
         counts = ", ".join(f"{name} {count}" for name, count in summary["counts"].items())
         faults = counts or ("no faults" if cause is None else "")
         ended = f"ended ({summary['ended']}{f': {cause}' if cause else ''})"
@@ -111,7 +123,7 @@ def _write(out: TextIO, line: str) -> None:
         out.flush()
     except (OSError, ValueError):  # a pipe that nobody reads, a full disk; a file that was closed
         with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
-            os.dup2(nowhere.fileno(), out.fileno())  # also what waits, which Python would write at its end
+            os.dup2(nowhere.fileno(), out.fileno())  # also for buffered text, which Python would write at exit
 
 
 def short(status: Mapping[str, Any]) -> str:
@@ -130,31 +142,12 @@ def short(status: Mapping[str, Any]) -> str:
     return ", ".join(words)
 
 
-# --- Those who look on while an agent runs on a robot: log, status file, terminal and systemd. None can stop it.
-
-
-NOT_YET: Mapping[str, Any] = {
-    "state": "starting",
-    "tick": -1,
-    "late_ticks": 0,
-    "watchdog_stops": 0,
-    "charge": None,
-    "agent_state": "",
-    "counts": {},
-}
-CLOCK_SET = "the clock was set by {:+.3f} s: times in the log before and after do not compare"
-SET_NS = to_ns(0.05)  # a clock that is only kept in step is moved by less in a second
-EMERGENCY = "emergency stop at step {}: motors off for good; end the agent, and start it anew, to go on"
-SILENT = "watchdog: nothing was received of the agent for {:.2f} s; motors off until it goes on"
-LOG_FULL = "the log cannot be written, and goes on without what is lost: {}"
-
-
 class RobotObservers:
-    """Told of each step; once a second they write, every five the terminal shows how the robot is.
+    """Log, status file, terminal and systemd; the intervals are in the robot's time.
 
     Attributes:
-        steps: how many there were.
-        look: called once a second: whoever looks on with them.
+        steps: steps so far.
+        look: called once a second, for a further observer.
     """
 
     def __init__(
@@ -167,22 +160,22 @@ class RobotObservers:
         facts: Mapping[str, Any],
         log: RobotLog | None,
     ) -> None:
-        """`facts` stand in each status: who and where the robot is."""
+        """`facts` are part of each status: name, swarm and log folder of the robot."""
         self._clock, self._terminal, self._file, self._control = clock, terminal, status_file, control
         self._facts, self._log = facts, log
-        self._status: Callable[[], Mapping[str, Any]] = lambda: NOT_YET
-        self._each_second = _Every(clock, to_ns(pace))
-        self._each_show = _Every(clock, to_ns(5.0 * pace))
-        self._told_of_log = False
-        self._ahead_ns = self._date_ahead_ns()
+        self._status: Callable[[], Mapping[str, Any]] = lambda: NOT_STARTED
+        self._status_interval = _Interval(clock, to_ns(STATUS_INTERVAL_S * pace))
+        self._terminal_interval = _Interval(clock, to_ns(TERMINAL_INTERVAL_S * pace))
+        self._reported_log = False
+        self._offset_ns = self._utc_offset_ns()
         self._clock_set = 0
-        self._stopped_at: int | None = None
+        self._stop_step: int | None = None
         control.at_stop = self._stopped
         self.steps = 0
         self.look: Callable[[], None] = lambda: None
 
     def attach(self, status: Callable[[], Mapping[str, Any]]) -> None:
-        """Whom to ask how the robot is, from now on."""
+        """Take the status from this call from now on."""
         self._status = status
         self._report()
 
@@ -195,33 +188,33 @@ class RobotObservers:
 
     def wait(self) -> None:
         """No step is due."""
-        if self._each_second.due():
+        if self._status_interval.due():
             self._flush()
-            self._notice_clock()
+            self._check_clock()
             self.look()
             self._report()
             notify(ALIVE)
-        if self._each_show.due():
+        if self._terminal_interval.due():
             self._terminal.show(self._status())
 
     def say(self, line: str) -> None:
-        """Something that the user should know."""
+        """A message for the user."""
         self._terminal.say(line)
 
     def silent(self, silent_s: float) -> None:
-        """The watchdog has stopped the motors, since nothing was received of the loop for so long."""
-        self._call(SILENT.format(silent_s))
+        """The watchdog has stopped the motors, because the loop did not feed it for this long."""
+        self._say_in_thread(SILENT.format(silent_s))
 
     def _stopped(self) -> None:
-        self._stopped_at = self.steps
-        self._call(EMERGENCY.format(self.steps))
+        self._stop_step = self.steps
+        self._say_in_thread(EMERGENCY.format(self.steps))
 
-    def _call(self, line: str) -> None:
-        """Say it from a thread that whoever looks after the motors does not wait for: a terminal may take nothing."""
+    def _say_in_thread(self, line: str) -> None:
+        """Print from another thread: a terminal that blocks must not delay the threads that stop the motors."""
         threading.Thread(target=self.say, args=(line,), daemon=True).start()
 
     def end(self, ended: str, cause: str | None = None) -> None:
-        """The last words: the summary, in the log, too; with a cause, it failed."""
+        """Write the summary to log and terminal; with a cause, the run failed."""
         status = self._status()
         summary: dict[str, Any] = {
             "ended": ended,
@@ -230,8 +223,8 @@ class RobotObservers:
             "watchdog_stops": status["watchdog_stops"],
             "counts": self._counts(status),
         }
-        if self._stopped_at is not None:
-            summary["emergency_stop_at"] = self._stopped_at
+        if self._stop_step is not None:
+            summary["emergency_stop_at"] = self._stop_step
         if self._log is not None:
             self._log.end(summary)
         self._report(ended)
@@ -241,42 +234,42 @@ class RobotObservers:
         if self._log is None:
             return
         self._log.flush()
-        if self._log.fault and not self._told_of_log:
-            self._told_of_log = True
+        if self._log.fault and not self._reported_log:
+            self._reported_log = True
             self.say(LOG_FULL.format(self._log.fault))
 
-    def _date_ahead_ns(self) -> int:
+    def _utc_offset_ns(self) -> int:
         return self._clock.utc_ns() - self._clock.now_ns()
 
-    def _notice_clock(self) -> None:
-        """A robot without a battery for its clock learns the date from the network, some time after it was started."""
-        ahead_ns = self._date_ahead_ns()
-        moved_ns, self._ahead_ns = ahead_ns - self._ahead_ns, ahead_ns
-        if abs(moved_ns) > SET_NS:
+    def _check_clock(self) -> None:
+        """Report a date that was set: a robot without a clock battery gets it from the network after its start."""
+        offset_ns = self._utc_offset_ns()
+        moved_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
+        if abs(moved_ns) > CLOCK_SET_NS:
             self._clock_set += 1
             self.say(CLOCK_SET.format(to_s(moved_ns)))
 
     def _report(self, ended: str | None = None) -> None:
         status = self._status()
-        told = {**self._facts, **status, "utc_ns": self._clock.utc_ns(), "counts": self._counts(status)}
-        if self._stopped_at is not None:
-            told |= {"state": STOP_REQUESTED, "emergency_stop_at": self._stopped_at}
+        report = {**self._facts, **status, "utc_ns": self._clock.utc_ns(), "counts": self._counts(status)}
+        if self._stop_step is not None:
+            report |= {"state": STOP_REQUESTED, "emergency_stop_at": self._stop_step}
         if ended is not None:
-            told |= {"state": "ended", "ended": ended}
-        self._control.tell(told)
-        self._file.write(told)
+            report |= {"state": "ended", "ended": ended}
+        self._control.tell(report)
+        self._file.write(report)
 
     def _counts(self, status: Mapping[str, Any]) -> dict[str, int]:
-        own = self._log.counts() if self._log else {}
+        of_reports = self._log.counts() if self._log else {}
         if self._clock_set:
-            own["clock_set"] = self._clock_set
+            of_reports["clock_set"] = self._clock_set
         if self._file.lost:
-            own["status_lost"] = self._file.lost
-        return {**status["counts"], **own}
+            of_reports["status_lost"] = self._file.lost
+        return {**status["counts"], **of_reports}
 
 
-class _Every:
-    """Whether a period has gone by since it was the last time."""
+class _Interval:
+    """Whether a period has passed since `due` was last true."""
 
     def __init__(self, clock: DatedClock, period_ns: int) -> None:
         self._clock, self._period_ns = clock, period_ns

@@ -1,4 +1,25 @@
-"""The motors of a robot, behind the emergency stop and the loss of the driver."""
+"""Emergency stop, watchdog and stop signals of one robot: every path on which its motors are switched off.
+
+An emergency stop latches. `Control.estop` sets the latch and then stops the motors; from then on `Motors.act` drops
+every command and the loop no longer steps the agent. Only a new process can drive the robot again. Requests come
+
+- over the robots' network: `radios/control.py` calls `Control.estop` in a thread of its own, so that an agent that
+  hangs cannot delay it;
+- from another process of this machine (`swarmwire-agent stop-motors`): it finds the process that holds the robot's
+  lock, sends it a signal and reads the confirmation from the lock (`robot_lock.py`).
+
+A request at a robot that is out of reach raises DriverLost, so that the operator does not take it for stopped. The
+latch stays set, and the loop stops the motors as soon as the robot answers again (`reconnect` in `loop.py`).
+
+Three mechanisms stop the motors without a request:
+
+- `Watchdog`: the loop is late. Motors stay off until the loop continues.
+- `Heartbeats`: the process died or froze. The guard (`guard.py`, a process of its own) misses the heartbeats, kills
+  the process and stops the motors by its own connection. A heartbeat also carries the latch, so that the guard's exit
+  code does not make a service manager restart an agent after an emergency stop.
+- `StopFlag`: a signal arrived or the guard is gone. The loop ends after the current step, and `assembly.py` closes
+  the robot, motors first.
+"""
 
 import os
 import signal
@@ -13,53 +34,91 @@ from swarmwire.agent.on_robot.guard import RUNS, STOPPED
 from swarmwire.comms.clock import Clock, to_ns, to_s
 
 OUT_OF_REACH = "the robot is out of reach, and may go on as it was told last"
+STOP_REQUESTED = "estop"  # the state of a robot after an emergency stop
+SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+CHECKS_PER_TIMEOUT = 5  # of the watchdog
+MIN_CHECK_INTERVAL_S = 0.01  # also for a robot that is emulated far faster than the wall clock
+
+
+class Control:
+    """The latching emergency stop and the robot's status; both may be called from any thread.
+
+    Attributes:
+        at_stop: called at the first emergency stop, after the motors were asked to stop.
+    """
+
+    def __init__(self, stop: Callable[[], None]) -> None:
+        """`stop` switches the motors off at once, from any thread; DriverLost if the robot is out of reach."""
+        self._stop = stop
+        self._latched = threading.Event()
+        self._status: Mapping[str, Any] = {}
+        self._first_lock = threading.Lock()
+        self.at_stop: Callable[[], None] = lambda: None
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the emergency stop is latched."""
+        return self._latched.is_set()
+
+    def estop(self) -> None:
+        """Motors off for good: at once, or, if DriverLost is raised, as soon as the robot answers again."""
+        with self._first_lock:
+            first = not self._latched.is_set()
+            self._latched.set()
+        try:
+            self._stop()
+        finally:
+            if first:
+                self.at_stop()
+
+    def status(self) -> Mapping[str, Any]:
+        """The newest status, in plain values. The loop sets it, so it is old while an agent hangs."""
+        return {**self._status, "state": STOP_REQUESTED} if self.stopped else self._status
+
+    def tell(self, status: Mapping[str, Any]) -> None:
+        """Replace the status."""
+        self._status = status
 
 
 class Motors:
-    """Hands commands to the driver unless the emergency stop is latched; `stop` may be called from any thread.
+    """Passes commands to the driver until the emergency stop is latched; `stop` may be called from any thread.
 
     Attributes:
-        reachable: whether the robot answered when it was last asked for something; the loop knows.
+        control: the emergency stop of these motors.
+        reachable: whether the robot answered the last call; the loop sets it.
     """
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
-        self.control = Control(self._stop_or_tell)
+        self.control = Control(self._stop_or_raise)
         self.reachable = True
 
     def act(self, command: Command) -> None:
-        """Hand a command to the robot; DriverLost if it cannot be. Nothing moves after an emergency stop."""
+        """Pass a command to the robot; DriverLost if that fails. Nothing moves after an emergency stop."""
         if self.control.stopped:
             return
         self._driver.act(command)
-        if self.control.stopped:  # it came while the command was on its way, and may have been overtaken
+        if self.control.stopped:  # it came during the call, and the command may have overtaken it
             self._driver.stop()
 
     def stop(self) -> None:
-        """Motors off at once. A robot that cannot be reached is stopped first of all when it can be."""
+        """Motors off at once. The loop stops a robot that is out of reach as soon as it answers again."""
         try:
             self._driver.stop()
         except DriverLost:
             return
 
-    def _stop_or_tell(self) -> None:
-        """Motors off at once; DriverLost if the robot cannot be reached, so that nobody believes that it stands."""
+    def _stop_or_raise(self) -> None:
+        """Motors off at once; DriverLost if the robot is out of reach, so that nobody takes it for stopped."""
         self._driver.stop()
         if not self.reachable:
             raise DriverLost(OUT_OF_REACH)
 
 
-# --- The watchdog of an agent on a robot: motors off when the loop has not fed it for too long.
-
-
-LOOKS = 5  # in the time that it allows
-MIN_LOOK_S = 0.01  # also of a robot that is emulated far faster than the wall clock
-
-
 class Watchdog:
-    """A thread of its own that stops the motors, once in a lapse; it rests until it is fed.
+    """A thread that stops the motors, once per lapse, when `feed` was not called in time; it rests until the first.
 
-    Each time it looks it calls `beat`, so that the guard outside knows that this process runs.
+    At each check it also calls `beat`, so that the guard outside knows that this process runs.
 
     Attributes:
         stops: how often it stopped the motors so far.
@@ -74,103 +133,74 @@ class Watchdog:
         beat: Callable[[], None] = lambda: None,
         tell: Callable[[float], None] = lambda _: None,
     ) -> None:
-        """`tell` is told for how many seconds nothing was received of the loop, once the motors were stopped for it."""
-        self._after_ns, self._stop, self._clock = to_ns(after_s), stop, clock
-        self._look_s = max(after_s / LOOKS / pace, MIN_LOOK_S)  # of wall time
-        self._beat, self._tell = beat, tell
+        """`tell` gets the seconds since the loop last fed the watchdog, after the motors were stopped for it."""
+        self._timeout_ns, self._stop, self._clock = to_ns(after_s), stop, clock
+        self._check_interval_s = max(after_s / CHECKS_PER_TIMEOUT / pace, MIN_CHECK_INTERVAL_S)  # of wall time
+        self._beat, self._report = beat, tell
         self._fed_ns: int | None = None  # None: it rests
-        self._lapsed_ns: int | None = None  # when it was fed last before it stopped the motors
+        self._lapsed_ns: int | None = None  # the last `_fed_ns` for which it stopped the motors
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self.stops = 0
 
     def start(self) -> None:
-        """Begin to look, and beat at once: from now on motors may move."""
+        """Start the thread and send the first heartbeat at once: from now on motors may move."""
         self._beat()
         self._thread.start()
 
     def feed(self) -> None:
-        """The loop is there: from now on it has its time again."""
+        """The loop runs: the timeout starts again."""
         self._fed_ns = self._clock.now_ns()
 
     def rest(self) -> None:
-        """Nothing is expected until it is fed again: the motors are at rest, or cannot be reached."""
+        """Suspend the timeout until the next `feed`: the motors are at rest, or out of reach."""
         self._fed_ns = None
 
     def look(self) -> None:
-        """Stop the motors if the loop has not been received of for too long."""
+        """Stop the motors if the timeout has passed."""
         fed_ns = self._fed_ns
-        if fed_ns is None or fed_ns == self._lapsed_ns or (silent_ns := self._clock.now_ns() - fed_ns) < self._after_ns:
+        if fed_ns is None or fed_ns == self._lapsed_ns:
+            return
+        silent_ns = self._clock.now_ns() - fed_ns
+        if silent_ns < self._timeout_ns:
             return
         self._lapsed_ns = fed_ns
         self._stop()
         self.stops += 1
-        self._tell(to_s(silent_ns))
+        self._report(to_s(silent_ns))
 
     def end(self) -> None:
-        """Look no more; safe to call more than once, and before `start`."""
+        """Stop the thread; safe to call more than once, and before `start`."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()
 
     def _run(self) -> None:
-        while not self._ended.wait(self._look_s):
+        while not self._ended.wait(self._check_interval_s):
             self.look()
             self._beat()
 
 
-# --- What whoever runs the swarm may ask of a robot while its agent runs: an emergency stop, and how it is.
+class Heartbeats:
+    """Sends the guard one byte per call: the process runs, or its motors were stopped for good.
 
-
-STOP_REQUESTED = "estop"  # the state of a robot whose agent goes on no more
-
-
-class Control:
-    """The emergency stop, which latches, and the robot's status; both may be asked from any thread.
-
-    An agent that was stopped so is not stepped any more: only a new process goes on.
-
-    Attributes:
-        at_stop: called at the first emergency stop, as soon as the motors were asked to stop.
+    Without a pipe there is no guard, and nothing happens.
     """
 
-    def __init__(self, stop: Callable[[], None]) -> None:
-        """`stop` takes the motors off at once, from any thread; DriverLost if the robot cannot be reached."""
-        self._stop = stop
-        self._latched = threading.Event()
-        self._status: Mapping[str, Any] = {}
-        self._first = threading.Lock()
-        self.at_stop: Callable[[], None] = lambda: None
+    def __init__(self, pipe: int | None, stopped: Callable[[], bool], orphaned: Callable[[], None]) -> None:
+        """`stopped` is whether the emergency stop is latched; `orphaned` is called once nobody reads the pipe."""
+        self._pipe, self._stopped, self._orphaned = pipe, stopped, orphaned
 
-    @property
-    def stopped(self) -> bool:
-        """Whether the emergency stop is latched."""
-        return self._latched.is_set()
-
-    def estop(self) -> None:
-        """Motors off, for good: at once, or, if DriverLost is raised, as soon as the robot can be reached."""
-        with self._first:
-            first = not self._latched.is_set()
-            self._latched.set()
+    def __call__(self) -> None:
+        """Send a heartbeat."""
+        if self._pipe is None:
+            return
         try:
-            self._stop()
-        finally:
-            if first:
-                self.at_stop()
-
-    def status(self) -> Mapping[str, Any]:
-        """The newest status, of plain values, as the loop told it, which an agent that hangs holds up."""
-        return {**self._status, "state": STOP_REQUESTED} if self.stopped else self._status
-
-    def tell(self, status: Mapping[str, Any]) -> None:
-        """Put a new status in place of the last one."""
-        self._status = status
-
-
-# --- What ends the agent of a robot from outside its loop: a signal, or the loss of the guard.
-
-
-SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+            os.write(self._pipe, STOPPED if self._stopped() else RUNS)
+        except BlockingIOError:  # the guard is frozen, and has enough to read when it continues
+            return
+        except OSError:
+            self._orphaned()
 
 
 class StopFlag:
@@ -180,7 +210,7 @@ class StopFlag:
         self.reason: str | None = None
 
     def ask(self, reason: str) -> None:
-        """End after the step that goes on; the first reason stays."""
+        """End after the current step; the first reason stays."""
         self.reason = self.reason or reason
 
     def __bool__(self) -> bool:
@@ -189,10 +219,10 @@ class StopFlag:
 
 @contextmanager
 def by_signals(end: StopFlag, patient: bool) -> Generator[None]:
-    """While it holds, signals ask for the end.
+    """Within this context, signals set the stop flag.
 
-    Unless it is `patient`, a second Ctrl-C does what it does to any program. With a guard, which ends what does not
-    end in time, signals may come twice: from the guard, and from whoever sends them to all processes, as systemd does.
+    Unless it is `patient`, a second Ctrl-C interrupts as in any program. With a guard, which kills a process that does
+    not end in time, a signal may come twice: from the guard, and from a sender that signals all processes, as systemd.
     """
     before = {number: signal.getsignal(number) for number in SIGNALS}
 
@@ -208,25 +238,3 @@ def by_signals(end: StopFlag, patient: bool) -> Generator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-# --- What an agent's process tells its guard through a pipe: that it runs, and whether it was stopped for good.
-
-
-class Heartbeats:
-    """A byte at each call; without a pipe there is no guard, and nothing happens."""
-
-    def __init__(self, pipe: int | None, stopped: Callable[[], bool], orphaned: Callable[[], None]) -> None:
-        """`stopped` tells of an emergency stop; `orphaned` is called when nobody reads the pipe any more."""
-        self._pipe, self._stopped, self._orphaned = pipe, stopped, orphaned
-
-    def __call__(self) -> None:
-        """Tell the guard."""
-        if self._pipe is None:
-            return
-        try:
-            os.write(self._pipe, STOPPED if self._stopped() else RUNS)
-        except BlockingIOError:  # the guard is frozen, and has enough to read when it wakes
-            return
-        except OSError:
-            self._orphaned()

@@ -1,4 +1,8 @@
-"""What the exit codes of `swarmwire-agent` mean."""
+"""Settings of one robot: the keys of `robot.toml`, the flags of `swarmwire-agent` that override them, and exit codes.
+
+`read_settings` reads a file and flags into a checked `RobotSettings`; BadInput names the file and the first wrong key.
+`by_flag` names the flag in place of the key, where the value came from a flag.
+"""
 
 import argparse
 import tomllib
@@ -14,21 +18,20 @@ from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
 
+# Exit codes of `swarmwire-agent`.
 ENDED = 0
 FAILED = 1  # an agent's error, no driver, the guard is gone
 BAD_INPUT = 2
 INTERRUPTED = 130  # Ctrl-C
 
-
-# --- What the settings of one robot, `robot.toml`, say; read by `settings_file.py`.
-
-
 FORMAT = 1  # of `robot.toml`
+NO_FILE = "command line"  # in place of the file, in errors of settings without one
+Flags = Mapping[str, tuple[str, Any]]  # key of the settings -> the flag's name and value
 
 
 @dataclass(frozen=True)
 class RadioSettings:
-    """Which radio the agent has."""
+    """The radio of the agent."""
 
     kind: str = parameter(
         "none",
@@ -42,11 +45,11 @@ class RadioSettings:
 
 @dataclass(frozen=True)
 class DriverSettings:
-    """Which driver, of which robot."""
+    """The driver, and the robot that it reaches."""
 
     name: str = parameter(help="expected a driver, as `swarmwire-agent drivers` lists them")
     address: str = parameter("", help="where the robot is reached, as its driver says")
-    options: dict[str, Any] = field(default_factory=dict[str, Any])  # as given; the driver says which there are
+    options: dict[str, Any] = field(default_factory=dict[str, Any])  # unchecked; the driver declares its options
 
 
 @dataclass(frozen=True)
@@ -57,9 +60,9 @@ class RobotSettings:
     driver: DriverSettings = parameter(help='expected a table such as { name = "epuck2", address = "192.168.1.23" }')
     name: str = parameter("robot-0", help="this robot")
     swarm: str = parameter("swarm", help="the swarm: the root of its keys")
-    robots: tuple[str, ...] = ()  # all of the swarm, in the order of their index; read: never empty
+    robots: tuple[str, ...] = ()  # all of the swarm, by index; never empty once read
     params: dict[str, Any] = field(default_factory=dict[str, Any])
-    body: str = parameter("", help="a body's name, or its sheet beside this file; else the driver's")
+    body: str = parameter("", help="a body's name, or its file beside this one; else the driver's")
     rate_hz: int = parameter(10, help="steps of the agent per second", unit="Hz", at_least=1, at_most=1000)
     watchdog_s: float = parameter(0.5, help="motors stop when the agent is later", unit="s", at_least=0.01, at_most=10)
     max_linear_mps: float | None = parameter(None, help="fastest speed; else half the body's", unit="m/s", above=0)
@@ -76,29 +79,22 @@ class RobotSettings:
 
     @property
     def index(self) -> int:
-        """The robot's place in the swarm: the number by which others know it."""
+        """The robot's index in the swarm, by which other robots address it."""
         return self.robots.index(self.name)
 
 
-# --- Reads the settings of a robot from its `robot.toml` and from flags, which override it; refused at the door.
-
-
-NO_FILE = "command line"  # where it is, in errors, when there is no file
-Flags = Mapping[str, tuple[str, Any]]  # key within the settings -> the flag, and what it was given
-
-
 def read_settings(file: Path | None, flags: Flags) -> RobotSettings:
-    """The settings of a file, if there is one, with what the flags say in place of its own.
+    """The settings of a file, if there is one, overridden by flags.
 
-    BadInput names the file and the key of the first that is wrong.
+    BadInput names the file and the first wrong key.
     """
     where = str(file) if file else NO_FILE
     table = read_toml(file) if file else {"format": FORMAT}
     check_format(table, FORMAT, where)
-    beside = (file.parent if file else Path()).resolve()
+    base = (file.parent if file else Path()).resolve()
     for key, (_, value) in flags.items():
         _put(table, key, value, where)
-    return _settings(table, where, beside)
+    return _settings(table, where, base)
 
 
 def _put(table: dict[str, Any], key: str, value: Any, where: str) -> None:
@@ -108,7 +104,7 @@ def _put(table: dict[str, Any], key: str, value: Any, where: str) -> None:
     table[name] = value
 
 
-def _settings(table: dict[str, Any], where: str, beside: Path) -> RobotSettings:
+def _settings(table: dict[str, Any], where: str, base: Path) -> RobotSettings:
     table = dict(table)
     for key in ("params", "driver"):
         if key in table:
@@ -117,19 +113,19 @@ def _settings(table: dict[str, Any], where: str, beside: Path) -> RobotSettings:
     if "driver" in table:
         table["driver"] = _driver(table["driver"])
     network = table.pop("network", None)
-    read: RobotSettings = built(RobotSettings, table, where, "")
-    _check_names(read, where)
+    settings: RobotSettings = built(RobotSettings, table, where, "")
+    _check_names(settings, where)
     if network is not None:
-        read = replace(read, network=Network.from_mapping(mapping_of(where, "network", network), where, beside))
-    if "\0" in read.log:
-        raise BadInput(where, "log", f"expected a folder, got {read.log!r}")
-    if read.network is None and (read.tracker or read.radio.kind != "none"):
+        settings = replace(settings, network=Network.from_mapping(mapping_of(where, "network", network), where, base))
+    if "\0" in settings.log:
+        raise BadInput(where, "log", f"expected a folder, got {settings.log!r}")
+    if settings.network is None and (settings.tracker or settings.radio.kind != "none"):
         raise BadInput(where, "network", "expected listen, connect or multicast = true: radio and tracker need it")
-    return _absolute(replace(read, robots=read.robots or (read.name,)), beside)
+    return _absolute(replace(settings, robots=settings.robots or (settings.name,)), base)
 
 
 def _driver(table: dict[str, Any]) -> dict[str, Any]:
-    """The driver's own options apart from what all drivers have."""
+    """Separate the driver's own options from the keys of all drivers."""
     common = {key: table[key] for key in ("name", "address") if key in table}
     return {**common, "options": {key: value for key, value in table.items() if key not in common}}
 
@@ -148,25 +144,22 @@ def _check_names(settings: RobotSettings, where: str) -> None:
         raise BadInput(where, "name", f"expected {did_you_mean(settings.robots, settings.name)}; got {settings.name!r}")
 
 
-def _absolute(settings: RobotSettings, beside: Path) -> RobotSettings:
-    """With the paths of files, which lie beside the settings, absolute."""
+def _absolute(settings: RobotSettings, base: Path) -> RobotSettings:
+    """The settings with absolute paths; relative ones start at the folder `base` of the settings."""
 
     def path(name: str) -> str:
-        return str((beside / name).resolve()) if name else ""
+        return str((base / name).resolve()) if name else ""
 
     return replace(
         settings,
-        agent=resolve(settings.agent, beside),
+        agent=resolve(settings.agent, base),
         body=path(settings.body) if settings.body.endswith(".toml") else settings.body,
         log=path(settings.log),
     )
 
 
-# --- The flags of `swarmwire-agent` that stand for keys of `robot.toml`, and what they were given.
-
-
 class Flag(NamedTuple):
-    """One flag, of one key."""
+    """A flag of `swarmwire-agent` that sets one key of `robot.toml`."""
 
     name: str
     key: str
@@ -210,9 +203,9 @@ FLAGS = (
     Flag("--seed", "seed", "of the agent's draws", "N"),
 )
 
-OF_DRIVER = ("--driver", "--address", "--option", "--name", "--body")  # all that stopping the motors needs
-NO_FLAG = {"agent": AGENT, "driver": "--driver", "network": "--listen"}  # for keys that are missing as a whole
-CURES = {  # as errors name the keys
+DRIVER_FLAGS = ("--driver", "--address", "--option", "--name", "--body")  # sufficient to stop the motors
+TABLE_FLAGS = {"agent": AGENT, "driver": "--driver", "network": "--listen"}  # by key that is missing as a whole
+HINTS = {  # keys in hints of errors -> flags
     "listen, connect or multicast = true": "--listen, --connect or --multicast",
     "ca, certificate and key": "--ca, --certificate and --key",
     "insecure = true": "--insecure",
@@ -223,62 +216,62 @@ CURES = {  # as errors name the keys
 
 
 def add_flags(parser: argparse.ArgumentParser, only_driver: bool = False) -> None:
-    """The agent and all flags; the help may list those of the driver alone."""
-    spec = argparse.SUPPRESS if only_driver else '"file.py:Class" or "package.module:Class"'
-    parser.add_argument("agent", metavar=AGENT, nargs="?", help=spec)
+    """Add the agent and all flags; `only_driver` hides the flags that do not concern the driver from the help."""
+    agent_help = argparse.SUPPRESS if only_driver else '"file.py:Class" or "package.module:Class"'
+    parser.add_argument("agent", metavar=AGENT, nargs="?", help=agent_help)
     for flag in FLAGS:
-        told = argparse.SUPPRESS if only_driver and flag.name not in OF_DRIVER else flag.help
+        text = argparse.SUPPRESS if only_driver and flag.name not in DRIVER_FLAGS else flag.help
         if flag.kind == "true":
-            parser.add_argument(flag.name, dest=flag.name, action="store_const", const=True, help=told)
+            parser.add_argument(flag.name, dest=flag.name, action="store_const", const=True, help=text)
         else:
             action = "append" if flag.kind in ("list", "pairs") else "store"
-            parser.add_argument(flag.name, dest=flag.name, action=action, metavar=flag.metavar, help=told)
+            parser.add_argument(flag.name, dest=flag.name, action=action, metavar=flag.metavar, help=text)
 
 
-def given_flags(parsed: argparse.Namespace) -> Flags:
-    """What the flags were given, by the keys that they stand for; BadInput for a pair that is none."""
-    given: dict[str, tuple[str, Any]] = {}
+def flags_in(parsed: argparse.Namespace) -> Flags:
+    """The flags of a command line by the keys that they set; BadInput for a malformed `K=V` pair."""
+    flags: dict[str, tuple[str, Any]] = {}
     if parsed.agent is not None:
-        given["agent"] = AGENT, resolve(parsed.agent, Path())
+        flags["agent"] = AGENT, resolve(parsed.agent, Path())
     for flag in FLAGS:
         value = getattr(parsed, flag.name)
         if value is None:
             continue
         if flag.kind == "pairs":
-            given |= {f"{flag.key}.{name}": (f"{flag.name} {name}", told) for name, told in _pairs(flag, value)}
+            flags |= {f"{flag.key}.{name}": (f"{flag.name} {name}", option) for name, option in _pairs(flag, value)}
         else:
-            given[flag.key] = flag.name, _read(flag, value)
-    return given
+            flags[flag.key] = flag.name, _read(flag, value)
+    return flags
 
 
 def by_flag(error: BadInput, where: str, flags: Flags) -> BadInput:
-    """The fault of a key of the settings in `where`, told of the flag that gave it, if one did.
+    """The fault of a key of the settings in `where`, attributed to the flag that set the key, if one did.
 
-    Where there is no file, cures that are keys are told as flags, too.
+    Without a file, hints that name keys name flags instead.
     """
     expected = _in_flags(error.expected) if where == NO_FILE else error.expected
     flag = next((flag for key, (flag, _) in flags.items() if (error.where, error.key) == (where, key)), None)
     if flag or error.where != NO_FILE:
         return BadInput(flag or error.where, "" if flag else error.key, expected)
-    missing = next((flag.name for flag in FLAGS if flag.key == error.key), NO_FLAG.get(error.key))
+    missing = next((flag.name for flag in FLAGS if flag.key == error.key), TABLE_FLAGS.get(error.key))
     return BadInput(error.where, missing or error.key, expected)
 
 
 def _in_flags(text: str) -> str:
-    """A cure that names keys of the settings, in flags.
+    """A hint that names keys of the settings, in flags.
 
     >>> _in_flags("expected listen, connect or multicast = true")
     'expected --listen, --connect or --multicast'
     >>> _in_flags('expected radio.kind "zenoh" or "world"')
     'expected --radio zenoh or --radio world'
     """
-    for keys, told in CURES.items():
-        text = text.replace(keys, told)
+    for keys, flags in HINTS.items():
+        text = text.replace(keys, flags)
     return text
 
 
 def _read(flag: Flag, value: Any) -> Any:
-    """A path is meant from where the command is given, not from where the settings lie."""
+    """The value of a flag; a path is relative to the working directory, not to the folder of the settings."""
     if flag.kind == "value":
         return _plain(value)
     is_path = flag.kind == "path" or (flag.kind == "spec" and value.endswith(".toml"))
@@ -294,7 +287,7 @@ def _pairs(flag: Flag, texts: list[str]) -> list[tuple[str, Any]]:
 
 
 def _plain(text: str) -> Any:
-    """The value of a text as TOML has it, or the text itself: 0.1, true, [1, 2], left."""
+    """The value of a text in TOML's syntax, or else the text itself: 0.1, true, [1, 2], left."""
     try:
         return from_toml(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.on_robot.log import TickRow, new_log
 from swarmwire.agent.on_robot.network_check import LivenessWatch
-from swarmwire.agent.on_robot.reporting import NOT_YET, RobotObservers, StatusFile, Terminal, short, status_path
+from swarmwire.agent.on_robot.reporting import NOT_STARTED, RobotObservers, StatusFile, Terminal, short, status_path
 from swarmwire.agent.on_robot.safety import Control
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.wire.radio_bridge import Pose
@@ -24,7 +24,7 @@ class _Watched(Terminal):
 
     def __init__(self) -> None:
         super().__init__("robot-0")
-        self._watched = True
+        self._is_terminal = True
 
 
 class _Set:
@@ -35,7 +35,7 @@ class _Set:
         self.log = new_log(folder / "log", ("robot-0",), "robot-0", "now", "robot.toml")
         self.file = folder / "status.json"
         self.control = Control(lambda: None)
-        self.status = {**NOT_YET, "state": "running", "counts": {"clipped_commands": 3}}
+        self.status = {**NOT_STARTED, "state": "running", "counts": {"clipped_commands": 3}}
         self.onlookers = RobotObservers(
             self.clock, pace, _Watched(), StatusFile(self.file), self.control, {"name": "robot-0"}, self.log
         )

@@ -3,7 +3,7 @@ import signal
 import pytest
 
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
-from swarmwire.agent.on_robot.robot_lock import ASKS_BY, OUT_OF_REACH, STOPPED, NotStopped, RobotLock
+from swarmwire.agent.on_robot.robot_lock import STOP_SIGNAL, OUT_OF_REACH, STOPPED, NotStopped, RobotLock
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from tests.support.agent.on_robot.scripted import DatedFakeClock, ScriptedDriver
@@ -50,14 +50,14 @@ def test_a_holder_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_pat
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock, asked = DatedFakeClock(), []
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    before = signal.signal(ASKS_BY, lambda *_: asked.append(True))
+    before = signal.signal(STOP_SIGNAL, lambda *_: asked.append(True))
     try:
         with first.held("robot.toml"):
             first.tell(told)
             with pytest.raises(NotStopped, match=expected):
                 second.stopped_by_holder()
     finally:
-        signal.signal(ASKS_BY, before)
+        signal.signal(STOP_SIGNAL, before)
     assert asked == [True]  # once, not in every round
 
 
