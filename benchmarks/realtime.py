@@ -6,7 +6,7 @@ import statistics
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.deploy import run
-from swarmwire.world.backends.pacing import LatencyHistogram
+from swarmwire.world.backends.pacing import LatencySummary
 from swarmwire.world.scenario.file import scenario_from
 
 AGENT = "benchmarks.agents:Relay"
@@ -39,5 +39,5 @@ def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: f
         report(of, statistics.median(values), "ms", results[-1], config)
 
 
-def _ms(delays: LatencyHistogram | None) -> float:
+def _ms(delays: LatencySummary | None) -> float:
     return delays.p99_s * MS_PER_S if delays else float("nan")

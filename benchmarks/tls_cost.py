@@ -115,7 +115,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
             at: list[str] = []
             around = BackendHooks(opened=at.extend)
             backend = LockstepBackend(
-                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, terms=JoinPolicy(open=True)
+                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, policy=JoinPolicy(open=True)
             )
             stack.callback(backend.close)
             backend.open()

@@ -149,7 +149,7 @@ class Backends:
                 terms,
                 self.subticks,
             )
-        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, terms=terms)
+        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, policy=terms)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""

@@ -9,7 +9,7 @@ from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.world.backends.join_policy import ListenSettings
-from swarmwire.world.backends.registry import GOES_ON, RunnerEvent
+from swarmwire.world.backends.registry import NON_BLOCKING, RunnerEvent
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -51,7 +51,7 @@ class Listening:
             return
         if not 0 <= self.start_with <= robots:
             raise BadInput("--start-with", "", f"expected 0 to {robots} (the robots), got {self.start_with}")
-        if self.start_with < robots and scenario.run.on_runner_loss not in GOES_ON:
+        if self.start_with < robots and scenario.run.on_runner_loss not in NON_BLOCKING:
             expected = "expected stand or coast with --start-with: what robots do that have no agent yet"
             raise BadInput(scenario.source, "run.on_runner_loss", expected)
 

@@ -89,7 +89,7 @@ class SmallRun:
         self.truths: list[Truth] = []
         self.given: Actions | None = None  # in place of the agents' actions
         self._hosts = dict(zip(RUNNERS, map(AgentExecutor, self.parts), strict=True))
-        self._roster = joined(Lockstep(list(self.parts), terms=JoinPolicy(memory=self.layouts)))
+        self._roster = joined(Lockstep(list(self.parts), policy=JoinPolicy(memory=self.layouts)))
 
     def do(self, actions: Actions) -> Truth:
         """A tick with these actions."""

@@ -30,7 +30,7 @@ def played(monkeypatch, tmp_path):
 
                 patched.setattr(backends, "LocalBackend", made)
             result = run(LOSSY, overrides=overrides, observers=[watcher])
-        told = [f"{change.what} {change.runner} {change.tick}" for of in backend for change in of.roster.changes]
+        told = [f"{change.what} {change.runner} {change.tick}" for of in backend for change in of.roster.events]
         return result, watcher, told
 
     return play

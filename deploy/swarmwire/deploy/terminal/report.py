@@ -12,7 +12,7 @@ from swarmwire.deploy.result import ArenaResult, Percentiles, Result, Statistics
 
 if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
-    from swarmwire.world.backends.pacing import LatencyHistogram
+    from swarmwire.world.backends.pacing import LatencySummary
 
 BLOCKED = Fate.BLOCKED.name.lower()
 SHOWN = 6  # arenas that are named, at most
@@ -102,7 +102,7 @@ def _add_real_time(table: Table, result: Result) -> None:
         table.add_row("runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}")
 
 
-def _delays(of: "LatencyHistogram") -> str:
+def _delays(of: "LatencySummary") -> str:
     """How late things came."""
     return f"{_lag(of.p50_s)} (99 %: {_lag(of.p99_s)}, worst {_lag(of.worst_s)})"
 

@@ -46,7 +46,7 @@ def backend_at(endpoint: str, told: Told, limits: JoinLimits) -> LockstepBackend
     whole = [assignment(group(spec("Counter"), [0, 1, 2]))]
     around = BackendHooks(changed=told.changed, opened=told.opened)
     return LockstepBackend(
-        endpoint, RUN, whole, 20.0, WallClock(), around, "stand", terms=JoinPolicy(OFFER, True, limits=limits)
+        endpoint, RUN, whole, 20.0, WallClock(), around, "stand", policy=JoinPolicy(OFFER, True, limits=limits)
     )
 
 

@@ -105,7 +105,7 @@ class WorldFrames(FrameTarget):
         if stage not in self.rosters:
             parts, terms = list(self.run.parts), JoinPolicy(memory=self.run.layouts)
             made: Any = RealTime(parts, 0.5, 30.0, "stop", terms, subtick=True) if stage == "real time" else None
-            roster = joined(made or Lockstep(parts, terms=terms), ready=stage != "building")
+            roster = joined(made or Lockstep(parts, policy=terms), ready=stage != "building")
             if stage != "building":
                 self._open_tick(roster)
             self.rosters[stage] = roster
@@ -120,7 +120,7 @@ def _state(roster: Any) -> Any:
     """All that a frame might change."""
     slots = [
         (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), len(getattr(slot, "asked", ())))
-        for slot in roster._slots
+        for slot in roster._allocations
     ]
     if isinstance(roster, RealTime):
         arrays = (roster._asked_ns, roster._stopped, roster._drive, roster._command, roster.late)

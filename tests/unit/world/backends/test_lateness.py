@@ -4,13 +4,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.world.backends.pacing import LatencyHistogram, TimingReport
+from swarmwire.world.backends.pacing import LatencySummary, LatencyHistogram
 
 NS_PER_S = 1e9
 
 
-def delays_of(*parts: list[int]) -> LatencyHistogram | None:
-    lateness = TimingReport()
+def delays_of(*parts: list[int]) -> LatencySummary | None:
+    lateness = LatencyHistogram()
     for part in parts:
         lateness.add(np.array(part, np.int64))
     return lateness.delays()
@@ -21,7 +21,7 @@ def test_of_nothing_there_are_no_delays() -> None:
 
 
 def test_what_came_early_was_on_time() -> None:
-    assert delays_of([-5_000_000, 0]) == LatencyHistogram(2, 0.0, 0.0, 0.0)
+    assert delays_of([-5_000_000, 0]) == LatencySummary(2, 0.0, 0.0, 0.0)
 
 
 @given(st.lists(st.lists(st.integers(0, 10**14), max_size=30), min_size=1, max_size=5).filter(any))

@@ -61,8 +61,8 @@ def taken(runners: RealTime) -> tuple[dict[int, float], list[int]]:
 
 
 def state(runners: RealTime) -> Any:
-    slots = [(slot.runner, slot.state, list(slot.asked)) for slot in runners._slots]
-    arrays = (runners._asked_ns, runners._stopped, runners._drive, runners._command, runners.late)
+    slots = [(slot.runner, slot.state, list(slot.unanswered)) for slot in runners._allocations]
+    arrays = (runners._pending_since_ns, runners._stopped, runners._drive, runners._command, runners.late)
     return slots, [array.tolist() for array in arrays], len(runners._sent), runners.frames_dropped
 
 

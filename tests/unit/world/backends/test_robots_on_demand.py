@@ -37,10 +37,10 @@ def whole() -> list[Assignment]:
     return parts(dict.fromkeys(range(8), 0))
 
 
-def made(kind: str, on_loss: OnLoss = "stand", terms: JoinPolicy = OPEN) -> Made:
+def made(kind: str, on_loss: OnLoss = "stand", policy: JoinPolicy = OPEN) -> Made:
     if kind == "lockstep":
-        return Lockstep(whole(), on_loss, terms)
-    return RealTime(whole(), 0.5, 30.0, on_loss, terms)
+        return Lockstep(whole(), on_loss, policy)
+    return RealTime(whole(), 0.5, 30.0, on_loss, policy)
 
 
 @pytest.fixture(params=["lockstep", "real time"])
@@ -119,7 +119,7 @@ def test_what_is_cut_has_its_own_parameters_and_keys() -> None:
     ids=repr,
 )
 def test_what_cannot_be_had_is_refused_counted_and_changes_nothing(kind: str, wanted: dict[str, Any], why: str) -> None:
-    roster = made(kind, terms=JoinPolicy(OFFER, open=True, limits=JoinLimits(robots_per_runner=4)))
+    roster = made(kind, policy=JoinPolicy(OFFER, open=True, limits=JoinLimits(robots_per_runner=4)))
     asked(roster, "a", robots=3)
     before = state(roster)
     with pytest.raises(JoinRefused, match=why):
@@ -134,7 +134,7 @@ def test_the_right_agents_and_the_right_scenario_are_let_in(roster: Made) -> Non
 
 
 def test_there_are_no_more_runners_than_the_limit(kind: str) -> None:
-    roster = made(kind, terms=JoinPolicy(OFFER, open=True, limits=JoinLimits(runners=2)))
+    roster = made(kind, policy=JoinPolicy(OFFER, open=True, limits=JoinLimits(runners=2)))
     asked(roster, "a", robots=1)
     asked(roster, "b", robots=1)
     with pytest.raises(JoinRefused, match="there are 2 runners already"):
@@ -149,19 +149,19 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
     roster.answer("a", LEAVE)
     roster.gone("b", "its link is gone")
     assert roster.robots_free == 8
-    assert [(change.what, change.runner, change.tick) for change in roster.changes] == [
+    assert [(change.what, change.runner, change.tick) for change in roster.events] == [
         ("joined", "a", -1),
         ("left", "a", -1),
         ("lost", "b", -1),
     ]
     assert rows(asked(roster, "b", robots=8)) == {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
     ready(roster, "b")
-    assert str(roster.changes[-1]) == "b returned to flock-0 … lone-7 (8 robots) before the first tick"
+    assert str(roster.events[-1]) == "b returned to flock-0 … lone-7 (8 robots) before the first tick"
     assert roster.counts() == {"runners_left": 1, "runners_lost": 1, "runners_returned": 1}
 
 
 def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(kind: str) -> None:
-    roster = made(kind, terms=JoinPolicy(OFFER, open=True))
+    roster = made(kind, policy=JoinPolicy(OFFER, open=True))
     asked(roster, "own", robots=2, agents=AGENTS)
     asked(roster, "foreign", robots=2)
     assert roster.health().foreign == 0
@@ -169,7 +169,7 @@ def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(ki
     assert roster.health().foreign == 1
     roster.answer("foreign", LEAVE)
     assert roster.health().foreign == 0
-    closed = made(kind, terms=JoinPolicy(OFFER))
+    closed = made(kind, policy=JoinPolicy(OFFER))
     asked(closed, "r0")
     ready(closed, "r0")
     assert closed.health().foreign == 0
@@ -183,7 +183,7 @@ def test_robots_that_nobody_plays_are_told_in_their_order_whoever_came_and_went(
 
 
 def test_a_run_may_begin_with_some_robots(kind: str) -> None:
-    roster = made(kind, terms=JoinPolicy(OFFER, open=True, start_with=3))
+    roster = made(kind, policy=JoinPolicy(OFFER, open=True, start_with=3))
     assert roster.waiting
     asked(roster, "a", robots=2)
     ready(roster, "a")
@@ -215,7 +215,7 @@ def test_who_leaves_a_run_that_bears_it_frees_its_robots_or_they_are_given_up(ki
         ready(roster, runner)
     roster._tick = 7
     roster.answer("a", LEAVE)
-    assert roster.changes[-1] == RunnerEvent("left", "a", ("flock-0", "flock-1", "scouts-2"), 7)
+    assert roster.events[-1] == RunnerEvent("left", "a", ("flock-0", "flock-1", "scouts-2"), 7)
     assert roster.counts() == {"runners_left": 1}
     assert not roster.losses
     if on_loss == "dead":
@@ -224,7 +224,7 @@ def test_who_leaves_a_run_that_bears_it_frees_its_robots_or_they_are_given_up(ki
     else:
         assert rows(asked(roster, "c")) == {"flock": [0, 1], "scouts": [2]}
         ready(roster, "c")
-        assert roster.changes[-1] == RunnerEvent("joined", "c", ("flock-0", "flock-1", "scouts-2"), 7)
+        assert roster.events[-1] == RunnerEvent("joined", "c", ("flock-0", "flock-1", "scouts-2"), 7)
         assert roster.counts() == {"runners_left": 1, "runners_joined_late": 1}
 
 
@@ -238,8 +238,8 @@ def test_an_offer_comes_over_whole(roster: Made) -> None:
 def test_the_owner_of_each_robot_follows_the_cuts(roster: Made) -> None:
     asked(roster, "a", names=["flock-4", "lone-3"])
     asked(roster, "b", robots=2)
-    players = np.array([slot.runner or "" for slot in roster._slots])
-    assert players[roster._slots.owner].tolist() == ["b", "b", "", "a", "a", "", "", ""]
+    players = np.array([slot.runner or "" for slot in roster._allocations])
+    assert players[roster._allocations.owner].tolist() == ["b", "b", "", "a", "a", "", "", ""]
 
 
 @pytest.mark.parametrize("asked", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])

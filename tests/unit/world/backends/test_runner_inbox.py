@@ -47,7 +47,7 @@ def test_a_flood_of_one_runner_keeps_no_other_out(session):
 
 def test_who_floods_is_known_by_name(session):
     inbox = filled(session, JoinLimits(waiting=1, flood=2), *[("a", b"x")] * 4, *[("b", b"x")] * 3)
-    assert inbox.flooding() == {"a"}
+    assert inbox.rate_limited() == {"a"}
 
 
 def test_what_was_taken_makes_room(session):
@@ -88,7 +88,7 @@ def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
 def test_who_asks_under_ever_new_names_is_remembered_so_often_and_no_more(session):
     inbox = asked_by(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
     assert inbox.counts() == {"flooded_requests": 2}
-    assert len(inbox._asked) == len(inbox._beyond) == 2
+    assert len(inbox._requests) == len(inbox._dropped_of) == 2
 
 
 def test_nothing_in_time_is_an_empty_queue():

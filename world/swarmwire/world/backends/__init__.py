@@ -1,1 +1,1 @@
-"""The agents of a run as the world sees them: in this process, or behind the network."""
+"""Agent backends: the world's side of the agents, in this process or in runners on the network."""

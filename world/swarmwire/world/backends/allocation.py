@@ -1,4 +1,9 @@
-"""Which robots go to which runner, with the keys of their draws."""
+"""Allocations: the robots that each runner plays, with the keys of their draws.
+
+An assignment lists robots by group. `whole` builds the assignment of a run, `split`, `part_of` and `merged` divide and
+join assignments. `Allocation` adds the runner of an assignment and its state; `MOVES` holds the state machine, from
+which the docs draw their diagram. `Allocations` holds all allocations of a run: each robot is in exactly one.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +20,7 @@ from swarmwire.world.scenario.scenario import Scenario
 
 
 def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assignment:
-    """All robots of all arenas; `agents` gives each group's agent spec."""
+    """The assignment of all robots of all arenas; `agents` maps each group to its agent spec."""
     keys = np.array([[derive_key("robot", seed, i) for i in range(static.robots)] for seed in static.seeds], np.uint64)
     groups = tuple(
         GroupAssignment(
@@ -35,41 +40,41 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
 
 
 def split(assignment: Assignment, runners: int) -> list[Assignment]:
-    """The robots in as many nearly equal parts, at most one part per robot, along the robot rows."""
+    """Split an assignment into nearly equal parts along the robot rows, at most one part per robot."""
     rows = np.sort(np.concatenate([group.rows for group in assignment.groups]))
     return [part_of(assignment, part) for part in np.array_split(rows, min(runners, len(rows)))]
 
 
 def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
-    """The assignment's robots that are among these rows."""
+    """The part of an assignment that lies in these rows."""
     groups: list[GroupAssignment] = []
     for group in assignment.groups:
-        at = np.flatnonzero(np.isin(group.rows, rows))
-        if len(at):
-            names = tuple(group.robot_names[i] for i in at)
+        selected = np.flatnonzero(np.isin(group.rows, rows))
+        if len(selected):
+            names = tuple(group.robot_names[i] for i in selected)
             groups.append(
                 replace(
                     group,
-                    params=params_of(group.params, at),
-                    rows=group.rows[at],
+                    params=params_of(group.params, selected),
+                    rows=group.rows[selected],
                     robot_names=names,
-                    keys=group.keys[at],
+                    keys=group.keys[selected],
                 )
             )
     return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
 
 
 def merged(parts: list[Assignment]) -> Assignment:
-    """The robots of all parts of one run, in one assignment."""
+    """Merge parts of one run into one assignment."""
     if len(parts) == 1:
         return parts[0]
     names = list(dict.fromkeys(group.name for part in parts for group in part.groups))
-    groups = [_one([group for part in parts for group in part.groups if group.name == name]) for name in names]
+    groups = [_merged_group([group for part in parts for group in part.groups if group.name == name]) for name in names]
     return replace(parts[0], groups=tuple(groups))
 
 
-def _one(parts: list[GroupAssignment]) -> GroupAssignment:
-    """The robots of all parts of one group."""
+def _merged_group(parts: list[GroupAssignment]) -> GroupAssignment:
+    """Merge parts of one group, in the order of the robot rows."""
     rows = np.concatenate([part.rows for part in parts])
     order = np.argsort(rows)
     names = [name for part in parts for name in part.robot_names]
@@ -81,7 +86,7 @@ def _one(parts: list[GroupAssignment]) -> GroupAssignment:
         parts[0],
         params=params_of(params, order),
         rows=rows[order],
-        robot_names=tuple(names[int(at)] for at in order),
+        robot_names=tuple(names[int(i)] for i in order),
         keys=np.concatenate([part.keys for part in parts])[order],
     )
 
@@ -97,58 +102,54 @@ def _name(static: Static, row: int) -> str:
     return name if static.arenas == 1 else f"a{arena}/{name}"
 
 
-# --- Some robots and the runner that plays them, and the states through which that goes.
-#
-# `MOVES` says from which state a move leads to which; the picture in the docs is drawn from it. In real time nobody is
-# waited for: there a runner that is asked stays ready.
-
-
 State = Literal["free", "joined", "ready", "waiting", "dead"]
 Move = Literal["joins", "is ready", "is asked", "answers", "is lost", "is given up"]
 
+# From each state, the next state by move. In real time the loop waits for no runner: there a runner stays `ready` after
+# a frame was sent to it.
 MOVES: dict[State, dict[Move, State]] = {
-    "free": {"joins": "joined"},  # a runner asks, and gets the slot's robots
+    "free": {"joins": "joined"},  # a join request was accepted
     "joined": {"is ready": "ready", "is lost": "free", "is given up": "dead"},  # ready: its agents are built
     "ready": {"is asked": "waiting", "is lost": "free", "is given up": "dead"},
     "waiting": {"answers": "ready", "is lost": "free", "is given up": "dead"},
-    "dead": {},  # the robots stand still to the end
+    "dead": {},  # the robots stand still until the end of the run
 }
 
 
 @dataclass(eq=False)
 class Allocation:
-    """Some robots, and the runner that plays them."""
+    """Robots, the runner that plays them, and the state of that runner."""
 
     assignment: Assignment
-    rows: IntArray  # (n,) that act in the tick that is open, in the order of the answer: group after group
+    rows: IntArray  # (n,) robot rows that act in the open tick, in the order of the answer: group after group
     runner: str | None = None
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
-    foreign: bool = False  # whether the runner plays code of its own, of which it told nothing
+    foreign: bool = False  # whether the runner sent no hashes of its agents, so that their code is unknown
 
     def __post_init__(self) -> None:
         self._all_rows = rows_of(self.assignment)
 
     @property
     def all_rows(self) -> IntArray:
-        """Every robot of the slot, (n,)."""
+        """Every robot row of the allocation, (n,)."""
         return self._all_rows
 
     def remember(self, other: "Allocation", rows: IntArray) -> None:
-        """What another slot remembers of these robots is remembered here, too."""
+        """Copy the memory of these robots from another allocation."""
         for name, parts in other.memory.items():
-            own = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
-            if own:
-                self.memory.setdefault(name, []).extend(own)
+            part_rows = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
+            if part_rows:
+                self.memory.setdefault(name, []).extend(part_rows)
 
     def may(self, move: Move) -> bool:
-        """Whether the move leads anywhere from the state."""
+        """Whether the state allows the move."""
         return move in MOVES[self.state]
 
     def move(self, move: Move) -> None:
-        """Change the state; RuntimeError, and nothing changed, if the move leads nowhere from it."""
+        """Change the state; raise RuntimeError and change nothing if the state does not allow the move."""
         if not self.may(move):
-            raise RuntimeError(f"a slot that is {self.state} has no move {move!r}")
+            raise RuntimeError(f"an allocation that is {self.state} has no move {move!r}")
         self.state = MOVES[self.state][move]
 
 
@@ -157,78 +158,77 @@ def rows_of(assignment: Assignment) -> IntArray:
     return np.concatenate([group.rows for group in assignment.groups])
 
 
-# --- All slots of a run: each robot is in one of them, and a runner that asks for some gets a slot of exactly these.
+NO_ALLOCATION = -1  # owner of a robot that is in no allocation
+
+AllocationT = TypeVar("AllocationT", bound=Allocation)
 
 
-NOBODY = -1  # owner of a robot that no slot holds
+class Allocations(Generic[AllocationT]):
+    """All allocations of a run, in order. Each robot is in exactly one of them.
 
-S = TypeVar("S", bound=Allocation)
-
-
-class Allocations(Generic[S]):
-    """The slots in their order.
+    A runner that joins with some robots gets a new allocation of exactly these, cut from those that are free.
 
     Attributes:
-        owner: (robots,) int64, the place of each robot row's slot. It changes only when slots are cut, so that a tick
-            costs the same as with parts that were cut before the run.
+        owner: (robots,) int64, the index of the allocation of each robot row. It changes only when an allocation is
+            cut, so a tick costs the same as with parts that were cut before the run.
         row_of: the row of each robot by its name.
     """
 
-    def __init__(self, parts: Sequence[Assignment], slot_of: Callable[[Assignment], S]) -> None:
-        """A slot of each part; `slot_of` makes one that is free."""
-        self._slot_of = slot_of
-        self._slots = [slot_of(part) for part in parts]
+    def __init__(self, parts: Sequence[Assignment], new_allocation: Callable[[Assignment], AllocationT]) -> None:
+        """One allocation per part; `new_allocation` makes a free one."""
+        self._new_allocation = new_allocation
+        self._allocations = [new_allocation(part) for part in parts]
         self.row_of = {name: row for part in parts for name, row in _named(part)}
         self.owner = self._owners()
 
-    def __iter__(self) -> Iterator[S]:
-        return iter(self._slots)
+    def __iter__(self) -> Iterator[AllocationT]:
+        return iter(self._allocations)
 
     def __len__(self) -> int:
-        return len(self._slots)
+        return len(self._allocations)
 
     @property
     def assignments(self) -> list[Assignment]:
-        """The robots of each slot."""
-        return [slot.assignment for slot in self._slots]
+        """The assignment of each allocation."""
+        return [allocation.assignment for allocation in self._allocations]
 
     @property
-    def free(self) -> list[S]:
-        """Those whose robots a runner may have."""
-        return [slot for slot in self._slots if slot.may("joins")]
+    def free(self) -> list[AllocationT]:
+        """The allocations that a runner may join."""
+        return [allocation for allocation in self._allocations if allocation.may("joins")]
 
-    def holding(self, rows: IntArray) -> list[S]:
-        """The slots that hold any of these robots; it takes no longer where there are a thousand slots."""
-        return [self._slots[place] for place in np.unique(self.owner[rows]).tolist()]
+    def holding(self, rows: IntArray) -> list[AllocationT]:
+        """The allocations that hold any of these robots; the cost does not depend on the number of allocations."""
+        return [self._allocations[place] for place in np.unique(self.owner[rows]).tolist()]
 
-    def cut(self, rows: IntArray) -> S:
-        """A free slot of exactly these robots, (n,) rising, all of which are in slots that are free."""
-        olds = self.holding(rows)
-        if len(olds) == 1 and len(olds[0].all_rows) == len(rows):
-            return olds[0]
-        slot = self._slot_of(merged([part_of(old.assignment, rows) for old in olds]))
-        for old in olds:
-            slot.remember(old, rows)
-            self._leave_rest(old, rows)
-        self._slots.append(slot)
+    def cut(self, rows: IntArray) -> AllocationT:
+        """A free allocation of exactly these robots, (n,) rising, all of which are in free allocations."""
+        sources = self.holding(rows)
+        if len(sources) == 1 and len(sources[0].all_rows) == len(rows):
+            return sources[0]
+        allocation = self._new_allocation(merged([part_of(source.assignment, rows) for source in sources]))
+        for source in sources:
+            allocation.remember(source, rows)
+            self._leave_rest(source, rows)
+        self._allocations.append(allocation)
         self.owner = self._owners()
-        return slot
+        return allocation
 
-    def _leave_rest(self, old: S, rows: IntArray) -> None:
-        """In the place of a slot, one of its robots that are not taken; none if all are."""
-        rest = old.all_rows[~np.isin(old.all_rows, rows)]
-        place = self._slots.index(old)
+    def _leave_rest(self, source: AllocationT, rows: IntArray) -> None:
+        """Replace an allocation by one of its remaining robots; remove it if none remain."""
+        rest = source.all_rows[~np.isin(source.all_rows, rows)]
+        place = self._allocations.index(source)
         if len(rest):
-            kept = self._slots[place] = self._slot_of(part_of(old.assignment, rest))
-            kept.remember(old, rest)
+            remaining = self._allocations[place] = self._new_allocation(part_of(source.assignment, rest))
+            remaining.remember(source, rest)
         else:
-            del self._slots[place]
+            del self._allocations[place]
 
     def _owners(self) -> IntArray:
-        rows = [slot.all_rows for slot in self._slots]
-        every = np.concatenate(rows)
-        owner = np.full(1 + int(every.max()), NOBODY)
-        owner[every] = np.repeat(np.arange(len(rows)), [len(own) for own in rows])
+        rows = [allocation.all_rows for allocation in self._allocations]
+        all_rows = np.concatenate(rows)
+        owner = np.full(1 + int(all_rows.max()), NO_ALLOCATION)
+        owner[all_rows] = np.repeat(np.arange(len(rows)), [len(part_rows) for part_rows in rows])
         return owner
 
 

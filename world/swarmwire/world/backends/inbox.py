@@ -1,7 +1,7 @@
-"""What arrives from runners, between the network's threads and the loop: so much of each runner waits, and no more.
+"""A bounded queue between the network's threads and the loop, with limits per runner.
 
-A runner that sends more than it is asked for takes nobody else's place and no memory without bound. What is dropped is
-counted by name; a token that is dropped shows in the time-out of its runner.
+A runner that sends too much fills only its own share, so memory stays bounded and other runners are not affected. The
+inbox counts dropped items by name. A dropped liveliness token shows as the time-out of its runner.
 """
 
 import queue
@@ -21,65 +21,65 @@ class RunnerInbox:
     """The runners' answers, tokens and requests, in the order in which they arrived.
 
     Attributes:
-        arrived_ns: when the item that was got last arrived.
+        arrived_ns: when the item that `get` returned last arrived.
     """
 
     def __init__(self, limits: JoinLimits = LIMITS, now_ns: Callable[[], int] = lambda: 0) -> None:
-        """`now_ns` tells the time, where it matters when something arrives."""
+        """`now_ns` returns the time of arrival; backends that do not use that time leave it out."""
         self._limits, self._now_ns, self.arrived_ns = limits, now_ns, 0
         self._arrived: queue.SimpleQueue[tuple[str, int, int, Item]] = queue.SimpleQueue()
         self._lock = threading.Lock()
-        self._waiting: dict[str, tuple[int, int]] = {}  # of each runner: items, and their bytes
-        self._asked: Counter[str] = Counter()
+        self._queued: dict[str, tuple[int, int]] = {}  # per runner: items, and their bytes
+        self._requests: Counter[str] = Counter()
         self._dropped: Counter[str] = Counter()
-        self._beyond: Counter[str] = Counter()  # what was dropped of each runner
+        self._dropped_of: Counter[str] = Counter()  # dropped items, per runner
 
     def put(self, item: Item) -> None:
-        """Called from the network's threads; it returns at once."""
+        """Add an item, or drop it if its runner is over a limit. Called from the network's threads; does not block."""
         runner, payload = runner_of(str(item.key_expr)), item.payload
         size = 0 if payload is None else len(payload)
         limits = self._limits
         with self._lock:
-            if isinstance(item, zenoh.Query) and not self._may_ask(runner):
+            if isinstance(item, zenoh.Query) and not self._accepts_request(runner):
                 self._drop("flooded_requests", runner)
-                return  # the asker gets no answer as soon as nobody holds the query
-            items, waiting_bytes = self._waiting.get(runner, (0, 0))
-            if items >= limits.waiting or (items and waiting_bytes + size > limits.waiting_bytes):
+                return  # dropping the query ends the request without an answer
+            items, queued_bytes = self._queued.get(runner, (0, 0))
+            if items >= limits.waiting or (items and queued_bytes + size > limits.waiting_bytes):
                 self._drop("flooded_frames", runner)
                 return
-            self._waiting[runner] = items + 1, waiting_bytes + size
+            self._queued[runner] = items + 1, queued_bytes + size
         self._arrived.put((runner, size, self._now_ns(), item))
 
     def get(self, timeout: float | None = None) -> Item:
-        """The next item; queue.Empty if there is none in time."""
+        """The next item; raises queue.Empty after `timeout` seconds."""
         runner, size, self.arrived_ns, item = self._arrived.get(timeout=timeout)
         with self._lock:
-            items, waiting_bytes = self._waiting.pop(runner)
+            items, queued_bytes = self._queued.pop(runner)
             if items > 1:
-                self._waiting[runner] = items - 1, waiting_bytes - size
+                self._queued[runner] = items - 1, queued_bytes - size
         return item
 
     def qsize(self) -> int:
-        """How many wait, about."""
+        """The approximate number of queued items."""
         return self._arrived.qsize()
 
-    def flooding(self) -> set[str]:
-        """Runners of which so much was dropped that no mistake explains it."""
+    def rate_limited(self) -> set[str]:
+        """Runners with more dropped items than the flood limit, beyond what a mistake explains."""
         with self._lock:
-            return {runner for runner, dropped in self._beyond.items() if dropped > self._limits.flood}
+            return {runner for runner, dropped in self._dropped_of.items() if dropped > self._limits.flood}
 
     def counts(self) -> dict[str, int]:
-        """What was dropped, by name."""
+        """Dropped items, by name."""
         with self._lock:
             return dict(self._dropped)
 
-    def _may_ask(self, runner: str) -> bool:
-        if runner not in self._asked and len(self._asked) >= self._limits.names:
+    def _accepts_request(self, runner: str) -> bool:
+        if runner not in self._requests and len(self._requests) >= self._limits.names:
             return False
-        self._asked[runner] += 1
-        return self._asked[runner] <= self._limits.requests
+        self._requests[runner] += 1
+        return self._requests[runner] <= self._limits.requests
 
-    def _drop(self, what: str, runner: str) -> None:
-        self._dropped[what] += 1
-        if runner in self._beyond or len(self._beyond) < self._limits.names:
-            self._beyond[runner] += 1
+    def _drop(self, name: str, runner: str) -> None:
+        self._dropped[name] += 1
+        if runner in self._dropped_of or len(self._dropped_of) < self._limits.names:
+            self._dropped_of[runner] += 1

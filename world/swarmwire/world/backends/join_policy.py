@@ -1,4 +1,8 @@
-"""Texts from elsewhere, fit for a terminal and a log."""
+"""Admission of runners: the address and the policy of a run, and the check of a join request against them.
+
+`ListenSettings` says where runners connect, `JoinPolicy` which of them may join and when. `accepted` checks a request
+against the policy and the free robots. It changes no allocation; a refused runner gets the reason in one line.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,34 +17,31 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import LIMITS, JoinLimits, JoinRequest, SessionInfo, versioned
 from swarmwire.comms.wire.network import Network
-from swarmwire.world.backends.allocation import Allocations, S
+from swarmwire.world.backends.allocation import Allocations, AllocationT
 
 
-def printable(text: str, most: int, keep: str = "") -> str:
-    r"""The text without what a terminal would obey, but for letters in `keep`, cut to `most` letters.
+def printable(text: str, max_letters: int, keep: str = "") -> str:
+    r"""Remote text that is safe for a terminal and a log: control characters escaped, except those in `keep`.
+
+    The result has at most `max_letters` characters of the text.
 
     >>> printable("flock-0\x1b[2J", 40)
     'flock-0\\x1b[2J'
     >>> printable("flock-0", 4)
     'flo…'
     """
-    cut = text if len(text) <= most else text[: most - 1] + "…"
-    return "".join(
-        letter if letter.isprintable() or letter in keep else letter.encode("unicode_escape").decode() for letter in cut
-    )
-
-
-# --- Where runners meet the world, and who is let in.
+    cut = text if len(text) <= max_letters else text[: max_letters - 1] + "…"
+    return "".join(c if c.isprintable() or c in keep else c.encode("unicode_escape").decode() for c in cut)
 
 
 @dataclass(frozen=True)
 class ListenSettings:
-    """The agents' side of a world in the network.
+    """The address of the world for its runners, and their access rights.
 
     Attributes:
-        endpoints: where it listens.
-        network: its certificates; None: none, for this machine alone.
-        access: zenoh's access control; None: whoever reaches an endpoint may do anything there.
+        endpoints: the endpoints on which the world listens.
+        network: its certificates; None: no encryption, for this machine alone.
+        access: zenoh's access control; None: no restriction for any client that reaches an endpoint.
     """
 
     endpoints: tuple[str, ...]
@@ -48,20 +49,17 @@ class ListenSettings:
     access: Mapping[str, Any] | None = None
 
 
-# --- On what terms runners join a run: what they are offered, whether they may come late, and how many.
-
-
 @dataclass(frozen=True)
 class JoinPolicy:
-    """What a world asks of its runners.
+    """The conditions under which runners join a run.
 
     Attributes:
-        offer: what there is to play; None: nothing is told, and no agent is compared.
-        open: whether runners come from elsewhere and when they like: nobody is waited for in vain, and who leaves
-            before the first tick only frees its robots.
-        start_with: robots with an agent that are enough for the first tick; None: all.
-        limits: how many runners, how many robots of each, and how long they may take.
-        memory: by group, what is kept of its robots for whoever plays them next; None: nothing is.
+        offer: the session info for runners; None: none is sent, and no agent hash is compared.
+        open: whether runners from elsewhere may join at any time. The loss of a runner before the first tick then only
+            frees its robots.
+        start_with: the number of robots with an agent at which the first tick may begin; None: all.
+        limits: the most runners, the most robots of each, and their time-outs.
+        memory: by group, the layout of the agent memory that the next runner gets; None: none is kept.
     """
 
     offer: SessionInfo | None = None
@@ -71,99 +69,94 @@ class JoinPolicy:
     memory: Mapping[str, Layout] | None = None
 
 
-USUAL = JoinPolicy()  # of runners that the run starts itself
-
-
-# --- Whether a runner gets the robots that it asks for: its request against what there is, on the run's terms.
-#
-# Nothing here changes a slot; whoever is refused hears why, in one line.
+DEFAULT_JOIN_POLICY = JoinPolicy()  # of runners that the run starts itself
 
 
 NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
-MAX_SAID = 500  # letters
+MAX_REASON_LETTERS = 500  # of the reason for a refusal
 
 
 class JoinRefused(Exception):
-    """A request that is not granted; the text goes back to the runner, and `count` says under which name it counts."""
+    """A refused request: the text goes back to the runner, `count` is the name of its counter."""
 
     def __init__(self, text: str, count: str = "refused_join") -> None:
-        super().__init__(printable(text, MAX_SAID))
+        super().__init__(printable(text, MAX_REASON_LETTERS))
         self.count = count
 
 
 def read_request(runner: str, request: bytes) -> JoinRequest:
-    """What a runner asks for; Refused if it is no request, or if no runner can have this name."""
+    """Decode a join request; JoinRefused if it is malformed or the runner's name is not allowed."""
     try:
-        asked = JoinRequest.decode(request)
+        parsed = JoinRequest.decode(request)
     except BadFrame as fault:
         raise JoinRefused(str(fault), "bad_join") from fault
     if not NAME.fullmatch(runner):
         raise JoinRefused("expected a name of letters, digits, '_', '-' and '.', 64 at most", "bad_join")
-    return asked
+    return parsed
 
 
 def check_version(request: bytes) -> None:
-    """Refused if what a runner asks about the run is in another version than ours."""
+    """Raise JoinRefused if a request for the session info has another protocol version."""
     try:
         versioned(request)
     except BadFrame as fault:
         raise JoinRefused(str(fault), "bad_join") from fault
 
 
-def accepted(asked: JoinRequest, slots: Allocations[S], terms: JoinPolicy) -> IntArray:
-    """The rows that a runner gets, rising; Refused if what it asks for is not to be had."""
-    _check_scenario(asked, terms)
-    rows = _rows(asked, slots)
-    most = terms.limits.robots_per_runner
-    if terms.open and len(rows) > most:
-        raise JoinRefused(f"expected at most {most} robots for one runner, got {len(rows)}")
-    groups = [group for slot in slots.holding(rows) for group in slot.assignment.groups]
-    _check_agents(asked, terms, [group.name for group in groups if np.isin(group.rows, rows).any()])
+def accepted(request: JoinRequest, allocations: Allocations[AllocationT], policy: JoinPolicy) -> IntArray:
+    """The robot rows that a runner gets, rising; JoinRefused if its request cannot be met."""
+    _check_scenario(request, policy)
+    rows = _rows(request, allocations)
+    max_robots = policy.limits.robots_per_runner
+    if policy.open and len(rows) > max_robots:
+        raise JoinRefused(f"expected at most {max_robots} robots for one runner, got {len(rows)}")
+    groups = [group for allocation in allocations.holding(rows) for group in allocation.assignment.groups]
+    _check_agents(request, policy, [group.name for group in groups if np.isin(group.rows, rows).any()])
     return rows
 
 
-def _rows(asked: JoinRequest, slots: Allocations[S]) -> IntArray:
-    free = slots.free
-    if asked.names is not None:
-        return _named(asked.names, slots)
+def _rows(request: JoinRequest, allocations: Allocations[AllocationT]) -> IntArray:
+    free = allocations.free
+    if request.names is not None:
+        return _named(request.names, allocations)
     if not free:
         raise JoinRefused("all robots are taken")
-    if asked.robots is None:
+    if request.robots is None:
         return np.sort(free[0].all_rows)
-    rows = np.sort(np.concatenate([slot.all_rows for slot in free]))[: asked.robots]
-    if len(rows) < asked.robots:
-        raise JoinRefused(f"expected at most {len(rows)} robots, which are free, got {asked.robots}")
+    rows = np.sort(np.concatenate([allocation.all_rows for allocation in free]))[: request.robots]
+    if len(rows) < request.robots:
+        raise JoinRefused(f"expected at most {len(rows)} robots, which are free, got {request.robots}")
     return rows
 
 
-def _named(names: Sequence[str], slots: Allocations[S]) -> IntArray:
-    """The rows of robots that are free; Refused if one is not, or is none."""
-    row_of = slots.row_of
+def _named(names: Sequence[str], allocations: Allocations[AllocationT]) -> IntArray:
+    """The rows of named robots; JoinRefused if one of them is not free or does not exist."""
+    row_of = allocations.row_of
     if not names or len(set(names)) < len(names) or not row_of.keys() >= set(names):
         raise JoinRefused(
             f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(list(names))}"
         )
     rows = np.sort(np.array([row_of[name] for name in names], np.int64))
-    for slot in slots.holding(rows):
-        if not slot.may("joins"):
-            taken = robots_text([name for name in names if row_of[name] in slot.all_rows])
-            raise JoinRefused(f"taken, by {slot.runner}: {taken}" if slot.runner else f"given up: {taken}")
+    for allocation in allocations.holding(rows):
+        if not allocation.may("joins"):
+            taken = robots_text([name for name in names if row_of[name] in allocation.all_rows])
+            raise JoinRefused(f"taken, by {allocation.runner}: {taken}" if allocation.runner else f"given up: {taken}")
     return rows
 
 
-def _check_scenario(asked: JoinRequest, terms: JoinPolicy) -> None:
-    offer = terms.offer
-    if offer is not None and asked.scenario_sha256 not in (None, offer.scenario_sha256):
+def _check_scenario(request: JoinRequest, policy: JoinPolicy) -> None:
+    offer = policy.offer
+    if offer is not None and request.scenario_sha256 not in (None, offer.scenario_sha256):
         raise JoinRefused(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
 
 
-def _check_agents(asked: JoinRequest, terms: JoinPolicy, groups: Sequence[str]) -> None:
-    """The runner's own agents must be those of the run, unless it says nothing of them."""
-    if asked.agents is None or terms.offer is None:
+def _check_agents(request: JoinRequest, policy: JoinPolicy, groups: Sequence[str]) -> None:
+    """Raise JoinRefused if the hash of one of the runner's agents differs; a runner may send no hashes."""
+    if request.agents is None or policy.offer is None:
         return
-    for group in terms.offer.groups:
-        got = asked.agents.get(group.name)
-        if group.name in groups and got != group.agent_sha256:
-            its = "none" if got is None else f"{got[:12]}…"
-            here = f"{group.agent} has sha256 {group.agent_sha256[:12]}… here"
-            raise JoinRefused(f"another agent for {group.name}: {here}, the runner's own has {its}")
+    for group in policy.offer.groups:
+        runner_sha256 = request.agents.get(group.name)
+        if group.name in groups and runner_sha256 != group.agent_sha256:
+            runner_text = "none" if runner_sha256 is None else f"{runner_sha256[:12]}…"
+            world_text = f"{group.agent} has sha256 {group.agent_sha256[:12]}… here"
+            raise JoinRefused(f"another agent for {group.name}: {world_text}, the runner's own has {runner_text}")

@@ -1,4 +1,10 @@
-"""What all robots sense and received, cut into one part for each runner."""
+"""The lockstep handshake with runners, without any I/O: bytes and tokens in, bytes and actions out.
+
+A tick opens with one frame to each runner of a group that acts. It is complete once all of them have answered. The
+functions at the top split the readings, received packets and transmit statuses of a tick into one part per runner.
+`Lockstep` runs the handshake. `allocation` holds the states and moves of a runner, `registry` the rules for runners
+that join or are lost and for frames that do not fit.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -15,13 +21,13 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.backends.allocation import NOBODY, Allocation, rows_of
-from swarmwire.world.backends.join_policy import USUAL, JoinPolicy
-from swarmwire.world.backends.registry import GOES_ON, OnLoss, RunnerRegistry, What
+from swarmwire.world.backends.allocation import NO_ALLOCATION, Allocation, rows_of
+from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy
+from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerRegistry, What
 
 
 def split_readings(readings: Readings, owner: IntArray, assignments: list[Assignment]) -> list[Readings]:
-    """What the robots of each assignment sense; `owner` (rows,) names the assignment of each robot row."""
+    """The readings of each assignment's robots; `owner` (rows,) is the index of each robot row's assignment."""
     parts: list[Readings] = [{} for _ in assignments]
     for name, group in readings.items():
         owners = owner[group.rows]
@@ -31,32 +37,32 @@ def split_readings(readings: Readings, owner: IntArray, assignments: list[Assign
         fields = {field: column[order] for field, column in group.fields.items()}
         spans = zip(assignments, parts, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
         for assignment, part, first, last in spans:
-            # Also a group none of whose robots acts now: their agents must forget, as they do beside others.
+            # Also a group without an acting robot: its agents must forget, as they would in a larger assignment.
             if name in [group.name for group in assignment.groups]:
-                own = {field: column[first:last] for field, column in fields.items()}
-                part[name] = GroupReadings(rows[first:last], own)
+                selected = {field: column[first:last] for field, column in fields.items()}
+                part[name] = GroupReadings(rows[first:last], selected)
     return parts
 
 
-def acting(part: Readings) -> IntArray:
-    """The robot rows of a part, group after group: the order of the answer."""
+def acting_rows(part: Readings) -> IntArray:
+    """The robot rows that act in a part, group after group: the order of the answer."""
     if len(part) == 1:
         return next(iter(part.values())).rows
     return np.concatenate([np.empty(0, np.int64), *(group.rows for group in part.values())])
 
 
-def split_received(received: ReceivedPackets, owner: IntArray, slots: int) -> list[ReceivedPackets]:
-    """What the robots of each of `slots` parts received, each with its payloads, once; `owner` is (rows,)."""
+def split_received(received: ReceivedPackets, owner: IntArray, parts: int) -> list[ReceivedPackets]:
+    """The received packets of each part, with each payload once per part; `owner` (rows,) is each row's part."""
     if not len(received):
-        return [received] * slots
-    by_slot = np.argsort(owner[received.receiver], kind="stable")
-    slot_of = owner[received.receiver[by_slot]]
-    sorted_received = received.select(by_slot)
+        return [received] * parts
+    order = np.argsort(owner[received.receiver], kind="stable")
+    part_index = owner[received.receiver[order]]
+    sorted_received = received.select(order)
     packets = len(received.payloads)
-    wanted, place = np.unique(slot_of * packets + sorted_received.payload, return_inverse=True)
-    payloads = received.payloads.rows(wanted % packets)
-    first_row = np.searchsorted(slot_of, np.arange(slots + 1)).tolist()
-    first_payload = np.searchsorted(wanted // packets, np.arange(slots + 1)).tolist()
+    pairs, place = np.unique(part_index * packets + sorted_received.payload, return_inverse=True)
+    payloads = received.payloads.rows(pairs % packets)
+    first_row = np.searchsorted(part_index, np.arange(parts + 1)).tolist()
+    first_payload = np.searchsorted(pairs // packets, np.arange(parts + 1)).tolist()
     place = place.reshape(-1)
     return [
         ReceivedPackets(
@@ -72,34 +78,27 @@ def split_received(received: ReceivedPackets, owner: IntArray, slots: int) -> li
     ]
 
 
-def split_tx_status(tx_status: TxStatuses, owner: IntArray, slots: int) -> list[TxStatuses]:
-    """What the robots of each of `slots` parts learn of their packets; `owner` is (rows,)."""
+def split_tx_status(tx_status: TxStatuses, owner: IntArray, parts: int) -> list[TxStatuses]:
+    """The transmit statuses of each part; `owner` (rows,) is each row's part."""
     if not len(tx_status):
-        return [NO_TX_STATUSES] * slots
-    slot_of = owner[tx_status.row]
-    by_slot = np.argsort(slot_of, kind="stable")
-    first = np.searchsorted(slot_of[by_slot], np.arange(slots + 1)).tolist()
-    return [tx_status.select(by_slot[a:b]) for a, b in itertools.pairwise(first)]
-
-
-# --- The lockstep hand-shake with runners, without any I/O: bytes and tokens in, bytes and actions out.
-#
-# A tick opens with one frame to each runner of a group that acts, and is complete once all of them have answered. Where
-# the run waits for lost runners, who takes over within a tick gets a frame of it; what the lost one answered in that
-# tick counts no more, and its agents' memory is that from before. Where the run goes on, its robots stand or coast from
-# that tick on until the first tick that opens with an agent. States and moves stand in `slot`; how runners join and are
-# lost, and what becomes of frames that do not fit, in `roster`.
+        return [NO_TX_STATUSES] * parts
+    part_index = owner[tx_status.row]
+    order = np.argsort(part_index, kind="stable")
+    first = np.searchsorted(part_index[order], np.arange(parts + 1)).tolist()
+    return [tx_status.select(order[a:b]) for a, b in itertools.pairwise(first)]
 
 
 @dataclass(eq=False)
-class _Slot(Allocation):
+class LockstepAllocation(Allocation):
+    """An allocation with its answer to the open tick."""
+
     actions: Actions | None = None  # in the open tick
-    idle: bool = False  # whether its robots have no agent in the open tick
-    before: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # memory, at its start
+    idle: bool = False  # whether no runner plays its robots in the open tick
+    memory_at_start: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of the tick
 
 
-class _Open(NamedTuple):
-    """What the tick that is open brings to all robots."""
+class _OpenTick(NamedTuple):
+    """The inputs of the open tick, of all robots."""
 
     tick: int
     readings: Readings
@@ -107,77 +106,99 @@ class _Open(NamedTuple):
     tx_status: TxStatuses
 
 
-class Lockstep(RunnerRegistry[_Slot]):
-    """The runners of a run: who plays which robots, and how far each has come."""
+class Lockstep(RunnerRegistry[LockstepAllocation]):
+    """The runners of a run in lockstep.
 
-    def __init__(self, parts: list[Assignment], on_loss: OnLoss = "stop", terms: JoinPolicy = USUAL) -> None:
-        super().__init__(parts, on_loss, terms)
-        self._open: _Open | None = None
+    Where a run waits for lost runners, a replacement that joins within a tick gets a frame of that tick. The lost
+    runner's answer to that tick is discarded, and its agents' memory is restored to the start of the tick. Where a run
+    goes on, the robots of a lost runner stand or coast from that tick on, until the first tick that opens with an
+    agent.
+    """
+
+    def __init__(
+        self, parts: list[Assignment], on_loss: OnLoss = "stop", policy: JoinPolicy = DEFAULT_JOIN_POLICY
+    ) -> None:
+        super().__init__(parts, on_loss, policy)
+        self._open: _OpenTick | None = None
 
     def open_tick(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> list[tuple[str, bytes]]:
-        """Begin a tick: one frame for each runner of a group that acts; the others stay ready."""
-        self._tick, self._open = tick, _Open(tick, readings, received, tx_status)
-        parts = split_readings(readings, self._slots.owner, self._slots.assignments)
-        packets = split_received(received, self._slots.owner, len(self._slots))
-        told = split_tx_status(tx_status, self._slots.owner, len(self._slots))
+        """Open a tick: one frame for each runner of a group that acts; the others stay ready."""
+        self._tick, self._open = tick, _OpenTick(tick, readings, received, tx_status)
+        parts = split_readings(readings, self._allocations.owner, self._allocations.assignments)
+        received_parts = split_received(received, self._allocations.owner, len(self._allocations))
+        status_parts = split_tx_status(tx_status, self._allocations.owner, len(self._allocations))
         out: list[tuple[str, bytes]] = []
-        for slot, part, own, its in zip(self._slots, parts, packets, told, strict=True):
-            slot.rows, slot.actions, slot.idle = acting(part), None, not slot.may("is asked")
-            if slot.state == "dead" or not part:
+        for allocation, part, part_received, part_status in zip(
+            self._allocations, parts, received_parts, status_parts, strict=True
+        ):
+            allocation.rows, allocation.actions, allocation.idle = (
+                acting_rows(part),
+                None,
+                not allocation.may("is asked"),
+            )
+            if allocation.state == "dead" or not part:
                 continue
-            if slot.idle:
-                if self._on_loss in GOES_ON:  # else whoever is waited for gets it all
-                    self._to_nobody(own, its)
+            if allocation.idle:
+                if self._on_loss in NON_BLOCKING:  # otherwise the next runner gets it all
+                    self._count_undelivered(part_received, part_status)
                 continue
-            slot.move("is asked")
-            out.append((slot.runner or "", encode_tick(tick, part, own, its)))
+            allocation.move("is asked")
+            out.append((allocation.runner or "", encode_tick(tick, part, part_received, part_status)))
         return out
 
     def take(self) -> Actions:
-        """The actions of all robots, once the tick is complete; without an agent they stand still, or coast."""
+        """The actions of all robots, once the tick is complete; robots without an agent stand still or coast."""
         self._open = None
-        still = [standing(slot) for slot in self._slots if slot.idle and self._on_loss != "coast"]
-        return Actions.joined([slot.actions for slot in self._slots if slot.actions is not None] + still)
+        zero = [
+            zero_commands(allocation)
+            for allocation in self._allocations
+            if allocation.idle and self._on_loss != "coast"
+        ]
+        return Actions.joined(
+            [allocation.actions for allocation in self._allocations if allocation.actions is not None] + zero
+        )
 
-    def _slot(self, assignment: Assignment) -> _Slot:
-        return _Slot(assignment, rows_of(assignment), idle=True)
+    def _new_allocation(self, assignment: Assignment) -> LockstepAllocation:
+        return LockstepAllocation(assignment, rows_of(assignment), idle=True)
 
-    def _acted(self, slot: _Slot, frame: Frame) -> None:
-        if frame.tick != self._tick or not slot.may("answers"):
+    def _acted(self, allocation: LockstepAllocation, frame: Frame) -> None:
+        if frame.tick != self._tick or not allocation.may("answers"):
             raise BadFrame("wrong_tick", str(frame.tick))
-        actions, memory = decode_actions(frame, slot.rows), self._memory(slot, frame)
-        slot.actions, slot.before, slot.memory = actions, slot.memory, memory
-        slot.move("answers")
+        actions, memory = decode_actions(frame, allocation.rows), self._memory(allocation, frame)
+        allocation.actions, allocation.memory_at_start, allocation.memory = actions, allocation.memory, memory
+        allocation.move("answers")
 
-    def _catch_up(self, slot: _Slot) -> Sequence[bytes]:
-        if self._open is None or self._on_loss in GOES_ON:
+    def _catch_up(self, allocation: LockstepAllocation) -> Sequence[bytes]:
+        if self._open is None or self._on_loss in NON_BLOCKING:
             return ()
         tick, readings, received, tx_status = self._open
-        own = np.full(len(self._slots.owner), NOBODY)
-        own[slot.all_rows] = 0
-        (part,) = split_readings(readings, own, [slot.assignment])
-        slot.rows, slot.idle = acting(part), False
+        owner = np.full(len(self._allocations.owner), NO_ALLOCATION)
+        owner[allocation.all_rows] = 0
+        (part,) = split_readings(readings, owner, [allocation.assignment])
+        allocation.rows, allocation.idle = acting_rows(part), False
         if not part:
             return ()
-        slot.move("is asked")
-        return (encode_tick(tick, part, split_received(received, own, 1)[0], split_tx_status(tx_status, own, 1)[0]),)
+        allocation.move("is asked")
+        return (
+            encode_tick(tick, part, split_received(received, owner, 1)[0], split_tx_status(tx_status, owner, 1)[0]),
+        )
 
-    def _free(self, slot: _Slot, runner: str, what: What, reason: str) -> None:
-        super()._free(slot, runner, what, reason)
-        if self._open is not None and slot.actions is not None:
-            slot.memory = slot.before
-        slot.actions, slot.idle = None, True
+    def _free(self, allocation: LockstepAllocation, runner: str, what: What, reason: str) -> None:
+        super()._free(allocation, runner, what, reason)
+        if self._open is not None and allocation.actions is not None:
+            allocation.memory = allocation.memory_at_start
+        allocation.actions, allocation.idle = None, True
 
-    def _to_nobody(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        for name, some in (("packets_without_agent", received), ("tx_status_without_agent", tx_status)):
-            if len(some):
-                self._counts[name] += len(some)
+    def _count_undelivered(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+        for name, undelivered in (("packets_without_agent", received), ("tx_status_without_agent", tx_status)):
+            if len(undelivered):
+                self._counts[name] += len(undelivered)
 
 
-def standing(slot: Allocation) -> Actions:
-    """Command 0 for every robot of a slot."""
-    rows = slot.all_rows
-    still = np.zeros(len(rows))
-    return Actions(rows, np.ones(len(rows), np.bool_), still, still, still)
+def zero_commands(allocation: Allocation) -> Actions:
+    """Zero commands for every robot of an allocation."""
+    rows = allocation.all_rows
+    zero = np.zeros(len(rows))
+    return Actions(rows, np.ones(len(rows), np.bool_), zero, zero, zero)

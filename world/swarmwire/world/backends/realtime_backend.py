@@ -1,4 +1,8 @@
-"""Backends in real time: each act ends when its tick is over by the wall clock, whoever has answered by then."""
+"""Real-time backends: each `act` returns when its tick ends by the wall clock, with the answers so far.
+
+`PacedBackend` paces a backend in this process. `RealTimeBackend` connects runners over zenoh. `RealTimeReport` says how
+far a run kept up with the wall clock.
+"""
 
 # pyright: reportUnknownMemberType=false
 
@@ -13,8 +17,8 @@ from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickP
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import USUAL, JoinPolicy, ListenSettings
-from swarmwire.world.backends.pacing import LatencyHistogram, Pace
+from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy, ListenSettings
+from swarmwire.world.backends.pacing import LatencySummary, Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
 from swarmwire.world.backends.zenoh_backend import BackendHooks, ZenohBackend
@@ -23,25 +27,23 @@ from swarmwire.world.subtick import Subticks
 
 @dataclass(frozen=True)
 class RealTimeReport:
-    """What a run in real time did not manage; all 0 and empty if it kept up."""
+    """Deadlines that a run in real time missed; all 0 and empty if it kept up."""
 
     factor: float  # simulated s per s of wall time
-    missed_ticks: int  # that were over before the loop came to wait for it: the next one started late
-    worst_lag_s: float  # by how much at most, wall time
+    missed_ticks: int  # that ended before the loop waited for their end: the next one started late
+    worst_lag_s: float  # the greatest lag, wall time
     late_answers: dict[str, int] = field(default_factory=dict[str, int])  # after their own tick, by robot
     watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # by robot
     frames_dropped: int = 0  # to runners, never acted on: middleware loss
     packets_dropped: int = 0  # in these frames: received by the radio, never by the agent
-    tx_status_dropped: int = 0  # in these frames: what radios knew of packets sent, and agents never learned
+    tx_status_dropped: int = 0  # transmit statuses in these frames: known to the radio, never to the agent
     subtick_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
-    delivery: LatencyHistogram | None = (
-        None  # packets: when they were handed over against when the modelled radio had them
-    )
-    tick_jitter: LatencyHistogram | None = None  # ticks: when they began against when the ones before were to end
+    delivery: LatencySummary | None = None  # of the delivery of packets after their reception by the modelled radio
+    tick_jitter: LatencySummary | None = None  # of the start of ticks after the planned end of the tick before
 
 
 def report_of(pace: Pace, subticks: Subticks | None) -> RealTimeReport:
-    """How far a loop kept up."""
+    """The report of a loop."""
     return RealTimeReport(
         factor=pace.factor,
         missed_ticks=pace.missed_ticks,
@@ -63,7 +65,7 @@ class PacedBackend:
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What every robot does in this tick."""
+        """The actions of all robots in this tick."""
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
         actions = self._backend.act(tick, readings, received, tx_status)
@@ -73,7 +75,7 @@ class PacedBackend:
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """The same, with packets handed over when they are due."""
+        """As `act`, with packets delivered when they are due."""
         assert self._subticks
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
@@ -84,98 +86,98 @@ class PacedBackend:
         return replace(actions, sent=SentPackets.none())
 
     def take_in(self) -> list[SubtickPackets]:
-        """What agents sent since the last call."""
+        """The packets that agents sent since the last call."""
         puts, self._puts = self._puts, []
         return puts
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Let agents that read between ticks read."""
+        """Deliver packets and statuses within a tick to agents with an `on_receive`."""
         self._backend.receive(received, tx_status)
         sent = self._backend.on_receive(tick, at_ns)
         if len(sent):
             self._puts.append(SubtickPackets(self._pace.now_ns(), None, sent))
 
     def report(self) -> RealTimeReport:
-        """How far the loop kept up."""
+        """The report of the loop."""
         return report_of(self._pace, self._subticks)
 
 
 class RealTimeBackend(ZenohBackend[RealTime]):
-    """All agents of a run in runners, none of which the loop waits for; `realtime` decides, this carries the bytes."""
+    """A backend of runners that the loop does not wait for: `RealTime` decides, this class carries the bytes."""
 
     congestion = zenoh.CongestionControl.DROP  # a runner that reads nothing must not hold up the world
 
     def __init__(
         self,
-        door: ListenSettings | str,
+        listen: ListenSettings | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
         clock: Clock,
-        around: BackendHooks,
+        hooks: BackendHooks,
         on_loss: OnLoss,
         pace: Pace,
         watchdog_s: float,
-        terms: JoinPolicy = USUAL,
+        policy: JoinPolicy = DEFAULT_JOIN_POLICY,
         subticks: Subticks | None = None,
     ) -> None:
-        roster = RealTime(assignments, watchdog_s, timeout_s, on_loss, terms, subtick=subticks is not None)
-        super().__init__(door, run_id, roster, timeout_s, clock, around)
+        registry = RealTime(assignments, watchdog_s, timeout_s, on_loss, policy, subtick=subticks is not None)
+        super().__init__(listen, run_id, registry, timeout_s, clock, hooks)
         self._pace, self._assignments, self._subticks = pace, assignments, subticks
         self._rate_hz = assignments[0].rate_hz
         if subticks:
-            self._inbox = RunnerInbox(roster.limits, clock.now_ns)
+            self._inbox = RunnerInbox(registry.limits, clock.now_ns)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """A frame to every runner; what has come when the tick is over."""
-        self._send(self._roster.open_tick(tick, self._pace.begin(), readings, received, tx_status))
+        """Send a frame to every runner, and return the actions that arrived by the end of the tick."""
+        self._send(self._registry.open_tick(tick, self._pace.begin(), readings, received, tx_status))
         self._pace.handed_over(received.received_at_ns)
         self._pace.hold(tick)
         self._take_in()
-        return self._roster.take()
+        return self._registry.take()
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """The same, with frames also between ticks, as packets come and are due."""
+        """As `act`, with frames also within the tick, as packets arrive and are due."""
         assert self._subticks
         now_ns = self._pace.begin()
         self.hand_over(tick, tick_start_ns(tick, self._rate_hz), received, tx_status)
         self._pace.handed_over(received.received_at_ns)
         self._subticks.exchange(tick, medium, self)  # first what became due since the last tick's end
-        self._send(self._roster.open_tick(tick, now_ns, readings, ReceivedPackets.none(), NO_TX_STATUSES))
+        self._send(self._registry.open_tick(tick, now_ns, readings, ReceivedPackets.none(), NO_TX_STATUSES))
         self._subticks.pass_tick(tick, medium, self)
-        return self._roster.take()
+        return self._registry.take()
 
     def take_in(self) -> list[SubtickPackets]:
-        """Packets that arrived from runners since the last call."""
+        """The packets that arrived from runners since the last call."""
         self._take_in()
-        return self._roster.puts()
+        return self._registry.puts()
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """A frame to every runner that this concerns."""
-        self._send(self._roster.hand_over(tick, at_ns, received, tx_status))
+        """Send a frame to every runner whose robots have new packets or statuses."""
+        self._send(self._registry.hand_over(tick, at_ns, received, tx_status))
 
     def report(self) -> RealTimeReport:
-        """How far loop and runners kept up."""
-        roster = self._roster
+        """The report of the loop and of the runners."""
+        registry = self._registry
         return replace(
             report_of(self._pace, self._subticks),
-            late_answers=self._by_robot(roster.late),
-            watchdog_stops=self._by_robot(roster.watchdog_stops),
-            frames_dropped=roster.frames_dropped,
-            packets_dropped=roster.packets_dropped,
-            tx_status_dropped=roster.tx_status_dropped,
+            late_answers=self._by_robot(registry.late),
+            watchdog_stops=self._by_robot(registry.watchdog_stops),
+            frames_dropped=registry.frames_dropped,
+            packets_dropped=registry.packets_dropped,
+            tx_status_dropped=registry.tx_status_dropped,
         )
 
     def _handle(self, item: Item) -> None:
-        self._roster.now_ns = self._inbox.arrived_ns
+        self._registry.now_ns = self._inbox.arrived_ns
         super()._handle(item)
 
     def _by_robot(self, counts: IntArray) -> dict[str, int]:
-        """The counts that are not 0, by robot."""
+        """The non-zero counts, by robot."""
         groups = [group for assignment in self._assignments for group in assignment.groups]
         pairs = [pair for group in groups for pair in zip(group.robot_names, counts[group.rows].tolist(), strict=True)]
         return {name: count for name, count in pairs if count}

@@ -1,4 +1,8 @@
-"""Runners behind zenoh: a thin adapter that carries bytes between them and a roster, which decides."""
+"""Runners behind zenoh: an adapter that carries bytes between runners and a `RunnerRegistry`, which decides.
+
+`ZenohBackend` opens the session, queues arrivals in a `RunnerInbox`, waits for runners with time-outs, and reports
+events through `BackendHooks`. `LockstepBackend` is the backend whose loop waits for every runner in each tick.
+"""
 
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
@@ -20,34 +24,37 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import USUAL, JoinPolicy, JoinRefused, ListenSettings
+from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy, JoinRefused, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import Loss, OnLoss, RunnerEvent, RunnerHealth, RunnerRegistry
 
 # zenoh's stubs leave out the return types of put, reply and close.
 
-
-POLL_S = 0.2  # how often a wait looks up whether to go on waiting
-AWAY_S = 2.0  # longer between two looks: this process was frozen itself
-START_S = 60.0  # how long runners may take to join and build their agents
-MAX_TOLD = 200  # refusals: whoever asks for ever shall not fill the log
-FLOODED = "it sent far more than it was asked for"
-FAREWELL_S = 3.0  # how long runners may take to leave after the end
+POLL_S = 0.2  # between two checks of a wait
+FREEZE_THRESHOLD_S = 2.0  # a longer time between two checks: this process itself was frozen
+START_TIMEOUT_S = 60.0  # for runners to join and build their agents
+LEAVE_TIMEOUT_S = 3.0  # for runners to leave after the end
+MAX_REFUSALS_REPORTED = 200  # so that endless requests do not fill the log
+RATE_LIMITED = "it sent far more than it was asked for"
 
 R = TypeVar("R", bound=RunnerRegistry[Any])
 
 
 @dataclass(frozen=True)
 class BackendHooks:
-    """What a backend asks and tells whoever runs it.
+    """The callbacks of a backend.
 
-    `trouble` says why there is no more point in waiting for runners (a process that exited), or None; it is asked while
-    any loss ends the run. `stopped` says whether the run is to end; `lost` is told of a loss that the run survives,
-    `changed` of every runner that comes or goes and of the robots that nobody plays then, `refused` of one that may not
-    join, and why; `opened`, in an open run, of where the world listens.
+    Attributes:
+        failure: returns why waiting for runners is pointless (a process exited), or None; called while any loss ends
+            the run.
+        stopped: returns whether the run is to end.
+        lost: gets a loss that the run survives.
+        changed: gets every runner event, and the names of the robots without a runner after it.
+        refused: gets the name of a refused runner, and the reason.
+        opened: gets the endpoints of an open run.
     """
 
-    trouble: Callable[[], str | None] = lambda: None
+    failure: Callable[[], str | None] = lambda: None
     stopped: Callable[[], bool] = lambda: False
     lost: Callable[[Loss], None] = lambda _: None
     changed: Callable[[RunnerEvent, tuple[str, ...]], None] = lambda _change, _free: None
@@ -56,92 +63,94 @@ class BackendHooks:
 
 
 class ZenohBackend(ABC, Generic[R]):
-    """All agents of a run in runners that join at `endpoint`; how the loop waits for them is the subclass's affair."""
+    """A backend whose agents run in runners that join over the network; the subclass defines how the loop waits."""
 
     congestion = zenoh.CongestionControl.BLOCK  # of frames to runners
 
     def __init__(
         self,
-        door: ListenSettings | str,
+        listen: ListenSettings | str,
         run_id: str,
-        roster: R,
+        registry: R,
         timeout_s: float,
         clock: Clock,
-        around: BackendHooks,
-        start_s: float = START_S,
+        hooks: BackendHooks,
+        start_s: float = START_TIMEOUT_S,
     ) -> None:
-        self._door = ListenSettings((door,)) if isinstance(door, str) else door
+        self._listen = ListenSettings((listen,)) if isinstance(listen, str) else listen
         self._keys = Keys(run_id)
-        self._roster, self._timeout_s, self._clock, self._around = roster, timeout_s, clock, around
-        self._inbox = RunnerInbox(roster.limits)
+        self._registry, self._timeout_s, self._clock, self._hooks = registry, timeout_s, clock, hooks
+        self._inbox = RunnerInbox(registry.limits)
         self._session: zenoh.Session | None = None
-        self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
-        self._answers: dict[str, zenoh.Subscriber[Any]] = {}  # by key: one for all; one for each once one is shut out
-        self._shut_out: set[str] = set()
-        self._frames: dict[str, zenoh.Publisher] = {}
+        self._declarations: tuple[object, ...] = ()  # zenoh undeclares what is not referenced
+        self._answers: dict[str, zenoh.Subscriber[Any]] = {}  # by key: one for all, or one per runner
+        self._rate_limited: set[str] = set()
+        self._publishers: dict[str, zenoh.Publisher] = {}
         self._present: set[str] = set()
-        self._building: dict[str, int] = {}  # until when runners may take, wall time
-        self._losses_told = self._changes_told = self._refusals = 0
-        self._patience_s = start_s  # how long a wait may last; in ticks the time-out
-        self._deadline_ns = self._looked_ns = 0
+        self._build_deadlines_ns: dict[str, int] = {}  # per runner, wall time
+        self._losses_reported = self._events_reported = self._refusals = 0
+        self._wait_timeout_s = start_s  # of a wait; after the start the tick's time-out
+        self._deadline_ns = self._checked_ns = 0
         self._waits_since_ns: int | None = None
 
     def open(self) -> None:
-        """Listen at the endpoints, so that runners may join; BadInput if one is taken."""
-        door = self._door
+        """Listen at the endpoints, so that runners may join; BadInput if one is in use."""
+        listen = self._listen
         try:
-            session = open_world(door.endpoints, self._timeout_s, door.network, door.access, self._roster.limits)
+            session = open_world(
+                listen.endpoints, self._timeout_s, listen.network, listen.access, self._registry.limits
+            )
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
             raise BadInput(
-                "", ", ".join(door.endpoints), f"expected an endpoint that is free and can be listened on: {reason}"
+                "", ", ".join(listen.endpoints), f"expected an endpoint that is free and can be listened on: {reason}"
             ) from error
         self._session = session
         arrived = (self._inbox.put, self._inbox)
         self._answers = {self._keys.any_answer: session.declare_subscriber(self._keys.any_answer, arrived)}
-        self._declared = (
+        self._declarations = (
             session.declare_queryable(self._keys.any_offer, arrived),
             session.declare_queryable(self._keys.any_join, arrived),
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
-            session.liveliness().declare_token(self._keys.world),  # last: it says that runners may join
+            session.liveliness().declare_token(self._keys.world),  # last: it announces that runners may join
         )
-        if self._roster.is_open:
-            self._around.opened(listens_at(session))
+        if self._registry.is_open:
+            self._hooks.opened(listens_at(session))
 
     def start(self) -> None:
         """Wait until runners have taken all robots and built their agents."""
         if self._session is None:
             self.open()
         self._wait()
-        self._patience_s = self._timeout_s
+        self._wait_timeout_s = self._timeout_s
 
     @abstractmethod
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What every robot does in this tick."""
+        """The actions of all robots in this tick."""
 
     def counts(self) -> dict[str, int]:
         """Frames that were dropped and runners that were lost, by name."""
-        return {**self._roster.counts(), **self._inbox.counts()}
+        return {**self._registry.counts(), **self._inbox.counts()}
 
     def health(self) -> RunnerHealth:
-        """How the runners are doing; safe from any thread."""
-        health, since_ns = self._roster.health(), self._waits_since_ns
+        """The health of the runners; safe from any thread."""
+        health, since_ns = self._registry.health(), self._waits_since_ns
         if since_ns is None:
             return health
         waits_s = to_s(self._clock.now_ns() - since_ns)
-        return replace(health, waits_s=waits_s, waits_for=self._roster.waits_for)
+        return replace(health, waits_s=waits_s, waits_for=self._registry.waits_for)
 
     def close(self) -> None:
-        """Tell the runners that the run is over, give them a moment to leave, and close the session."""
+        """Send the end of the run to the runners, wait until they leave or time out, and close the session."""
         session, self._session = self._session, None
         if session is None:
             return
-        for publisher in self._frames.values():
+        for publisher in self._publishers.values():
             publisher.put(frames.encode("end", -1, {}))
-        deadline_ns = self._clock.now_ns() + to_ns(FAREWELL_S)
-        while self._present and self._clock.now_ns() < deadline_ns and self._trouble() is None:
+        deadline_ns = self._clock.now_ns() + to_ns(LEAVE_TIMEOUT_S)
+        while self._present and self._clock.now_ns() < deadline_ns and self._failure() is None:
             item = self._next()
             if isinstance(item, zenoh.Sample) and item.kind == zenoh.SampleKind.DELETE:
                 self._present.discard(runner_of(str(item.key_expr)))
@@ -149,24 +158,24 @@ class ZenohBackend(ABC, Generic[R]):
 
     def _send(self, out: list[tuple[str, bytes]]) -> None:
         for runner, data in out:
-            self._frames[runner].put(data)
+            self._publishers[runner].put(data)
 
     def _wait(self) -> None:
-        """Take in what arrives until every runner is ready; one that takes too long is lost.
+        """Handle arrivals until every runner is ready; a runner that takes too long is lost.
 
         Samples are handled together once there may be one from each runner: one by one, the caches of this process
-        would be cold for each, since the runners use the cores in between. A question is answered at once.
+        would be cold for each, since the runners use the cores in between. A query is answered at once.
         """
         self._allow_time()
-        self._waits_since_ns = self._looked_ns
+        self._waits_since_ns = self._checked_ns
         self._wait_for_all()
         self._waits_since_ns = None
 
     def _wait_for_all(self) -> None:
-        if not self._roster.waiting:  # who joins is let in also where nobody is waited for
+        if not self._registry.waiting:  # join requests are answered also when no runner blocks
             self._take_in()
         arrived: list[Item] = []
-        while waiting := self._roster.waiting:
+        while waiting := self._registry.waiting:
             while len(arrived) < waiting:
                 item = self._next()
                 if item is None:
@@ -174,40 +183,42 @@ class ZenohBackend(ABC, Generic[R]):
                 arrived.append(item)
                 if isinstance(item, zenoh.Query):
                     break
-            if not arrived and self._around.stopped():
+            if not arrived and self._hooks.stopped():
                 raise Interrupted("interrupted while it waited for its runners")
-            trouble = None if arrived else self._trouble()
+            failure = None if arrived else self._failure()
             for item in arrived:
                 self._handle(item)
             arrived.clear()
-            if trouble is not None and self._roster.waiting:
-                raise RunnerLost(*self._roster.missing, trouble)
-            if self._looked() > self._deadline_ns:
-                self._roster.lose_silent(f"no answer for {self._patience_s:g} s")
+            if failure is not None and self._registry.waiting:
+                raise RunnerLost(*self._registry.missing, failure)
+            if self._check_time() > self._deadline_ns:
+                self._registry.lose_silent(f"no answer for {self._wait_timeout_s:g} s")
                 self._allow_time()
-            self._tell_changes()
+            self._report_changes()
 
     def _take_in(self) -> None:
-        """All that has arrived by now, without waiting for more."""
+        """Handle everything that has arrived, without waiting for more."""
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get())
-        self._tell_changes()
+        self._report_changes()
 
     def _allow_time(self) -> None:
-        self._looked_ns = self._clock.now_ns()
-        self._deadline_ns = self._looked_ns + to_ns(self._patience_s)
+        self._checked_ns = self._clock.now_ns()
+        self._deadline_ns = self._checked_ns + to_ns(self._wait_timeout_s)
 
-    def _looked(self) -> int:
-        """The time. For as long as this process was frozen, no runner can be blamed: it is allowed to them again."""
-        now_ns, before_ns = self._clock.now_ns(), self._looked_ns
-        if now_ns - before_ns > to_ns(AWAY_S):
+    def _check_time(self) -> int:
+        """The time. If this process was frozen, all deadlines move by that time: no runner is to blame for it."""
+        now_ns, before_ns = self._clock.now_ns(), self._checked_ns
+        if now_ns - before_ns > to_ns(FREEZE_THRESHOLD_S):
             self._deadline_ns += now_ns - before_ns
-            self._building = {runner: until_ns + now_ns - before_ns for runner, until_ns in self._building.items()}
-        self._looked_ns = now_ns
+            self._build_deadlines_ns = {
+                runner: until_ns + now_ns - before_ns for runner, until_ns in self._build_deadlines_ns.items()
+            }
+        self._checked_ns = now_ns
         return now_ns
 
-    def _trouble(self) -> str | None:
-        return None if self._roster.bears_losses else self._around.trouble()
+    def _failure(self) -> str | None:
+        return None if self._registry.bears_losses else self._hooks.failure()
 
     def _next(self) -> Item | None:
         try:
@@ -215,128 +226,128 @@ class ZenohBackend(ABC, Generic[R]):
         except queue.Empty:
             return None
         finally:
-            self._looked()
+            self._check_time()
 
     def _handle(self, item: Item) -> None:
         if isinstance(item, zenoh.Query):
-            self._asked(item)
+            self._answer_query(item)
             return
         key = str(item.key_expr)
         runner = runner_of(key)
         if key != self._keys.alive(runner):
             # A put may name its key with wildcards; only the exact one speaks for a runner.
-            speaker = runner if key == self._keys.answer(runner) else key
-            self._send(self._roster.answer(speaker, item.payload.to_bytes()))
+            sender = runner if key == self._keys.answer(runner) else key
+            self._send(self._registry.answer(sender, item.payload.to_bytes()))
         elif item.kind == zenoh.SampleKind.DELETE:
             self._present.discard(runner)
-            self._roster.gone(runner, "its process or its link is gone")
+            self._registry.gone(runner, "its process or its link is gone")
         else:
             self._present.add(runner)
 
-    def _asked(self, query: zenoh.Query) -> None:
-        """A runner asks what there is to play, or for robots."""
+    def _answer_query(self, query: zenoh.Query) -> None:
+        """Answer a query of a runner for the session info, or its join request."""
         if self._session is None:
             return
-        self._tell_changes()  # before another runner of the same name hears what the one before it was told
+        self._report_changes()  # before a new runner of the same name gets the frames of the last one
         key = str(query.key_expr)
         runner = runner_of(key)
-        with query:  # a query that is kept alive holds the asker until its time-out
+        with query:  # a query that is kept alive blocks the runner until its time-out
             request = query.payload.to_bytes() if query.payload else b""
             try:
                 if key == self._keys.offer(runner):
-                    offer = self._roster.offer(request)
+                    offer = self._registry.offer(request)
                     if offer is not None:
                         query.reply(key, offer.encode())
                     return
-                if runner in self._shut_out:
-                    raise JoinRefused(FLOODED)
+                if runner in self._rate_limited:
+                    raise JoinRefused(RATE_LIMITED)
                 # Only the exact key speaks for a runner, as below.
-                reply = self._roster.join(runner if key == self._keys.join(runner) else key, request)
+                reply = self._registry.join(runner if key == self._keys.join(runner) else key, request)
             except JoinRefused as refusal:
                 self._refusals += 1
-                if self._refusals <= MAX_TOLD:
-                    self._around.refused(runner, str(refusal))
+                if self._refusals <= MAX_REFUSALS_REPORTED:
+                    self._hooks.refused(runner, str(refusal))
                 query.reply_err(str(refusal))
                 return
-            self._frames[runner] = self._session.declare_publisher(
+            self._publishers[runner] = self._session.declare_publisher(
                 self._keys.frame(runner), congestion_control=self.congestion, express=True
             )
-            if self._shut_out:
-                self._hear(self._session, runner)
-            self._building[runner] = self._clock.now_ns() + to_ns(self._roster.limits.join_s)
+            if self._rate_limited:
+                self._subscribe(self._session, runner)
+            self._build_deadlines_ns[runner] = self._clock.now_ns() + to_ns(self._registry.limits.join_s)
             self._allow_time()
             query.reply(key, reply)
 
-    def _tell_changes(self) -> None:
-        """A runner that was lost may be but slow: it is told to leave, since it has no robots any more."""
-        flooding = self._inbox.flooding() - self._shut_out
-        if flooding:
-            self._shut(flooding)
-        for runner, until_ns in list(self._building.items()):
-            if not self._roster.is_building(runner):
-                del self._building[runner]
+    def _report_changes(self) -> None:
+        """Report losses and events to the hooks, and drop rate-limited runners and those past their build deadline.
+
+        A lost runner may only be slow: it gets an "end" frame, since it has no robots any more.
+        """
+        rate_limited = self._inbox.rate_limited() - self._rate_limited
+        if rate_limited:
+            self._rate_limit(rate_limited)
+        for runner, until_ns in list(self._build_deadlines_ns.items()):
+            if not self._registry.is_building(runner):
+                del self._build_deadlines_ns[runner]
             elif self._clock.now_ns() > until_ns:
-                self._roster.gone(runner, f"its agents were not ready within {self._roster.limits.join_s:g} s")
-        for loss in self._roster.losses[self._losses_told :]:
-            self._around.lost(loss)
-        self._losses_told = len(self._roster.losses)
-        for change in self._roster.changes[self._changes_told :]:
-            if change.what in ("lost", "left"):
-                why = {"why": change.reason} if change.reason else {}
-                self._frames.pop(change.runner).put(frames.encode("end", -1, {}, why))
-                self._present.discard(change.runner)
-            self._around.changed(change, self._roster.missing_robots)
-        self._changes_told = len(self._roster.changes)
+                self._registry.gone(runner, f"its agents were not ready within {self._registry.limits.join_s:g} s")
+        for loss in self._registry.losses[self._losses_reported :]:
+            self._hooks.lost(loss)
+        self._losses_reported = len(self._registry.losses)
+        for event in self._registry.events[self._events_reported :]:
+            if event.what in ("lost", "left"):
+                reason = {"why": event.reason} if event.reason else {}
+                self._publishers.pop(event.runner).put(frames.encode("end", -1, {}, reason))
+                self._present.discard(event.runner)
+            self._hooks.changed(event, self._registry.missing_robots)
+        self._events_reported = len(self._registry.events)
 
-    def _shut(self, flooding: set[str]) -> None:
-        """Hear each runner on its own, but for these: what they send is dropped where no Python sees it.
+    def _rate_limit(self, rate_limited: set[str]) -> None:
+        """Subscribe to each runner on its own, except to these: zenoh drops their samples before Python sees them.
 
-        An answer that comes while this is under way may be received twice, which is counted; none is missed.
+        An answer that arrives during the change may be received twice, which is counted; none is missed.
         """
         if self._session is None:
             return
-        self._shut_out |= flooding
-        for runner in self._frames.keys() - self._shut_out:
-            self._hear(self._session, runner)
-        for key in (self._keys.any_answer, *map(self._keys.answer, flooding)):
+        self._rate_limited |= rate_limited
+        for runner in self._publishers.keys() - self._rate_limited:
+            self._subscribe(self._session, runner)
+        for key in (self._keys.any_answer, *map(self._keys.answer, rate_limited)):
             if key in self._answers:
                 self._answers.pop(key).undeclare()
-        for runner in flooding:
-            self._roster.gone(runner, FLOODED)
+        for runner in rate_limited:
+            self._registry.gone(runner, RATE_LIMITED)
 
-    def _hear(self, session: zenoh.Session, runner: str) -> None:
+    def _subscribe(self, session: zenoh.Session, runner: str) -> None:
         key, put = self._keys.answer(runner), Callback(self._inbox.put, indirect=False)  # or each would have a thread
         if key not in self._answers:
             self._answers[key] = session.declare_subscriber(key, put)
 
 
-# --- The remote backend in lockstep: the loop waits for every runner, as fast as the machine allows.
-
-
-ALONE = BackendHooks()
+NO_HOOKS = BackendHooks()
 
 
 class LockstepBackend(ZenohBackend[Lockstep]):
-    """All agents of a run in runners; `lockstep` decides, this carries the bytes."""
+    """A backend of runners in lockstep, as fast as the machine allows: `Lockstep` decides, this carries the bytes."""
 
     def __init__(
         self,
-        door: ListenSettings | str,
+        listen: ListenSettings | str,
         run_id: str,
         assignments: list[Assignment],
         timeout_s: float,
         clock: Clock,
-        around: BackendHooks = ALONE,
+        hooks: BackendHooks = NO_HOOKS,
         on_loss: OnLoss = "stop",
-        start_s: float = START_S,
-        terms: JoinPolicy = USUAL,
+        start_s: float = START_TIMEOUT_S,
+        policy: JoinPolicy = DEFAULT_JOIN_POLICY,
     ) -> None:
-        super().__init__(door, run_id, Lockstep(assignments, on_loss, terms), timeout_s, clock, around, start_s)
+        super().__init__(listen, run_id, Lockstep(assignments, on_loss, policy), timeout_s, clock, hooks, start_s)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """One frame to every runner, one answer from each."""
-        self._send(self._roster.open_tick(tick, readings, received, tx_status))
+        """Send one frame to every runner, and wait for one answer from each."""
+        self._send(self._registry.open_tick(tick, readings, received, tx_status))
         self._wait()
-        return self._roster.take()
+        return self._registry.take()
