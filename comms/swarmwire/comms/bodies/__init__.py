@@ -1,1 +1,1 @@
-"""Kinds of robot: their data sheets, and those that come with swarmwire."""
+"""Bodies: the kinds of robot, their specs, and the bundled ones as TOML files."""

@@ -1,4 +1,8 @@
-"""A sense of the user's own: what its table in a body's sheet says, and what its class tells agents."""
+"""Specs of custom sensors and actuators: their tables in a body file, and the facts that agents get of them.
+
+A body file names the class and its parameters; the fields of a sensor and the width of an actuator are known once the
+class is loaded. The `read_…` functions read specs that `asdict` wrote down.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -11,12 +15,12 @@ from swarmwire.comms.config import check_plain, parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 
-MAX_WIDE = 10_000  # numbers of a field, or of an actuator, of one robot
+MAX_WIDTH = 10_000  # numbers in a field, or of an actuator, for one robot
 
 
 @dataclass(frozen=True)
 class CustomSensorSpec(RangedSensorSpec):
-    """A sense whose class is the user's own; what is not listed here are keys of that class. Sense: its fields."""
+    """A sensor with a custom class; other keys of its table are parameters of that class. Readings: its fields."""
 
     kind: str = parameter(
         help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
@@ -26,16 +30,16 @@ class CustomSensorSpec(RangedSensorSpec):
 
 
 def custom_sensor_spec(value: object, where: str, key: str, beside: Path) -> CustomSensorSpec:
-    """The sheet of a user's table, which has a `kind`; its fields are known once the class is."""
+    """The spec of a table in a body file, which has a `kind`; its fields stay empty until the class is loaded."""
     table = mapping_of(where, key, value)
-    shared = {name: table.pop(name) for name in [of.name for of in fields(RangedSensorSpec)] if name in table}
+    shared = {name: table.pop(name) for name in [field.name for field in fields(RangedSensorSpec)] if name in table}
     kind = kind_of(table, where, key, beside)
     check_plain(table, where, key)
     return built(CustomSensorSpec, {**shared, "kind": kind, "params": table, "fields": {}}, where, key)
 
 
 def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
-    """The `kind` of a table, taken out of it, with the path of a file made absolute; BadInput if it is no text."""
+    """Remove the `kind` of a table and return it, with the path of a file made absolute; BadInput if it is no text."""
     kind = table.pop("kind")
     if not isinstance(kind, str) or not kind:
         expected = 'expected "file.py:Class", "package.module:Class" or the name of an entry point'
@@ -44,22 +48,19 @@ def kind_of(table: dict[str, Any], where: str, key: str, beside: Path) -> str:
 
 
 def read_custom_sensor_spec(value: object, where: str, key: str) -> CustomSensorSpec:
-    """The sheet that `asdict` made into this table; only that knows `params` and `fields` from keys of the class."""
+    """The spec that `asdict` made into this table, with `params` and `fields` apart."""
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     widths = mapping_of(where, f"{key}.fields", table.get("fields"))
-    known = cast("Mapping[str, object]", widths).values()
-    if not all(type(width) is int and 0 <= width <= MAX_WIDE for width in known):
-        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MAX_WIDE}, got {widths!r}")
+    numbers = cast("Mapping[str, object]", widths).values()
+    if not all(type(width) is int and 0 <= width <= MAX_WIDTH for width in numbers):
+        raise BadInput(where, f"{key}.fields", f"expected whole numbers from 0 to {MAX_WIDTH}, got {widths!r}")
     return built(CustomSensorSpec, table, where, key)
-
-
-# --- An actuator of the user's own: what its table in a body's sheet says, and what its class tells agents.
 
 
 @dataclass(frozen=True)
 class CustomActuatorSpec:
-    """An actuator whose class is the user's own; agents set it by `robot.actuate(name, …)`."""
+    """An actuator with a custom class; agents set it by `robot.actuate(name, …)`."""
 
     kind: str = parameter(
         help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
@@ -69,7 +70,7 @@ class CustomActuatorSpec:
 
 
 def custom_actuator_spec(value: object, where: str, key: str, beside: Path) -> CustomActuatorSpec:
-    """The sheet of a user's table, which has a `kind`; its width is known once the class is."""
+    """The spec of a table in a body file, which has a `kind`; its width stays 0 until the class is loaded."""
     table = mapping_of(where, key, value)
     if "kind" not in table:
         raise BadInput(where, f"{key}.kind", "is missing")
@@ -79,10 +80,10 @@ def custom_actuator_spec(value: object, where: str, key: str, beside: Path) -> C
 
 
 def read_custom_actuator_spec(value: object, where: str, key: str) -> CustomActuatorSpec:
-    """The sheet that `asdict` made into this table; only that knows `params` and `width` from keys of the class."""
+    """The spec that `asdict` made into this table, with `params` and `width` apart."""
     table = mapping_of(where, key, value)
     mapping_of(where, f"{key}.params", table.get("params"))
     width = table.get("width")
-    if type(width) is not int or not 0 <= width <= MAX_WIDE:
-        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MAX_WIDE}, got {width!r}")
+    if type(width) is not int or not 0 <= width <= MAX_WIDTH:
+        raise BadInput(where, f"{key}.width", f"expected a whole number from 0 to {MAX_WIDTH}, got {width!r}")
     return built(CustomActuatorSpec, table, where, key)

@@ -1,4 +1,7 @@
-"""Drives: what moves a body and how fast it can go, as tables of its data sheet; `kind` says which."""
+"""Drives and LEDs of a body, as tables of its file; `kind` in the table `drive` names the drive.
+
+Colours of LEDs are numbers 0xRRGGBB.
+"""
 
 from dataclasses import dataclass
 
@@ -8,13 +11,15 @@ from numpy.typing import ArrayLike
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.config import parameter
 
+BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue
+
 
 @dataclass(frozen=True)
 class WheelNoise:
-    """How wheels differ from what they are asked for: asked for w, a wheel runs at f (w + b), as ARGoS has it.
+    """Actuation noise of wheels, as in ARGoS: a wheel with the command w runs at f (w + b).
 
-    The bias b is drawn once for each wheel, the factor f for each wheel in each tick, both normal. Where both
-    wheels are asked to stand still they do.
+    The bias b is drawn once for each wheel, the factor f for each wheel in each tick, both normal. A robot whose two
+    wheels are both commanded to 0 stands still.
     """
 
     bias_mps: float = parameter(0.0, help="mean of the bias b", unit="m/s", at_least=-0.1, at_most=0.1)
@@ -23,12 +28,12 @@ class WheelNoise:
     factor_std: float = parameter(0.0, help="standard deviation of the factor f", at_least=0, at_most=0.5)
 
 
-NO_WHEEL_NOISE = WheelNoise()  # wheels do as they are told
+NO_WHEEL_NOISE = WheelNoise()
 
 
 @dataclass(frozen=True)
 class Wheels:
-    """Two wheels on one axle; a command that a wheel cannot follow is slowed down as a whole, so its curve stays."""
+    """Two wheels on one axle; a command that is too fast for a wheel is slowed down as a whole, on the same curve."""
 
     wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
@@ -39,18 +44,18 @@ class Wheels:
 
     @property
     def max_linear_mps(self) -> float:
-        """The fastest it can drive straight ahead."""
+        """Largest forward speed."""
         return self.max_wheel_mps
 
     @property
     def max_angular_radps(self) -> float:
-        """The fastest it can turn on the spot."""
+        """Largest turn rate on the spot."""
         return 2.0 * self.max_wheel_mps / self.wheel_base_m
 
 
 @dataclass(frozen=True)
 class Twist:
-    """Two wheels on one axle behind a controller that limits forward speed and turn rate apart."""
+    """Two wheels on one axle behind a controller that limits forward speed and turn rate separately."""
 
     wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
     max_linear_mps: float = parameter(help="fastest forward speed", unit="m/s", above=0)
@@ -63,7 +68,7 @@ class Twist:
 
 @dataclass(frozen=True)
 class Holonomic:
-    """Moves in every direction of the plane and turns at the same time; it has no wheels that slip, and no noise."""
+    """A drive in every direction of the plane that turns at the same time; it has no wheel slip and no noise."""
 
     max_speed_mps: float = parameter(help="fastest speed in any direction of the plane", unit="m/s", above=0)
     max_angular_radps: float = parameter(help="fastest turn", unit="rad/s", above=0)
@@ -73,24 +78,17 @@ class Holonomic:
 
     @property
     def max_linear_mps(self) -> float:
-        """The fastest it can move straight ahead."""
+        """Largest forward speed."""
         return self.max_speed_mps
 
 
-Drive = Wheels | Twist | Holonomic  # what a body has one of
-# By `kind` in a body's sheet.
-DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}
+Drive = Wheels | Twist | Holonomic
+DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}  # by `kind`
 
 
 def wheel_base_of(drive: Drive) -> float:
     """The distance between a drive's wheels in m; 0 if it has none."""
     return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
-
-
-# --- LEDs: where a body has them, and their colours as 0xRRGGBB.
-
-
-BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue
 
 
 @dataclass(frozen=True)
@@ -106,11 +104,11 @@ class Leds:
 
     @property
     def count(self) -> int:
-        """How many LEDs there are."""
+        """Number of LEDs, with the beacon."""
         return len(self.angles_deg) + (self.beacon_height_m > 0.0)
 
     def places_m(self, body_radius_m: float) -> FloatArray:
-        """Where they sit: x ahead and y to the left of the body's axis, z above its lower side, (leds, 3)."""
+        """The LEDs' positions: x ahead and y to the left of the body's axis, z above its lower side, (leds, 3)."""
         angle, ring_m = np.deg2rad(self.angles_deg), self.radius_m or body_radius_m
         places = np.zeros((self.count, 3))
         places[: len(angle), 0], places[: len(angle), 1] = ring_m * np.cos(angle), ring_m * np.sin(angle)
@@ -120,11 +118,11 @@ class Leds:
 
 
 def rgb_of(red: ArrayLike, green: ArrayLike, blue: ArrayLike) -> IntArray:
-    """Colours as 0xRRGGBB of shares from 0 to 1, any shape; ValueError if one is out of range."""
-    whole: IntArray = np.zeros((), np.int64)
-    for share in (red, green, blue):
-        asked = np.asarray(share, np.float64)
-        if not ((asked >= 0.0) & (asked <= 1.0)).all():
-            raise ValueError(f"led(red, green, blue): expected numbers from 0 to 1, got {share}")
-        whole = (whole << 8) + np.round(255.0 * asked).astype(np.int64)
-    return whole
+    """Colours 0xRRGGBB from components in [0, 1], any shape; ValueError if one is out of range."""
+    rgb: IntArray = np.zeros((), np.int64)
+    for component in (red, green, blue):
+        level = np.asarray(component, np.float64)
+        if not ((level >= 0.0) & (level <= 1.0)).all():
+            raise ValueError(f"led(red, green, blue): expected numbers from 0 to 1, got {component}")
+        rgb = (rgb << 8) + np.round(255.0 * level).astype(np.int64)
+    return rgb

@@ -1,4 +1,8 @@
-"""Sensors around a body."""
+"""Specs of the sensors that look around a body: proximity, passive infrared, light, laser scanner.
+
+Infrared sensors answer to the distance from the body's rim by a `ResponseCurve`. Angles of a spec are in degrees,
+counter-clockwise from ahead; `angle_rad` has them in (-pi, pi].
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,9 +13,13 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import parameter
 
+FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple
+FULL_DEG = 360.0
+SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by
+
 
 def within_a_turn(angle_rad: FloatArray) -> FloatArray:
-    """These angles in (-pi, pi], not to be written to."""
+    """The angles wrapped into (-pi, pi]; the array is read-only."""
     wrapped = np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
     wrapped.setflags(write=False)
     return wrapped
@@ -25,7 +33,7 @@ class RadialSpec(RangedSensorSpec):
 
     @cached_property
     def angle_rad(self) -> FloatArray:
-        """Where the sensors look in the body's frame, in (-pi, pi], (sensors,)."""
+        """The directions of the sensors in the body's frame, in (-pi, pi], (sensors,)."""
         return within_a_turn(np.deg2rad(np.array(self.angles_deg, np.float64)))
 
     @cached_property
@@ -34,16 +42,9 @@ class RadialSpec(RangedSensorSpec):
         return np.cos(self.angle_rad), np.sin(self.angle_rad)
 
 
-# --- Infrared sensors at the body's rim, and how they answer to distance.
-
-
-FORMS = ("rational", "inverse_square", "quadratic")  # compiled code knows them by their places here
-SMALLEST = 1e-9  # values and distances that a curve is asked for, so that nothing is divided by 0
-
-
 @dataclass(frozen=True)
 class ResponseCurve:
-    """How an infrared sensor answers to distance d in m from the rim: a falling curve, clipped to [0, 1].
+    """The answer of an infrared sensor to distance d in m from the rim: a falling curve, clipped to [0, 1].
 
     `rational`: 1 below `full_m`, else a / (d + b), zero beyond `reach_m`.
     `inverse_square`: the same with a / (d + b)^2.
@@ -68,23 +69,23 @@ class ResponseCurve:
         return np.where(distance_m <= self.reach_m, np.clip(value, 0.0, 1.0), 0.0)
 
     def distance_m(self, value: FloatArray) -> FloatArray:
-        """The distance at which an ideal sensor answers `value`; `reach_m` where nothing is seen (any shape)."""
-        seen = np.maximum(value, SMALLEST)
+        """The distance at which an ideal sensor answers `value`; `reach_m` where the value is 0 (any shape)."""
+        positive = np.maximum(value, SMALLEST)
         if self.kind == "rational":
-            distance = self.a / seen - self.b
+            distance = self.a / positive - self.b
         elif self.kind == "inverse_square":
-            distance = np.sqrt(self.a / seen) - self.b
+            distance = np.sqrt(self.a / positive) - self.b
         elif self.a == 0.0:
-            distance = (seen - self.c) / self.b
+            distance = (positive - self.c) / self.b
         else:
-            root = np.sqrt(np.maximum(self.b * self.b - 4.0 * self.a * (self.c - seen), 0.0))
+            root = np.sqrt(np.maximum(self.b * self.b - 4.0 * self.a * (self.c - positive), 0.0))
             distance = (-self.b - root) / (2.0 * self.a)
         return np.where(value > 0.0, np.clip(distance, 0.0, self.reach_m), self.reach_m)
 
 
 @dataclass(frozen=True)
 class RayArraySpec(RadialSpec):
-    """Rays that start at the body's rim and answer to the nearest thing that they see."""
+    """Rays that start at the body's rim and answer to the nearest object on them."""
 
     range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
     response: ResponseCurve = parameter(help="answer to distance")
@@ -92,50 +93,42 @@ class RayArraySpec(RadialSpec):
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
         """As `SensorSpec.fault`."""
-        told = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
-        if np.any(np.diff(told) > 0.0) or told[0] <= told[-1]:
+        answers = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
+        if np.any(np.diff(answers) > 0.0) or answers[0] <= answers[-1]:
             return "response", "expected a curve that falls from the rim to reach_m"
         return None
 
 
-# --- Proximity: active infrared, which sees its own light come back from robots, obstacles and walls.
-
-
 @dataclass(frozen=True)
 class ProximitySpec(RayArraySpec):
-    """Rays from the body's rim that answer to the nearest thing on them. Sense: value (n, rays), 0 to 1."""
+    """Active infrared: rays from the rim that answer to the nearest robot, obstacle or wall by its reflection.
 
-
-# --- Passive infrared: a sensor with its own light off, which sees the light of other robots alone.
+    Readings: value (n, rays), 0 to 1.
+    """
 
 
 @dataclass(frozen=True)
 class InfraredSpec(RayArraySpec):
-    """Rays from the body's rim that answer to the nearest robot on them, unless an obstacle hides it; not to walls.
+    """Passive infrared: rays from the rim that answer to the light of the nearest robot, unless an obstacle hides it.
 
-    Beside proximity, which sees both, it tells robots from walls. Sense: value (n, rays), 0 to 1.
+    Proximity sensors answer to robots and walls, these to robots only: both together distinguish them. Readings: value
+    (n, rays), 0 to 1.
     """
-
-
-# --- Light: photocells around the body.
 
 
 @dataclass(frozen=True)
 class LightSpec(RadialSpec):
-    """Photocells that answer to the arena's lights. Sense: value (n, sensors), 0 dark to 1."""
+    """Photocells that answer to the arena's lights. Readings: value (n, sensors), 0 dark to 1."""
 
     noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
 
 
-# --- A laser scanner: the distance to the nearest thing on each of many rays.
-
-
-FULL_DEG = 360.0
-
-
 @dataclass(frozen=True)
 class ScanSpec(RangedSensorSpec):
-    """A laser scanner that turns at one height. Sense: range_m (n, rays), inf where nothing is within the range."""
+    """A laser scanner: the distance to the nearest object on each ray, all at one height.
+
+    Readings: range_m (n, rays), inf where nothing is within the range.
+    """
 
     rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
     range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
@@ -168,7 +161,7 @@ class ScanSpec(RangedSensorSpec):
 
     @cached_property
     def angle_rad(self) -> FloatArray:
-        """Where the rays look in the body's frame, in (-pi, pi], (rays,)."""
+        """The directions of the rays in the body's frame, in (-pi, pi], (rays,)."""
         return within_a_turn(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
 
     @cached_property

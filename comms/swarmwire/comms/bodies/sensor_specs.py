@@ -1,4 +1,7 @@
-"""The battery: what it holds, and what drains it."""
+"""Specs of the sensors that measure the robot itself, the floor under it, and the LEDs around it.
+
+Each spec's docstring names the fields of its readings, with shapes for n robots.
+"""
 
 from dataclasses import dataclass
 from math import hypot, radians, tan
@@ -10,10 +13,10 @@ from swarmwire.comms.config import parameter
 
 @dataclass(frozen=True)
 class BatterySpec(SensorSpec):
-    """What the robot runs on; when it is empty, the robot is dead. Sense: charge (n,), 0 to 1, and voltage_v (n,).
+    """The battery; a robot whose battery is empty is dead. Readings: charge (n,), 0 to 1, and voltage_v (n,).
 
-    It gives `idle_w`, `drive_w_per_mps` times the mean speed at which the wheels are told to run (of a body without
-    wheels, the speed in the plane), and `led_w` for each LED that is lit. The voltage falls evenly with the charge.
+    The robot draws `idle_w`, `drive_w_per_mps` times the mean commanded speed of its wheels (of a body without wheels,
+    the commanded speed in the plane), and `led_w` for each lit LED. The voltage falls linearly with the charge.
     """
 
     capacity_wh: float = parameter(help="energy of a full battery", unit="Wh", above=0)
@@ -33,22 +36,16 @@ class BatterySpec(SensorSpec):
         return None
 
 
-# --- The bumper.
-
-
 @dataclass(frozen=True)
 class BumperSpec(SensorSpec):
-    """A touch-sensitive rim. Sense: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
-
-
-# --- An omnidirectional camera: a mirror above the body that shows the LEDs of other robots around it.
+    """A touch-sensitive rim. Readings: pressed (n,), 1 if the body touched anything in the previous tick, else 0."""
 
 
 @dataclass(frozen=True)
 class CameraSpec(SensorSpec):
-    """A camera that looks down all around and tells the blobs of light that it sees, the nearest first.
+    """An omnidirectional camera: a mirror above the body shows the lit LEDs of other robots, the nearest first.
 
-    Sense: distance_m, bearing_rad, colour (n, most_blobs), nan where there is no further blob.
+    Readings: distance_m, bearing_rad, colour (n, most_blobs), nan after the last blob.
     """
 
     height_m: float = parameter(help="height of the mirror above the body's lower side", unit="m", above=0)
@@ -61,28 +58,22 @@ class CameraSpec(SensorSpec):
     )
 
     def reach_m(self, altitude_m: float) -> float:
-        """How far it sees on the floor from a body that hovers so high."""
+        """Radius in m of the visible floor, for a body at this altitude."""
         return (altitude_m + self.height_m) * tan(radians(self.aperture_deg))
-
-
-# --- The compass.
 
 
 @dataclass(frozen=True)
 class CompassSpec(RangedSensorSpec):
-    """The heading in the arena's frame. Sense: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
+    """The heading in the arena's frame. Readings: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
 
     is_global: ClassVar[bool] = True
 
     noise_rad: float = parameter(0.0, help="standard deviation of the error, new in each tick", unit="rad", at_least=0)
 
 
-# --- Ground sensors: the shade of the floor under given points of the body.
-
-
 @dataclass(frozen=True)
 class GroundSpec(RangedSensorSpec):
-    """Sensors that look down at the floor. Sense: shade (n, points), 0 black to 1 white."""
+    """Ground sensors: the shade of the floor under points of the body. Readings: shade (n, points), 0 black to 1."""
 
     points_m: tuple[tuple[float, float], ...] = parameter(
         help="where each sensor looks: ahead of the body's centre, and to its left", unit="m"
@@ -98,14 +89,11 @@ class GroundSpec(RangedSensorSpec):
         return None
 
 
-# --- The IMU: an accelerometer of two axes and a gyro.
-
-
 @dataclass(frozen=True)
 class ImuSpec(SensorSpec):
-    """Accelerometer and gyro, with white noise, a constant bias of each robot's own, and a bias that drifts.
+    """An accelerometer of two axes and a gyro, with white noise, a constant bias per robot, and a drifting bias.
 
-    Sense: forward_mps2, left_mps2, turn_radps (n,), in the body's frame, means over the tick before.
+    Readings: forward_mps2, left_mps2, turn_radps (n,), in the body's frame, means over the previous tick.
     """
 
     noise_mps2: float = parameter(
@@ -128,15 +116,12 @@ class ImuSpec(SensorSpec):
     )
 
 
-# --- Odometry: what the wheels have rolled.
-
-
 @dataclass(frozen=True)
 class OdometrySpec(SensorSpec):
-    """Encoders on the two wheels. Sense: left_m, right_m (n,), travelled since the start, in whole encoder steps.
+    """Encoders on the two wheels. Readings: left_m, right_m (n,), travel since the start, in whole encoder steps.
 
-    Each wheel has an error of its own that stays (its diameter), and slips anew in each tick. What heading and place
-    follow from it is the agent's to work out.
+    Each wheel has a constant error (its diameter) and a slip drawn in each tick. The agent computes heading and
+    position from the travel.
     """
 
     slip: float = parameter(0.0, help="standard deviation of a tick's relative error", at_least=0, at_most=1)
@@ -146,12 +131,9 @@ class OdometrySpec(SensorSpec):
     step_m: float = parameter(0.0, help="travel per encoder step; 0: not quantised", unit="m", at_least=0)
 
 
-# --- Positioning: where a tracking camera sees the robot.
-
-
 @dataclass(frozen=True)
 class PositioningSpec(RangedSensorSpec):
-    """The position in the arena's frame, as a tracking camera tells it. Sense: x_m, y_m (n,)."""
+    """The position in the arena's frame, as a tracking camera measures it. Readings: x_m, y_m (n,)."""
 
     is_global: ClassVar[bool] = True
 

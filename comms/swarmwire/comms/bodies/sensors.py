@@ -1,6 +1,7 @@
-"""Data sheets of the senses a body may have: what agents may know of their own sensors, and the world emulates.
+"""The registry of the built-in sensors' specs.
 
-A file per sense. A new one: its sheet in a file here, and its line in `SENSOR_SPECS`.
+Agents get the specs of their own sensors; the world emulates the sensors by them. A new sensor needs a spec class in
+`sensor_specs` or `ranging_specs` and a line in `SENSOR_SPECS`.
 """
 
 from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
@@ -16,7 +17,7 @@ from swarmwire.comms.bodies.sensor_specs import (
 )
 from swarmwire.comms.bodies.spec import SensorSpec
 
-# By the name that a sheet and an agent's `needs` have for the sense.
+# By the name of the sensor in body files and in the `needs` of agents.
 SENSOR_SPECS: dict[str, type[SensorSpec]] = {
     "proximity": ProximitySpec,
     "compass": CompassSpec,

@@ -1,4 +1,4 @@
-"""What every sense's data sheet says: how often it reads, how late it tells, how much it loses, in which steps."""
+"""The base classes of sensor specs: the keys that all sensors share, and the stages of a reading."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -8,13 +8,13 @@ from swarmwire.comms.config import parameter
 
 @dataclass(frozen=True, kw_only=True)
 class SensorSpec:
-    """The data sheet of a sense; these keys all senses have, and each has its own beside them.
+    """The keys that all sensors have; a subclass adds those of one sensor.
 
     A reading passes through these stages, in this order: the truth, taken at `rate_hz`; noise; outliers; rounding to
-    steps; clipping to the range; drop-out. It is shown `delay_s` later, and until the next one is.
+    steps; clipping to the range; drop-out. The agent gets it `delay_s` later, and until the next one arrives.
     """
 
-    is_global: ClassVar[bool] = False  # whether it tells more than what is around the robot
+    is_global: ClassVar[bool] = False  # True: it measures more than the robot and its surroundings
 
     rate_hz: float = parameter(
         0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0
@@ -26,13 +26,13 @@ class SensorSpec:
     )
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """A key whose value does not go with the others or a body of this radius, and what was expected; else None."""
+        """A key whose value contradicts the others or this body radius, and the expectation; None if there is none."""
         return None
 
 
 @dataclass(frozen=True, kw_only=True)
 class RangedSensorSpec(SensorSpec):
-    """The data sheet of a sense whose readings lie within a known range."""
+    """The spec of a sensor whose readings lie within a known range."""
 
     outlier: float = parameter(
         0.0, help="probability that a reading is anything within the range instead", at_least=0, at_most=1

@@ -1,4 +1,4 @@
-"""Tables of a data sheet as the frozen dataclasses that they describe, checked key by key."""
+"""Reads tables of a body file into frozen dataclasses, and checks every key, type and bound."""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -9,52 +9,52 @@ from typing import Any, cast, get_args, get_origin, get_type_hints
 from swarmwire.comms.config import bounds_of, did_you_mean, fault_of
 from swarmwire.comms.errors import BadInput
 
-GREATEST = 1e9  # of any number of a sheet: nothing on a robot is that large in its unit
-MAX_ITEMS = 1000  # of a list: what is told of each is kept for every robot
+MAX_NUMBER = 1e9  # of any number: no property of a robot is that large in its unit
+MAX_ITEMS = 1000  # of a list: each item may cost memory for every robot
 
 
 def mapping_of(where: str, key: str, value: object) -> dict[str, Any]:
-    """A table; BadInput names `where` and `key` if it is none."""
+    """The value as a dict; BadInput with `where` and `key` if it is no table."""
     if not isinstance(value, Mapping):
         raise BadInput(where, key, f"expected a table, got {value!r}")
     return {str(name): item for name, item in cast("Mapping[object, Any]", value).items()}
 
 
 def built(kind: type[Any], value: object, where: str, key: str) -> Any:
-    """An instance of the dataclass `kind` from its table; BadInput names `where` and the key of what is wrong."""
-    given = mapping_of(where, key, value)
+    """An instance of the dataclass `kind` from its table; BadInput names `where` and the key of a fault."""
+    table = mapping_of(where, key, value)
     hints = get_type_hints(kind)
-    known = {of.name: of for of in fields(kind)}
-    made: dict[str, Any] = {}
-    for name in given:
+    known = {field.name: field for field in fields(kind)}
+    values: dict[str, Any] = {}
+    for name in table:
         if name not in known:
             raise BadInput(where, _join(key, name), f"unknown key; expected {did_you_mean(known, name)}")
-    for name, of in known.items():
-        if name in given:
-            made[name] = _value(hints[name], given[name], where, _join(key, name))
-            limits = bounds_of(of)
-            fault = fault_of(made[name], limits) if isinstance(made[name], float | int) else None
-            if limits.choices and made[name] not in limits.choices:
-                fault = f"expected {did_you_mean(limits.choices, made[name])}; got {made[name]!r}"
+    for name, field in known.items():
+        if name in table:
+            values[name] = _value(hints[name], table[name], where, _join(key, name))
+            bounds = bounds_of(field)
+            fault = fault_of(values[name], bounds) if isinstance(values[name], float | int) else None
+            if bounds.choices and values[name] not in bounds.choices:
+                fault = f"expected {did_you_mean(bounds.choices, values[name])}; got {values[name]!r}"
             if fault:
                 raise BadInput(where, _join(key, name), fault)
-        elif of.default is MISSING and of.default_factory is MISSING:
-            raise BadInput(where, _join(key, name), ": ".join(filter(None, ("is missing", bounds_of(of).help))))
-    return kind(**made)
+        elif field.default is MISSING and field.default_factory is MISSING:
+            raise BadInput(where, _join(key, name), ": ".join(filter(None, ("is missing", bounds_of(field).help))))
+    return kind(**values)
 
 
 def _value(hint: Any, value: object, where: str, key: str) -> Any:
     if is_dataclass(hint) and isinstance(hint, type):
         return built(hint, value, where, key)
     if isinstance(hint, UnionType) and not is_dataclass(get_args(hint)[0]):
-        return _value(get_args(hint)[0], value, where, key)  # X | None: given, it is an X
+        return _value(get_args(hint)[0], value, where, key)  # of X | None: the value is an X
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(where, key, f"expected a number, got {value!r}")
         if isinstance(value, float) and not isfinite(value):
             raise BadInput(where, key, f"expected a finite number, got {value!r}")
-        if abs(value) > GREATEST:
-            raise BadInput(where, key, f"expected a number of at most {GREATEST:g} in size, got {str(value)[:40]}")
+        if abs(value) > MAX_NUMBER:
+            raise BadInput(where, key, f"expected a number of at most {MAX_NUMBER:g} in size, got {str(value)[:40]}")
         return float(value)
     if hint is int and type(value) is not int:
         raise BadInput(where, key, f"expected a whole number, got {value!r}")

@@ -75,7 +75,7 @@ def _bodies(static: Static, logs: RealLogs) -> Iterator[str]:
     if emulated.keys() != real.keys():
         yield f"body: {', '.join(sorted(emulated))} emulated, {', '.join(sorted(real))} in the log"
     for name in emulated.keys() & real.keys():
-        if emulated[name].told.as_mapping() != real[name].told.as_mapping():
+        if emulated[name].agent_view.as_mapping() != real[name].agent_view.as_mapping():
             yield f"body {name}: its sheet in the log differs from the emulated one"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
-from swarmwire.comms.bodies.custom import MAX_WIDE, CustomSensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, ActuatorCommands
 from swarmwire.world.custom.loading import made_actuator, made_sensor
@@ -207,7 +207,7 @@ SENSOR, ACTUATOR = "[sensors.x]\nkind = ", "[actuators.x]\nkind = "
         (SENSOR + f'"{PAINT}"\ndelay_s = -1', "sensors.x.delay_s: expected at least 0 s, got -1.0"),
         (
             "[sensors.x]\nscale = 1",
-            'sensors.x: unknown sense; expected one of .*, or a kind = "file.py:Class" of your own',
+            'sensors.x: unknown sensor; expected one of .*, or a kind = "file.py:Class" of your own',
         ),
         *(
             (
@@ -229,13 +229,13 @@ SENSOR, ACTUATOR = "[sensors.x]\nkind = ", "[actuators.x]\nkind = "
                 ("0x1_0000_0000_0000_0000", "", "a whole number of 64 bits, got 18446744073709551616"),
             )
         ),
-        ('[sensors."x.y"]\nkind = "a"', "sensors.x.y: unknown sense"),
+        ('[sensors."x.y"]\nkind = "a"', "sensors.x.y: unknown sensor"),
         (ACTUATOR + f'"{PAINT}"', "actuators.x.kind: expected a dataclass below CustomActuator"),
         (SENSOR + f'"{CODE}:Frozen"', "sensors.x.kind: expected a dataclass that is not frozen; Frozen is"),
         (ACTUATOR + f'"{CODE}:NoWidth"', "actuators.x.kind: expected a width from 1 to 10000; NoWidth has 0"),
         (
             ACTUATOR + f'"{CODE}:TooWide"',
-            f"actuators.x.kind: expected a width from 1 to {MAX_WIDE}; TooWide has",
+            f"actuators.x.kind: expected a width from 1 to {MAX_WIDTH}; TooWide has",
         ),
         (SENSOR + f'"{CODE}:WideField"', "sensors.x.kind: the field x of WideField: expected a width from 0 to 10000"),
         (ACTUATOR + f'"{PAINTER}"\ngain = -1', "actuators.x.gain: expected more than 0, got -1.0"),
@@ -286,4 +286,4 @@ def test_agents_know_names_and_widths_and_nothing_of_classes_and_keys(tmp_path: 
     assert (told.sensors["paint"].kind, told.actuators["painter"].kind) == ("", "")
     assert str(CODE.parent) not in str(told.as_mapping())
     assert body_from_mapping(body.as_mapping(), "static.json") == body
-    assert load_body("epuck").told == load_body("epuck")
+    assert load_body("epuck").agent_view == load_body("epuck")

@@ -27,7 +27,7 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
             name=group.name,
             agent=agents[group.name],
             params=params_of(scenario.robots[group.name].params, rows % static.robots - group.start),
-            body=group.body.told,
+            body=group.body.agent_view,
             rows=rows,
             robot_names=tuple(_name(static, int(row)) for row in rows),
             keys=keys.reshape(-1)[rows],

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import MAX_WIDE, CustomActuatorSpec, CustomSensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomActuatorSpec, CustomSensorSpec
 from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
@@ -65,9 +65,9 @@ def _actuator(spec: CustomActuatorSpec, where: str, key: str) -> CustomActuatorS
     spec = replace(spec, kind=_entry_point(spec.kind, ACTUATORS))
     own = _made(CustomActuator, spec.kind, spec.params, where, key)
     width: Any = _asked(own, "width", where, key)
-    if type(width) is not int or not 1 <= width <= MAX_WIDE:
+    if type(width) is not int or not 1 <= width <= MAX_WIDTH:
         raise BadInput(
-            where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDE}; {type(own).__name__} has {width!r}"
+            where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDTH}; {type(own).__name__} has {width!r}"
         )
     return replace(spec, width=width)
 

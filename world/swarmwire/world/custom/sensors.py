@@ -11,7 +11,7 @@ from typing import Any, Literal, cast, get_args, get_type_hints
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.custom import MAX_WIDE, CustomSensorSpec
+from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.errors import CustomCodeFailed
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
@@ -102,8 +102,8 @@ KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)
 def field_fault(field: Field) -> str | None:
     """What was expected of one of its values, and which there is; None if all are well. Its name may be anything."""
     of: Any = field  # what a user wrote may be of any type
-    if type(of.width) is not int or not 0 <= of.width <= MAX_WIDE:
-        return f"expected a width from 0 to {MAX_WIDE}; got {of.width!r}"
+    if type(of.width) is not int or not 0 <= of.width <= MAX_WIDTH:
+        return f"expected a width from 0 to {MAX_WIDTH}; got {of.width!r}"
     if not isinstance(of.noise, Noise):
         return f"expected noise as a Noise; got {of.noise!r}"
     if of.noise.kind not in KINDS:
