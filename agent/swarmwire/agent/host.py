@@ -1,4 +1,12 @@
-"""What robots are told of the radio: packets received, and tx statuses of their own."""
+"""Runs the agents of some robots, tick by tick: the same code in a local backend, in a runner and on a robot.
+
+`AgentExecutor` holds the agents of an assignment, one `AgentGroup` per group, and passes each group its readings,
+packets and tx statuses. Packets that arrive between ticks wait in an `Inbox` until the robots step, or until agents
+that define `on_receive` read them. A group keeps what its agents remember, also across a change of the rows that act.
+
+A robot's packet ids count from its first packet, whichever process sent it, so `host.sent` and `host.first_own` are
+columns of its memory.
+"""
 
 import traceback
 from abc import ABC, abstractmethod
@@ -21,9 +29,15 @@ from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 
+NOT_OWN = -1
+NO_ROWS = np.empty(0, np.int64)
+DRAWS_PER_CALL = 1 << 20  # more than a step or an `on_receive` draws for one purpose
+# Columns of memory that belong to the host, for robots of either kind of agent.
+SENT, FIRST_OWN, ACTED = "host.sent", "host.first_own", "host.acted"
+
 
 class Inbox(NamedTuple):
-    """Packets received and tx statuses, in the orders that these promise; true if there is any."""
+    """Received packets and tx statuses, in the order of their tables; false if both are empty."""
 
     received: ReceivedPackets
     tx_status: TxStatuses
@@ -32,103 +46,91 @@ class Inbox(NamedTuple):
         return bool(len(self.received) or len(self.tx_status))
 
     def followed_by(self, other: "Inbox") -> "Inbox":
-        """Both together."""
+        """Both inboxes in one."""
         return Inbox(
             ReceivedPackets.joined([self.received, other.received]),
             TxStatuses.joined([self.tx_status, other.tx_status]),
         )
 
     def of(self, rows: IntArray) -> "Inbox":
-        """What is for these robot rows, (n,), rising."""
+        """The part for these robot rows, (n,), rising."""
         return self.parted(rows)[0]
 
     def parted(self, rows: IntArray) -> "tuple[Inbox, Inbox]":
-        """What is for these robot rows, (n,), and what is for others."""
-        received, told = np.isin(self.received.receiver, rows), np.isin(self.tx_status.row, rows)
-        if received.all() and told.all():
-            return self, Inbox(self.received.select(NONE), self.tx_status.select(NONE))
+        """The part for these robot rows, (n,), and the rest."""
+        packets, statuses = np.isin(self.received.receiver, rows), np.isin(self.tx_status.row, rows)
+        if packets.all() and statuses.all():
+            return self, Inbox(self.received.select(NO_ROWS), self.tx_status.select(NO_ROWS))
         ours, theirs = (
-            Inbox(self.received.select(np.flatnonzero(h)).compacted(), self.tx_status.select(np.flatnonzero(o)))
-            for h, o in ((received, told), (~received, ~told))
+            Inbox(self.received.select(np.flatnonzero(p)).compacted(), self.tx_status.select(np.flatnonzero(s)))
+            for p, s in ((packets, statuses), (~packets, ~statuses))
         )
         return ours, theirs
-
-
-NONE = np.empty(0, np.int64)
-
-
-# --- The host runs the agents of some robots, tick by tick: the same code in a local backend and in every runner.
-
-
-NOT_OWN = -1
-NOBODY = np.empty(0, np.int64)
-DRAWS_APART = 1 << 20  # calls for a purpose that a step, or a hearing, does not reach
-# Columns of memory that are the host's own, for robots of either kind of agent.
-SENT, FIRST_OWN, ACTED = "host.sent", "host.first_own", "host.acted"
 
 
 class AgentExecutor:
     """The agents of all robots of an assignment."""
 
     def __init__(self, assignment: Assignment, memory: Memory | None = None) -> None:
-        """`memory` is what earlier agents of some of these robots remembered; others start afresh."""
+        """`memory` is that of earlier agents of some of these robots; the others start with defaults."""
         self._rate_hz = assignment.rate_hz
         self._groups = {group.name: agent_group(group, load_agent(group.agent)) for group in assignment.groups}
-        self._waiting: Inbox | None = None  # that came between ticks; None: nothing
-        for name, kept in (memory or {}).items():
-            self._groups[name].recall(kept)
+        self._waiting: Inbox | None = None  # that arrived between ticks; None: empty
+        for name, group_memory in (memory or {}).items():
+            self._groups[name].recall(group_memory)
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Keep what came between ticks until the robots that it is for step, or hear; what is for others is lost."""
+        """Keep an inbox between ticks until the robots step or read it; drop the part of other robots."""
         rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
-        came = Inbox(received, tx_status).of(np.sort(rows))
-        if came:
-            self._waiting = self._waiting.followed_by(came) if self._waiting else came
+        new = Inbox(received, tx_status).of(np.sort(rows))
+        if new:
+            self._waiting = self._waiting.followed_by(new) if self._waiting else new
 
     def on_receive(self, tick: int, at_ns: int) -> SentPackets:
-        """Let agents that read between ticks read, at a time in this tick: what they sent. AgentFailed as for `act`."""
+        """Call `on_receive` of agents that define it, at a time in this tick: their packets. Errors as `act`."""
         sent: list[SentPackets] = []
         for agents in self._groups.values():
             if self._waiting and agents.receives:
-                its, self._waiting = self._waiting.parted(agents.rows if agents.has_stepped else NOBODY)
-                if its:
-                    sent.append(agents.on_receive((tick, at_ns, self._time(tick, agents.group)[2]), its))
+                inbox, self._waiting = self._waiting.parted(agents.rows if agents.has_stepped else NO_ROWS)
+                if inbox:
+                    sent.append(agents.on_receive((tick, at_ns, self._time(tick, agents.group)[2]), inbox))
         return SentPackets.joined(sent)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What the robots do in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
+        """The robots' actions in this tick; AgentFailed with the robot and the agent's traceback if one raises."""
         if self._waiting:
             acting_rows = [self._groups[name].group.rows for name in readings]
-            # Also what waits for the dead of these groups: it is lost with them.
-            its, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
-            received, tx_status = Inbox(received, tx_status).followed_by(its) if its else (received, tx_status)
+            # Also the packets that wait for dead robots of these groups: they are lost with them.
+            inbox, self._waiting = self._waiting.parted(np.sort(np.concatenate(acting_rows)))
+            received, tx_status = Inbox(received, tx_status).followed_by(inbox) if inbox else (received, tx_status)
         acting = ((self._groups[name], group) for name, group in readings.items())
         return Actions.joined(
             [agents.act(self._time(tick, agents.group), group, received, tx_status) for agents, group in acting]
         )
 
     def memory(self, names: Iterable[str]) -> Memory:
-        """What is remembered of the robots of these groups."""
+        """The memory of the robots of these groups."""
         return {name: self._groups[name].memory() for name in names}
 
     def _time(self, tick: int, group: GroupAssignment) -> tuple[int, int, int]:
+        """The tick, its start and the period of the group's robots, both in ns."""
         time_ns = tick_start_ns(tick, self._rate_hz)
         return tick, time_ns, tick_start_ns(tick + group.act_every_ticks, self._rate_hz) - time_ns
 
 
 class AgentGroup(ABC):
-    """The agents of one group: what both kinds share."""
+    """The agents of one group, of either kind."""
 
     def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, receives: bool) -> None:
         self.group, self.needs = group, needs
-        self.receives = receives  # between steps, too
-        self.rows: IntArray = group.rows  # that acted last: state is kept for these
+        self.receives = receives  # whether the agents define `on_receive`
+        self.rows: IntArray = group.rows  # that acted last: their state is memory
         self._sent_before = np.zeros(len(group.rows), np.int64)
-        self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that the agent itself sent
-        self._readings: GroupReadings | None = None  # of the last step, for agents that read between steps
-        self._hearings = 0  # since it
+        self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that this agent sent
+        self._readings: GroupReadings | None = None  # of the last step, for `on_receive`
+        self._receive_calls = 0  # since the last step
 
     def act(
         self,
@@ -137,81 +139,81 @@ class AgentGroup(ABC):
         received: ReceivedPackets,
         tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> Actions:
-        """What the robots `sensors.rows` do; `time` is the tick, its start and the robots' period in ns."""
-        # As many rows as the group has are all of them; most ticks are so.
-        everyone = len(readings.rows) == len(self.group.rows)
-        place = slice(None) if everyone else np.searchsorted(self.group.rows, readings.rows)
+        """The actions of the robots `readings.rows`; `time` is the tick, its start and the robots' period in ns."""
+        # As many rows as the group has are all of its rows, as in most ticks.
+        all_act = len(readings.rows) == len(self.group.rows)
+        place = slice(None) if all_act else np.searchsorted(self.group.rows, readings.rows)
         sent_before = self._sent_before[place]
-        if not (everyone and len(self.rows) == len(readings.rows)) and not np.array_equal(readings.rows, self.rows):
-            fresh = np.flatnonzero(~np.isin(readings.rows, self.rows))
-            self._first_own[np.arange(len(self.group.rows))[place][fresh]] = sent_before[fresh]
+        if not (all_act and len(self.rows) == len(readings.rows)) and not np.array_equal(readings.rows, self.rows):
+            new_rows = np.flatnonzero(~np.isin(readings.rows, self.rows))
+            self._first_own[np.arange(len(self.group.rows))[place][new_rows]] = sent_before[new_rows]
             self.keep(readings.rows)
             self.rows = readings.rows
-        turn = StepContext(
+        context = StepContext(
             self.group,
             self.needs,
             time,
             readings,
-            _own(received, readings.rows),
+            _of_rows(received, readings.rows),
             self._own_tx_status(tx_status, readings.rows, place),
             self.group.keys[place],
             sent_before,
         )
-        if turn.n:  # no step for nobody: an agent must not tell whether others share its process
-            self.step(turn)
+        if context.n:  # no step without robots: an agent must not notice which others share its process
+            self.step(context)
         self._sent_before[place] = sent_before
         if self.receives:
-            self._readings, self._hearings = readings, 0
-        return turn.end()
+            self._readings, self._receive_calls = readings, 0
+        return context.end()
 
-    def on_receive(self, time: tuple[int, int, int], told: Inbox) -> SentPackets:
-        """What robots send that read, between steps, what they were `told`; `time` is as for `act`, but now."""
+    def on_receive(self, time: tuple[int, int, int], inbox: Inbox) -> SentPackets:
+        """The packets that robots send when they read an inbox between steps; `time` as for `act`, but of now."""
         readings = self._readings
         if readings is None:
-            raise RuntimeError("whoever has not stepped does not hear between steps")
+            raise RuntimeError("robots that have not stepped do not receive between steps")
         place = np.searchsorted(self.group.rows, self.rows)
         sent_before = self._sent_before[place]
-        self._hearings += 1
-        turn = StepContext(
+        self._receive_calls += 1
+        context = StepContext(
             self.group,
             self.needs,
             time,
             readings,
-            _own(told.received, self.rows),
-            self._own_tx_status(told.tx_status, self.rows, place),
+            _of_rows(inbox.received, self.rows),
+            self._own_tx_status(inbox.tx_status, self.rows, place),
             self.group.keys[place],
             sent_before,
-            self._hearings * DRAWS_APART,
+            self._receive_calls * DRAWS_PER_CALL,
         )
-        self.listen(turn)
+        self.receive(context)
         self._sent_before[place] = sent_before
         try:
-            return turn.end_hearing()
+            return context.end_receive()
         except RuntimeError as error:
             raise _failed([self.group.robot_names[at] for at in place], error) from error
 
     @property
     def has_stepped(self) -> bool:
-        """Whether any robot has: who has not does not hear."""
+        """Whether any robot has stepped: before that there is no `on_receive`."""
         return self._readings is not None
 
     def memory(self) -> GroupMemory:
-        """What is remembered of every robot of the group."""
+        """The memory of every robot of the group."""
         group_rows = self.group.rows
         acted = np.isin(group_rows, self.rows)
-        own = {SENT: self._sent_before, FIRST_OWN: self._first_own, ACTED: acted}
-        return GroupMemory(group_rows, {**own, **self.columns()})
+        host_columns = {SENT: self._sent_before, FIRST_OWN: self._first_own, ACTED: acted}
+        return GroupMemory(group_rows, {**host_columns, **self.columns()})
 
-    def recall(self, kept: GroupMemory) -> None:
-        """Go on from what earlier agents of some robots of the group remembered."""
-        at = np.searchsorted(self.group.rows, kept.rows)
-        self._sent_before[at], self._first_own[at] = kept.columns[SENT], kept.columns[FIRST_OWN]
+    def recall(self, memory: GroupMemory) -> None:
+        """Continue with the memory of earlier agents of some robots of the group."""
+        at = np.searchsorted(self.group.rows, memory.rows)
+        self._sent_before[at], self._first_own[at] = memory.columns[SENT], memory.columns[FIRST_OWN]
         acted = np.ones(len(self.group.rows), np.bool_)
-        acted[at] = kept.columns[ACTED]
+        acted[at] = memory.columns[ACTED]
         rows = self.group.rows[acted]
         self.keep(rows)
         self.rows = rows
-        if not self.fill(kept):
+        if not self.fill(memory):
             self._first_own[at] = self._sent_before[at]
 
     @abstractmethod
@@ -219,32 +221,32 @@ class AgentGroup(ABC):
         """The agents' own memory of every robot of the group."""
 
     @abstractmethod
-    def fill(self, kept: GroupMemory) -> bool:
-        """Take over the memory of the robots that it is of, whose rows are kept; whether agents have any."""
+    def fill(self, memory: GroupMemory) -> bool:
+        """Take over the memory of the robots that it is of, whose rows are memory; whether agents have any."""
 
     def _own_tx_status(self, tx_status: TxStatuses, rows: IntArray, place: slice | IntArray) -> TxStatuses:
         """Tx statuses of the robots `rows`, with the sender as a place in `rows`; a copy, which agents may write to.
 
-        Without those of packets that an agent before this one sent: the robot died since, or its runner was lost.
+        Packets of an earlier agent are left out: the robot died since, or its runner was lost.
         """
         if not len(tx_status) or not len(rows):
             return NO_TX_STATUSES
         mine = tx_status.select(np.flatnonzero(np.isin(tx_status.row, rows)))
         at = np.searchsorted(rows, mine.row)
-        own = (self._first_own[place][at] <= mine.id) & (mine.id < self._sent_before[place][at])
-        return TxStatuses(at, mine.id, mine.result).select(np.flatnonzero(own))
+        sent_here = (self._first_own[place][at] <= mine.id) & (mine.id < self._sent_before[place][at])
+        return TxStatuses(at, mine.id, mine.result).select(np.flatnonzero(sent_here))
 
     @abstractmethod
-    def step(self, turn: StepContext) -> None:
-        """Let the agents act."""
+    def step(self, context: StepContext) -> None:
+        """Call `step` of the agents."""
 
     @abstractmethod
-    def listen(self, turn: StepContext) -> None:
-        """Let the agents read between steps."""
+    def receive(self, context: StepContext) -> None:
+        """Call `on_receive` of the agents."""
 
     @abstractmethod
     def keep(self, rows: IntArray) -> None:
-        """Keep the memory of robots that act again, drop that of others, give new ones a fresh one."""
+        """Keep the memory of robots that act again, drop that of others, and start new robots with defaults."""
 
 
 class _Vector(AgentGroup):
@@ -258,21 +260,21 @@ class _Vector(AgentGroup):
         freeze(self._agent, self._per_robot)
         self._state: State = state_of(kind).fresh(len(group.rows))
 
-    def step(self, turn: StepContext) -> None:
-        self._call(self._agent.step, turn)
+    def step(self, context: StepContext) -> None:
+        self._call(self._agent.step, context)
 
-    def listen(self, turn: StepContext) -> None:
-        self._call(self._agent.on_receive, turn)
+    def receive(self, context: StepContext) -> None:
+        self._call(self._agent.on_receive, context)
 
-    def _call(self, method: Callable[[Robots, State], None], turn: StepContext) -> None:
+    def _call(self, method: Callable[[Robots, State], None], context: StepContext) -> None:
         if self._per_robot:
-            place = np.searchsorted(self.group.rows, turn.readings.rows)
+            place = np.searchsorted(self.group.rows, context.readings.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
         try:
-            method(Robots(turn), self._state)
+            method(Robots(context), self._state)
         except (Exception, SystemExit) as error:
-            place = np.searchsorted(self.group.rows, turn.readings.rows)
-            raise _failed([self.group.robot_names[at] for at in place], error, turn) from error
+            place = np.searchsorted(self.group.rows, context.readings.rows)
+            raise _failed([self.group.robot_names[at] for at in place], error, context) from error
 
     def keep(self, rows: IntArray) -> None:
         self._state = self._state.moved(self.rows, rows)
@@ -281,10 +283,10 @@ class _Vector(AgentGroup):
         whole = self._state if len(self.rows) == len(self.group.rows) else self._state.moved(self.rows, self.group.rows)
         return {of_state(name): getattr(whole, name) for name in whole.columns}
 
-    def fill(self, kept: GroupMemory) -> bool:
-        _, here, there = np.intersect1d(self.rows, kept.rows, assume_unique=True, return_indices=True)
+    def fill(self, memory: GroupMemory) -> bool:
+        _, here, there = np.intersect1d(self.rows, memory.rows, assume_unique=True, return_indices=True)
         for name in self._state.columns:
-            getattr(self._state, name)[here] = kept.columns[of_state(name)][there]
+            getattr(self._state, name)[here] = memory.columns[of_state(name)][there]
         return True
 
 
@@ -296,22 +298,22 @@ class _Single(AgentGroup):
         self._kind = kind
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
-    def step(self, turn: StepContext) -> None:
-        for at, row in enumerate(cast("list[int]", turn.readings.rows.tolist())):
-            self._call(self._agents[row].step, turn, at, row)
+    def step(self, context: StepContext) -> None:
+        for at, row in enumerate(cast("list[int]", context.readings.rows.tolist())):
+            self._call(self._agents[row].step, context, at, row)
 
-    def listen(self, turn: StepContext) -> None:
-        told = np.union1d(turn.received.receiver, turn.tx_status_rows)
-        for at in cast("list[int]", told.tolist()):
-            row = int(turn.readings.rows[at])
-            self._call(self._agents[row].on_receive, turn, at, row)
+    def receive(self, context: StepContext) -> None:
+        addressed = np.union1d(context.received.receiver, context.tx_status_rows)
+        for at in cast("list[int]", addressed.tolist()):
+            row = int(context.readings.rows[at])
+            self._call(self._agents[row].on_receive, context, at, row)
 
-    def _call(self, method: Callable[[Robot], None], turn: StepContext, at: int, row: int) -> None:
+    def _call(self, method: Callable[[Robot], None], context: StepContext, at: int, row: int) -> None:
         try:
-            method(Robot(turn, at))
+            method(Robot(context, at))
         except (Exception, SystemExit) as error:
             name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
-            raise _failed([name], error, turn) from error
+            raise _failed([name], error, context) from error
 
     def keep(self, rows: IntArray) -> None:
         known = self._agents
@@ -322,20 +324,23 @@ class _Single(AgentGroup):
     def columns(self) -> dict[str, AnyArray]:
         return {}
 
-    def fill(self, kept: GroupMemory) -> bool:
-        return False  # what an Agent remembers is its own affair: another starts afresh
+    def fill(self, memory: GroupMemory) -> bool:
+        return False  # an Agent keeps its memory in attributes of its own: a new one starts without
 
 
 def layout_of(kind: AgentClass) -> Layout:
-    """The columns of what is remembered of a robot of this agent."""
-    own = {SENT: ("<i8", ()), FIRST_OWN: ("<i8", ()), ACTED: ("|b1", ())}
+    """The columns of memory of a robot of this agent."""
+    host_columns = {SENT: ("<i8", ()), FIRST_OWN: ("<i8", ()), ACTED: ("|b1", ())}
     if not issubclass(kind, VectorAgent):
-        return own
-    return {**own, **{of_state(name): (dtype.str, shape) for name, (dtype, _, shape) in state_of(kind).columns.items()}}
+        return host_columns
+    return {
+        **host_columns,
+        **{of_state(name): (dtype.str, shape) for name, (dtype, _, shape) in state_of(kind).columns.items()},
+    }
 
 
 def of_state(name: str) -> str:
-    """The column of memory in which a column of a State is kept."""
+    """The column of memory in which a column of a State is memory."""
     return f"state.{name}"
 
 
@@ -347,22 +352,22 @@ def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
         raise _failed(list(group.robot_names), error) from error
 
 
-def _failed(robots: list[str], error: BaseException, turn: StepContext | None = None) -> AgentFailed:
-    """The failure of an agent, told from its own first line on, and when it was."""
-    own = error.__traceback__
-    while own is not None and own.tb_frame.f_globals["__name__"] in (__name__, make.__module__):
-        own = own.tb_next
-    when = f"in tick {turn.tick}, at {to_s(turn.time_ns):g} s\n" if turn else ""
-    return AgentFailed(robots_text(robots), "".join(traceback.format_exception(type(error), error, own)) + when)
+def _failed(robots: list[str], error: BaseException, context: StepContext | None = None) -> AgentFailed:
+    """The failure of an agent: its time, and the traceback from the agent's own code on."""
+    frames = error.__traceback__
+    while frames is not None and frames.tb_frame.f_globals["__name__"] in (__name__, make.__module__):
+        frames = frames.tb_next
+    when = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
+    return AgentFailed(robots_text(robots), "".join(traceback.format_exception(type(error), error, frames)) + when)
 
 
-def _own(received: ReceivedPackets, rows: IntArray) -> ReceivedPackets:
-    """What the robots `rows` received, with the receiver as a place in `rows`."""
+def _of_rows(received: ReceivedPackets, rows: IntArray) -> ReceivedPackets:
+    """The packets that the robots `rows` received, with the receiver as a place in `rows`."""
     if not len(received):
         return received
     first, last = (int(rows[0]), int(rows[-1])) if len(rows) else (0, -1)
     lowest, highest = int(received.receiver[0]), int(received.receiver[-1])  # receivers rise, as rows do
-    if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, and nobody beside it received
+    if last - first + 1 == len(rows) and first <= lowest and highest <= last:  # one span, which holds all receivers
         place = received.receiver - first if len(rows) > 1 else np.zeros(len(received), np.int64)
     else:
         places = np.full(max(highest, last) + 1, NOT_OWN)

@@ -1,4 +1,7 @@
-"""What an Agent's radio tells of a packet that it is done with."""
+"""Received packets and tx statuses as agents see them: objects for an Agent, columns for a VectorAgent.
+
+The measurements of the radio medium (range, bearing, RSSI) are read only if the agent's `needs` name them.
+"""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
@@ -10,28 +13,24 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import TAG_BYTES, ReceivedPackets, TxResult
 
+M = TypeVar("M", covariant=True)
+
 
 @dataclass(frozen=True, slots=True)
 class TxStatus:
-    """One addressed packet whose fate the sender's radio knows, as far as it can."""
+    """The result of one unicast packet, as far as the sender's radio knows it."""
 
-    id: int  # that `send` returned
+    id: int  # as returned by `send`
     result: TxResult
 
     @property
     def acknowledged(self) -> bool:
-        """Whether it arrived for certain; if not, it may have arrived all the same, and its acknowledgement not."""
+        """Whether it arrived for certain. Otherwise it may have arrived without its acknowledgement."""
         return self.result == TxResult.ACKNOWLEDGED
 
 
-# --- Packets as agents see them: one object each for an Agent, columns for a VectorAgent.
-
-
-M = TypeVar("M", covariant=True)
-
-
 class NotDeclared(AttributeError):
-    """An agent reads what its `needs` do not name, or what its body or radio does not give."""
+    """An agent reads a sensor or a measurement that its `needs` do not name."""
 
 
 class Columns:
@@ -62,7 +61,7 @@ class Packets(Generic[M]):
 
     @property
     def row(self) -> IntArray:
-        """The robot that received it, 0 to n - 1, rising, (k,)."""
+        """Row of the receiving robot, 0 to n - 1, rising, (k,)."""
         return self._table.receiver
 
     @property
@@ -72,43 +71,43 @@ class Packets(Generic[M]):
 
     @property
     def sequence(self) -> IntArray:
-        """How many packets the sender had sent before this one, (k,)."""
+        """Number of packets that the sender sent before this one, (k,)."""
         return self._table.sequence
 
     @property
     def received_at_ns(self) -> IntArray:
-        """When it was received, ns since the start of the run, (k,)."""
+        """Time of reception, ns since the start of the run, (k,)."""
         return self._table.received_at_ns
 
     @property
     def range_m(self) -> FloatArray:
         """Distance to the sender when the packet went on air, (k,)."""
-        return self._given("radio.range", "range_m")
+        return self._measured("radio.range", "range_m")
 
     @property
     def bearing_rad(self) -> FloatArray:
         """Direction to the sender in the receiver's frame when the packet went on air, in (-pi, pi], (k,)."""
-        return self._given("radio.bearing", "bearing_rad")
+        return self._measured("radio.bearing", "bearing_rad")
 
     @property
     def rssi_dbm(self) -> FloatArray:
-        """Strength of the received signal, (k,)."""
-        return self._given("radio.rssi", "rssi_dbm")
+        """Received signal strength (RSSI), (k,)."""
+        return self._measured("radio.rssi", "rssi_dbm")
 
     def count(self) -> IntArray:
-        """How many packets each robot received, (n,)."""
+        """Number of packets that each robot received, (n,)."""
         return np.bincount(self.row, minlength=self._robots)
 
     def sum(self, values: FloatArray) -> FloatArray:
         """The sum of `values` (k,) over the packets of each robot, in their order, (n,)."""
         return cast(FloatArray, np.bincount(self.row, weights=values, minlength=self._robots))
 
-    def _given(self, need: str, column: str) -> FloatArray:
-        return given_column(self._table, self._needs, need, column)
+    def _measured(self, need: str, column: str) -> FloatArray:
+        return measured_column(self._table, self._needs, need, column)
 
 
 class ReceivedLists:
-    """What the robots of a tick received, as Python's own lists: for agents that read it number by number."""
+    """The packets of a tick as Python lists, for agents that read them number by number."""
 
     __slots__ = ("_columns", "_data", "_needs", "_offset", "_payload", "_receiver", "_table")
 
@@ -121,9 +120,9 @@ class ReceivedLists:
         self._columns: dict[str, list[Any]] = {}
 
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """What the robot of a row (rising) received with a tag and, if given, of this size.
+        """The payloads of one robot row with a tag and, unless it is None, of this size.
 
-        Each as its place, and the bytes with the span in which it stands.
+        Yields the place in the table, all bytes, and the start and end of the payload in them.
         """
         data, offset = self._data, self._offset
         low, high = tag & 0xFF, tag >> 8
@@ -137,17 +136,17 @@ class ReceivedLists:
 
     def column(self, name: str) -> list[Any]:
         """A column of the table."""
-        known = self._columns.get(name)
-        if known is None:
-            known = self._columns[name] = getattr(self._table, name).tolist()
-        return known
+        column = self._columns.get(name)
+        if column is None:
+            column = self._columns[name] = getattr(self._table, name).tolist()
+        return column
 
-    def given(self, need: str, name: str) -> list[float]:
-        """What the medium tells; NotDeclared if the agent's needs do not name it."""
-        known = self._columns.get(name)
-        if known is None:
-            known = self._columns[name] = given_column(self._table, self._needs, need, name).tolist()
-        return known
+    def measured(self, need: str, name: str) -> list[float]:
+        """A measurement of the medium; NotDeclared if the agent's needs do not name it."""
+        column = self._columns.get(name)
+        if column is None:
+            column = self._columns[name] = measured_column(self._table, self._needs, need, name).tolist()
+        return column
 
 
 class Packet(Generic[M]):
@@ -155,7 +154,7 @@ class Packet(Generic[M]):
 
     __slots__ = ("_all", "_at", "message")
 
-    message: M  # what was sent, frozen; of a dict a copy
+    message: M  # the message, frozen; a dict is a copy
 
     def __init__(self, received: ReceivedLists, at: int, message: M) -> None:
         self._all, self._at, self.message = received, at, message
@@ -167,32 +166,32 @@ class Packet(Generic[M]):
 
     @property
     def sequence(self) -> int:
-        """How many packets the sender had sent before this one."""
+        """Number of packets that the sender sent before this one."""
         return self._all.column("sequence")[self._at]
 
     @property
     def received_at_ns(self) -> int:
-        """When it was received, ns since the start of the run."""
+        """Time of reception, ns since the start of the run."""
         return self._all.column("received_at_ns")[self._at]
 
     @property
     def range_m(self) -> float:
         """Distance to the sender when the packet went on air."""
-        return self._all.given("radio.range", "range_m")[self._at]
+        return self._all.measured("radio.range", "range_m")[self._at]
 
     @property
     def bearing_rad(self) -> float:
         """Direction to the sender in this robot's frame when the packet went on air, in (-pi, pi]."""
-        return self._all.given("radio.bearing", "bearing_rad")[self._at]
+        return self._all.measured("radio.bearing", "bearing_rad")[self._at]
 
     @property
     def rssi_dbm(self) -> float:
-        """Strength of the received signal."""
-        return self._all.given("radio.rssi", "rssi_dbm")[self._at]
+        """Received signal strength (RSSI)."""
+        return self._all.measured("radio.rssi", "rssi_dbm")[self._at]
 
 
-def given_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
-    """What the medium tells of packets, (k,); NotDeclared if an agent's needs do not name it."""
+def measured_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
+    """A measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
     if need not in needs:
         raise NotDeclared(f"reads {need!r} of a packet, which its needs do not name: {', '.join(needs) or 'none'}")
     return table.given[column]

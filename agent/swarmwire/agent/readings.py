@@ -1,4 +1,9 @@
-"""What a reading has of a robot where it has a single number."""
+"""Readings of the sensors of one robot, or of n robots.
+
+A reading with a single number per robot holds a float for an Agent and an array (n,) for a VectorAgent (type `N`).
+Arrays of the form (…, width) are (width,) for one robot and (n, width) for n robots. Angles are in the body's frame, 0
+ahead and positive to the left, unless another frame is named.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,32 +22,27 @@ from swarmwire.comms.bodies.ranging_specs import (
     ScanSpec,
 )
 
-N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent, one for each robot
-
-
-# --- Readings of sensors around a body.
-
-
+N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent
 S = TypeVar("S", bound=RadialSpec)
 R = TypeVar("R", bound=RayArraySpec)
 
 
 @dataclass(frozen=True)
 class Around(Generic[N, S]):
-    """Sensors around a body, in the data sheet's order (use the angles, never the indices)."""
+    """Sensors around a body, in the order of the spec (use the angles, never the indices)."""
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
     spec: S
 
     @property
     def angle_rad(self) -> FloatArray:
-        """Where the sensors look in the body's frame, (sensors,)."""
+        """Directions of the sensors in the body's frame, (sensors,)."""
         return self.spec.angle_rad
 
     def vector_sum(self) -> tuple[N, N]:
-        """X and y of the sum of the sensors as vectors, `value` long towards `angle_rad`: where most of it is."""
+        """X and y of the sum of the sensors as vectors of length `value` towards `angle_rad`."""
         value, (cosine, sine) = self.value, self.spec.direction
-        if value.ndim == 1:  # once a robot and tick: a faster call than that for any axis
+        if value.ndim == 1:  # called once per robot and tick: faster than the call with an axis
             return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
         return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
 
@@ -50,34 +50,28 @@ class Around(Generic[N, S]):
 class _AtRim(Around[N, R]):
     @cached_property
     def distance_m(self) -> FloatArray:
-        """Distance from the rim at which an ideal sensor answers `value`; the reach if it sees nothing, (…, rays)."""
+        """Distance from the rim at which an ideal ray reads `value`; its range if it sees nothing, (…, rays)."""
         return self.spec.response.distance_m(self.value)
 
 
 class ProximityReading(_AtRim[N, ProximitySpec]):
-    """The rays of proximity, (…, rays): value is 0 for nothing, 1 for touching."""
+    """Proximity rays, (…, rays): value is 0 for nothing, 1 for touching."""
 
 
 class InfraredReading(_AtRim[N, InfraredSpec]):
-    """The rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
+    """Rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
 
 
 class LightReading(Around[N, LightSpec]):
     """Photocells, (…, cells): value is 0 for dark."""
 
 
-# --- The reading of the battery.
-
-
 @dataclass(frozen=True)
 class BatteryReading(Generic[N]):
     """The battery's gauge."""
 
-    charge: N  # 1 full, 0 empty: the motors stop
+    charge: N  # 1 full, 0 empty; an empty battery stops the motors
     voltage_v: N
-
-
-# --- Readings of the bumper.
 
 
 @dataclass(frozen=True)
@@ -94,12 +88,9 @@ class BumperReadings:
     pressed: FloatArray  # (n,) 1 for a robot that touched anything in the tick before, else 0
 
 
-# --- Readings of the omnidirectional camera.
-
-
 @dataclass(frozen=True)
 class Blob:
-    """A LED of another robot."""
+    """A LED of another robot in view."""
 
     distance_m: float  # over the floor, from the body's centre
     bearing_rad: float  # in the body's frame, (-pi, pi], 0 ahead, positive to the left
@@ -108,7 +99,7 @@ class Blob:
 
 @dataclass(frozen=True)
 class CameraReading:
-    """What one robot's camera sees."""
+    """The blobs in view of one robot's omnidirectional camera."""
 
     blobs: list[Blob]  # by true distance, the nearest first
 
@@ -122,7 +113,7 @@ class CameraReading:
 
 @dataclass(frozen=True)
 class CameraReadings:
-    """What the cameras of n robots see, a column per blob, by true distance; nan where there is none."""
+    """The blobs in view of n robots' cameras, a column per blob, by true distance; nan where there is none."""
 
     distance_m: FloatArray  # (n, most_blobs) over the floor, from the body's centre
     bearing_rad: FloatArray  # (n, most_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
@@ -130,43 +121,31 @@ class CameraReadings:
 
     @property
     def count(self) -> IntArray:
-        """How many blobs each robot sees, (n,)."""
+        """Number of blobs in view of each robot, (n,)."""
         return np.count_nonzero(np.isfinite(self.distance_m), axis=1)
-
-
-# --- The reading of the compass.
 
 
 @dataclass(frozen=True)
 class CompassReading(Generic[N]):
-    """The heading."""
+    """The heading of the body."""
 
     heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
 
 
-# --- The reading of the ground sensors.
-
-
 @dataclass(frozen=True)
 class GroundReading:
-    """The floor under the sensors, in the data sheet's order."""
+    """The floor under the ground sensors, in the order of the spec."""
 
     shade: FloatArray  # (…, points) 0 black to 1 white
 
 
-# --- The reading of the IMU.
-
-
 @dataclass(frozen=True)
 class ImuReading(Generic[N]):
-    """What the IMU feels, in the body's frame: the mean over the tick before."""
+    """Acceleration and turn rate in the body's frame: the mean over the tick before."""
 
-    forward_mps2: N  # acceleration towards ahead
+    forward_mps2: N  # acceleration ahead
     left_mps2: N  # acceleration to the left: in a left turn it is positive
     turn_radps: N  # turn rate, positive to the left
-
-
-# --- The reading of the wheel encoders.
 
 
 @dataclass(frozen=True)
@@ -177,11 +156,8 @@ class OdometryReading(Generic[N]):
     right_m: N
 
 
-# --- Readings of senses of the user's own.
-
-
 class CustomReading:
-    """What a sense of the user's own reads: each of its fields is an attribute.
+    """The reading of a custom sensor: each of its fields is an attribute.
 
     For one robot a float, or (width,); for n robots (n,), or (n, width).
     """
@@ -192,22 +168,16 @@ class CustomReading:
     def __getattr__(self, name: str) -> Any:
         """A field by its name."""
         if name.startswith("_") or name not in self._fields:
-            raise AttributeError(f"the sense {self._sensor} has the fields {', '.join(self._fields)}, not {name}")
+            raise AttributeError(f"the sensor {self._sensor} has the fields {', '.join(self._fields)}, not {name}")
         return self._fields[name]
-
-
-# --- The reading of positioning.
 
 
 @dataclass(frozen=True)
 class PositioningReading(Generic[N]):
-    """Where the robot is told to be, arena frame."""
+    """The measured position, in the arena's frame."""
 
     x_m: N
     y_m: N
-
-
-# --- The reading of the laser scanner.
 
 
 @dataclass(frozen=True)
@@ -219,5 +189,5 @@ class ScanReading:
 
     @property
     def angle_rad(self) -> FloatArray:
-        """Where the rays look in the body's frame, (rays,)."""
+        """Directions of the rays in the body's frame, (rays,)."""
         return self.spec.angle_rad

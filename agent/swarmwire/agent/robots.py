@@ -1,4 +1,8 @@
-"""Random draws of robots, keyed by robot, tick and purpose: a draw does not depend on who else draws, or where."""
+"""Robots: the handle through which a VectorAgent's step reads and moves n robots; and the robots' random draws.
+
+A draw is keyed by robot, tick, purpose and the number of the call for that purpose, so it does not depend on other
+robots, nor on the process that draws.
+"""
 
 from typing import Any, TypeVar
 
@@ -15,12 +19,15 @@ from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.packets import TxStatuses
 
+M = TypeVar("M", bound=Message)
+N = TypeVar("N", float, FloatArray)
+
 
 class Draws:
     """Draws of n robots in one tick; a second call for a purpose gives new values."""
 
     def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
-        """`first` numbers the first call for each purpose: what was drawn before it in this tick is not drawn again."""
+        """`first` is the number of the first call for each purpose, above those of earlier draws in this tick."""
         self._keys, self._tick, self._first = keys, tick, first
         self._calls: dict[str, int] = {}
 
@@ -55,27 +62,20 @@ class Draw:
         return float(self._rows.normal(purpose, mean, deviation)[0])
 
 
-# --- Robots: the handle through which a VectorAgent's step sees and moves n robots.
-
-
-M = TypeVar("M", bound=Message)
-N = TypeVar("N", float, FloatArray)
-
-
 class Robots(Sensors[FloatArray]):
-    """n robots of one group in one tick; every array has a leading axis n. Senses raise NotDeclared unless needed."""
+    """n robots of one group in one tick; arrays have a leading axis n. Sensors that `needs` lacks raise NotDeclared."""
 
     __slots__ = ("draw", "radio")
 
-    def __init__(self, turn: StepContext) -> None:
-        super().__init__(turn)
-        self.radio = RadioRows(turn)
-        self.draw = Draws(turn.keys, turn.tick, turn.first_draw)
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context)
+        self.radio = RadioRows(context)
+        self.draw = Draws(context.keys, context.tick, context.first_draw)
 
     @property
     def n(self) -> int:
-        """How many robots act in this tick in this process: says nothing about the swarm."""
-        return self._turn.n
+        """Number of robots that act in this tick in this process; it is not the size of the swarm."""
+        return self._context.n
 
     @property
     def bumper(self) -> BumperReadings:
@@ -84,12 +84,12 @@ class Robots(Sensors[FloatArray]):
 
     @property
     def camera(self) -> CameraReadings:
-        """LEDs of other robots in sight: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
+        """LEDs of other robots in view: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
         return CameraReadings(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sensor(self, name: str) -> CustomReading:
-        """What a sense of your own reads: each field as an attribute, (n,) or (n, width)."""
-        return CustomReading(name, self._turn.fields(name))
+        """The reading of a custom sensor: each field is an attribute, (n,) or (n, width)."""
+        return CustomReading(name, self._context.fields(name))
 
     def drive(
         self,
@@ -98,19 +98,19 @@ class Robots(Sensors[FloatArray]):
         lateral_mps: ArrayLike = 0.0,
         rows: BoolArray | None = None,
     ) -> None:
-        """Wanted forward speed and turn rate, (n,) or one number; outside the mask `rows` the last ones hold.
+        """Command forward speed and turn rate, (n,) or one number; outside the mask `rows` the last command holds.
 
         Bodies with a holonomic drive can also move sideways, positive to the left.
         """
-        turn = self._turn
-        moved = True if rows is None else turn.mask(rows)
-        np.copyto(turn.drive, True, where=moved)
-        np.copyto(turn.linear_mps, linear_mps, where=moved)
-        np.copyto(turn.angular_radps, angular_radps, where=moved)
-        np.copyto(turn.lateral_mps, lateral_mps, where=moved)
+        context = self._context
+        moved = True if rows is None else context.mask(rows)
+        np.copyto(context.drive, True, where=moved)
+        np.copyto(context.linear_mps, linear_mps, where=moved)
+        np.copyto(context.angular_radps, angular_radps, where=moved)
+        np.copyto(context.lateral_mps, lateral_mps, where=moved)
 
     def wheels(self, left_mps: ArrayLike, right_mps: ArrayLike, rows: BoolArray | None = None) -> None:
-        """Wanted speeds of the two wheels, (n,) or one number; NotFitted if the bodies have none."""
+        """Command the speeds of two wheels, (n,) or one number; IncompatibleBody if the bodies have none."""
         left, right = np.asarray(left_mps, np.float64), np.asarray(right_mps, np.float64)
         self.drive(*forward_and_turn(left, right, self.body.wheels.wheel_base_m), rows=rows)
 
@@ -122,54 +122,53 @@ class Robots(Sensors[FloatArray]):
         which: int | None = None,
         rows: BoolArray | None = None,
     ) -> None:
-        """Colour of all LEDs, or of the one at place `which`, of the robots of the mask `rows`, or of all robots.
+        """Set the colour of all LEDs, or of LED `which`, of the robots of the mask `rows`, or of all robots.
 
-        Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. NotFitted if the bodies
-        have no LEDs, ValueError if they have not that one.
+        Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. IncompatibleBody if the
+        bodies have no LEDs, ValueError if they lack this one.
         """
-        here = True if rows is None else self._turn.mask(rows)[:, None]
-        np.copyto(self._turn.leds(which), rgb_of(red, green, blue)[..., None], where=here)
+        here = True if rows is None else self._context.mask(rows)[:, None]
+        np.copyto(self._context.leds(which), rgb_of(red, green, blue)[..., None], where=here)
 
     def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
-        """Set an actuator of your own of the robots of the mask `rows`, or of all.
+        """Set a custom actuator of the robots of the mask `rows`, or of all.
 
-        To one number, (n,), (n, width), or, of more than one, (width,) for each of them: of robots outside the mask
-        they do not count. What they do, and for how long, is the actuator's to know. NotFitted if the bodies have none
-        of this name, ValueError if the numbers do not fit or are not finite.
+        `values` is one number, (n,), (n, width) or, for a width above 1, (width,) for every robot; numbers of robots
+        outside the mask are ignored. The actuator defines their effect and its duration. IncompatibleBody if the bodies
+        have none of this name, ValueError for a wrong shape or if a number is not finite.
         """
-        self._turn.actuate(name, values, slice(None), None if rows is None else self._turn.mask(rows))
+        self._context.actuate(name, values, slice(None), None if rows is None else self._context.mask(rows))
 
     def note(self, state: str | None = None, rows: BoolArray | None = None, *, value: ArrayLike | None = None) -> None:
-        """Name what the robots of the mask `rows`, or all, are at, and tell a number of each: for whoever looks on.
+        """Note a state of the robots of the mask `rows`, or of all, and a number of each, for observers of the run.
 
         States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each holds until
-        the next is given. `value` is (n,) or one number for each of them; of robots outside the mask it does not count.
-        ValueError if neither is given, for a state that is no short text, for numbers that do not fit or are not
-        finite.
+        the next note. `value` is (n,) or one number for all; numbers of robots outside the mask are ignored. ValueError
+        if both are None, for a state that is no short text, and for numbers of a wrong shape or not finite.
         """
-        self._turn.note(slice(None) if rows is None else self._turn.mask(rows), state, value)
+        self._context.note(slice(None) if rows is None else self._context.mask(rows), state, value)
 
     def _number(self, sensor: str, field: str) -> FloatArray:
-        return self._turn.field(sensor, field)
+        return self._context.field(sensor, field)
 
     def _numbers(self, sensor: str, field: str) -> FloatArray:
-        return self._turn.field(sensor, field)
+        return self._context.field(sensor, field)
 
 
 class RadioRows:
     """The radios of n robots: an unreliable medium."""
 
-    def __init__(self, turn: StepContext) -> None:
-        self._turn = turn
+    def __init__(self, context: StepContext) -> None:
+        self._context = context
 
     def received(self, kind: type[M]) -> Packets[M]:
         """All packets of a message class received since the robots' last step."""
-        return self._turn.packets(kind)
+        return self._context.packets(kind)
 
     @property
     def tx_status(self) -> TxStatuses:
-        """Packets sent to one robot that the radios are done with since the last step: row (0 to n - 1), id, result."""
-        return self._turn.tx_status()
+        """Results of unicast packets since the last step: row (0 to n - 1), id, result."""
+        return self._context.tx_status()
 
     def send(
         self,
@@ -181,20 +180,20 @@ class RadioRows:
     ) -> IntArray:
         """Send a message from each robot, or those of the mask `rows`; each field is (n,) or one number.
 
-        It goes to all who hear it, or to the robot of index `to` in the arena, one number or (n,).
+        It is a broadcast, or goes to the robot of index `to` in the arena, one number or (n,).
 
         Returns the ids of the packets, in the order of the robots that sent.
         """
         message_class(kind)
         if rows is None:
-            return self._turn.send(None, to, encode_rows(kind, self._turn.n, fields))
-        row = np.flatnonzero(self._turn.mask(rows))
-        columns = {name: _of(rows, value) for name, value in fields.items()}
-        return self._turn.send(row, None if to is None else _of(rows, to), encode_rows(kind, len(row), columns))
+            return self._context.send(None, to, encode_rows(kind, self._context.n, fields))
+        row = np.flatnonzero(self._context.mask(rows))
+        columns = {name: _masked(rows, value) for name, value in fields.items()}
+        return self._context.send(row, None if to is None else _masked(rows, to), encode_rows(kind, len(row), columns))
 
 
-def _of(rows: BoolArray, value: Any) -> Any:
-    """The values of the rows of a mask; one number serves them all."""
+def _masked(rows: BoolArray, value: Any) -> Any:
+    """The values of the rows of a mask; one number stays as it is."""
     if np.ndim(value) == 0:
         return value
     if np.shape(value) != (len(rows),):
@@ -203,5 +202,5 @@ def _of(rows: BoolArray, value: Any) -> Any:
 
 
 def forward_and_turn(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
-    """Forward speed and turn rate (positive to the left) of a body whose wheels roll so fast."""
+    """Forward speed and turn rate (positive to the left) of a body with these wheel speeds."""
     return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m

@@ -1,4 +1,8 @@
-"""What both kinds of handle tell of the tick and the body."""
+"""Base classes of the handles `Robot` and `Robots`: time, body, and one property per sensor.
+
+The properties are the same for one robot and for n robots, whose arrays have a leading axis n (here written …). The
+sensors whose readings differ in form, bumper and camera, are in `robot.py` and `robots.py`.
+"""
 
 from abc import abstractmethod
 from typing import Generic, TypeVar
@@ -22,54 +26,50 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.clock import to_s
 
+S = TypeVar("S", bound=SensorSpec)
+
 
 class RobotHandle:
     """A view of one tick of one group."""
 
-    __slots__ = ("_turn",)
+    __slots__ = ("_context",)
 
-    def __init__(self, turn: StepContext) -> None:
-        self._turn = turn
+    def __init__(self, context: StepContext) -> None:
+        self._context = context
 
     @property
     def time_s(self) -> float:
         """Time since the start of the run, at this tick."""
-        return to_s(self._turn.time_ns)
+        return to_s(self._context.time_ns)
 
     @property
     def period_s(self) -> float:
         """Time between two steps."""
-        return to_s(self._turn.period_ns)
+        return to_s(self._context.period_ns)
 
     @property
     def body(self) -> Body:
         """Geometry and limits of the body."""
-        return self._turn.group.body
-
-
-# --- What robots sense, the same for one and for n of them: a property per sense of a body.
-
-
-S = TypeVar("S", bound=SensorSpec)
+        return self._context.group.body
 
 
 class Sensors(RobotHandle, Generic[N]):
-    """The senses of one robot, or of n with a leading axis n, here written …; but for those that differ in form."""
+    """The sensors of one robot, or of n robots with a leading axis n, here written …."""
 
-    __slots__ = ()  # what is set on a handle by mistake is refused
+    __slots__ = ()  # an attribute set on a handle by mistake raises
 
     @abstractmethod
     def _number(self, sensor: str, field: str) -> N:
-        """A field that has one number for a robot."""
+        """A field with one number per robot."""
 
     @abstractmethod
     def _numbers(self, sensor: str, field: str) -> FloatArray:
-        """A field that has several, (…, width)."""
+        """A field with several numbers per robot, (…, width)."""
 
     @property
     def proximity(self) -> ProximityReading[N]:
         """Rays around the body: value and distance_m (…, rays), angle_rad (rays,)."""
-        return ProximityReading(self._numbers("proximity", "value"), _had(self.body.proximity))
+        return ProximityReading(self._numbers("proximity", "value"), _checked(self.body.proximity))
 
     @property
     def compass(self) -> CompassReading[N]:
@@ -84,7 +84,7 @@ class Sensors(RobotHandle, Generic[N]):
     @property
     def light(self) -> LightReading[N]:
         """Photocells around the body: value (…, cells), angle_rad (cells,)."""
-        return LightReading(self._numbers("light", "value"), _had(self.body.light))
+        return LightReading(self._numbers("light", "value"), _checked(self.body.light))
 
     @property
     def positioning(self) -> PositioningReading[N]:
@@ -104,12 +104,12 @@ class Sensors(RobotHandle, Generic[N]):
     @property
     def infrared(self) -> InfraredReading[N]:
         """Light of other robots, by rays around the body: value and distance_m (…, rays), angle_rad (rays,)."""
-        return InfraredReading(self._numbers("infrared", "value"), _had(self.body.infrared))
+        return InfraredReading(self._numbers("infrared", "value"), _checked(self.body.infrared))
 
     @property
     def scan(self) -> ScanReading:
         """Laser scan: range_m (…, rays), angle_rad (rays,)."""
-        return ScanReading(self._numbers("scan", "range_m"), _had(self.body.scan))
+        return ScanReading(self._numbers("scan", "range_m"), _checked(self.body.scan))
 
     @property
     def ground(self) -> GroundReading:
@@ -117,8 +117,8 @@ class Sensors(RobotHandle, Generic[N]):
         return GroundReading(self._numbers("ground", "shade"))
 
 
-def _had(spec: S | None) -> S:
-    """The data sheet of a sense that the body has (needs are checked before a run)."""
+def _checked(spec: S | None) -> S:
+    """The spec of a sensor; AttributeError if the body lacks it (needs are checked before a run)."""
     if spec is None:
-        raise AttributeError("the body does not have this sense")
+        raise AttributeError("the body does not have this sensor")
     return spec

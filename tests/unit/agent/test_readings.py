@@ -193,7 +193,7 @@ def test_one_robot_and_many_do_the_same() -> None:
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda robots: robots.sensor("gas").colour, "the sense gas has the fields level, cells, not colour"),
+        (lambda robots: robots.sensor("gas").colour, "the sensor gas has the fields level, cells, not colour"),
         (lambda robots: robots.sensor("compass"), "NotDeclared"),
         (
             lambda robots: robots.actuate("leg", 1.0),
