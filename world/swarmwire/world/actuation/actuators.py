@@ -1,4 +1,9 @@
-"""What drives can follow of what agents ask for: each kind of drive clips commands in its own way. Compiled."""
+"""The actuators of all robots: drives with their limits, noise and failures, and LEDs. Compiled.
+
+A command passes these steps in each tick: `take_commands` limits it to the drive, `NoisyWheels` adds the noise of
+wheels, `FailedDrives` removes failed motors and wheels. The result is the target of the engines. `Actuators` joins the
+steps.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -17,11 +22,13 @@ from swarmwire.comms.tick_io import Actions, LedChanges
 from swarmwire.comms.truth import Group
 
 DIFFERENTIAL, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))
-ROUNDED = 1.0 + 1e-9  # a command that asks for exactly the limit and was rounded is not clipped
+ROUNDING_FACTOR = 1.0 + 1e-9  # a command at exactly the limit is not clipped, despite rounding
+BIAS, FACTOR = draws.purpose("wheel bias"), draws.purpose("wheel factor")
+WHEEL_NOISE = np.arange(2)  # left and right
 
 
 class DriveLimits(NamedTuple):
-    """How fast each robot index of an arena can go, (robots,) each."""
+    """The speed limits of each robot index of an arena, (robots,) each."""
 
     kind: IntArray  # WHEELS, TWIST or HOLONOMIC
     half_base_m: FloatArray  # half the distance between the wheels; 0: it has none
@@ -56,24 +63,24 @@ def take_commands(
     lateral_mps: FloatArray,
     command: FloatArray,
 ) -> tuple[IntArray, IntArray]:
-    """Write what drives can follow of new commands into `command` (rows, 3), which holds the last ones.
+    """Limit new commands to the drives and write them into `command` (rows, 3), which holds the last ones.
 
-    Two wheels shrink both speeds by one factor, so that the curve stays the same; a twist drive cuts each speed to its
-    own limit; a holonomic one shrinks the planar vector, so that the direction stays, and cuts the turn. Bodies with
-    wheels do not move sideways.
+    A differential drive scales both speeds by one factor, so that the curve stays the same. A twist drive cuts each
+    speed to its own limit. A holonomic drive scales the planar vector, so that the direction stays, and cuts the turn.
+    Bodies with wheels do not move sideways.
 
     Args:
         limits: of each robot index.
         alive: (all rows,).
         rows: (n,) robot row of each command.
         drive: (n,) False: no command.
-        linear_mps: (n,) forward speed asked for.
-        angular_radps: (n,) left turn asked for.
-        lateral_mps: (n,) speed to the left asked for.
+        linear_mps: (n,) forward speed.
+        angular_radps: (n,) left turn.
+        lateral_mps: (n,) speed to the left.
         command: (all rows, 3) forward m/s, left turn rad/s, to the left m/s.
 
     Returns:
-        How many commands were too fast, and how many were not finite and so dropped, (arenas,) each.
+        The number of commands that were too fast, and of those that were not finite and so dropped, (arenas,) each.
     """
     robots = len(limits.kind)
     arenas = len(command) // robots
@@ -97,54 +104,48 @@ def take_commands(
 
 @njit(cache=True)
 def _within(limits, i, linear, angular, lateral):
-    """What the drive of robot index i can follow of a command, and whether it asked for more."""
-    kind, most, most_turn = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
+    """A command within the limits of robot index i, and whether it exceeded them."""
+    kind, max_linear, max_angular = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
     too_fast = lateral != 0.0 and kind != HOLONOMIC
     if kind != HOLONOMIC:
         lateral = 0.0
     if kind == DIFFERENTIAL:
         fastest = abs(linear) + abs(angular) * limits.half_base_m[i]
-        if fastest > most * ROUNDED:
-            return linear * (most / fastest), angular * (most / fastest), lateral, True
+        if fastest > max_linear * ROUNDING_FACTOR:
+            return linear * (max_linear / fastest), angular * (max_linear / fastest), lateral, True
         return linear, angular, lateral, too_fast
     size = np.hypot(linear, lateral)
-    if size > most * ROUNDED:
+    if size > max_linear * ROUNDING_FACTOR:
         too_fast = True
-        linear, lateral = linear * (most / size), lateral * (most / size)
-    if abs(angular) > most_turn * ROUNDED:
+        linear, lateral = linear * (max_linear / size), lateral * (max_linear / size)
+    if abs(angular) > max_angular * ROUNDING_FACTOR:
         too_fast = True
-        angular = most_turn if angular > 0.0 else -most_turn
+        angular = max_angular if angular > 0.0 else -max_angular
     return linear, angular, lateral, too_fast
 
 
-# --- Wheels that do not run as they are asked to, as in ARGoS: at f (w + b) in place of w. Compiled.
-#
-# The bias b is drawn once for each wheel, the factor f for each wheel and tick.
-
-
-BIAS, FACTOR = draws.purpose("wheel bias"), draws.purpose("wheel factor")
-WHEEL_NOISE = np.arange(2)  # left and right
-
-
 class NoisyWheels:
-    """The noise of all wheels of all arenas; `any` tells whether there is some."""
+    """The noise of all wheels of all arenas, as in ARGoS: a wheel runs at f (w + b) in place of w.
+
+    The bias b is drawn once for each wheel, the factor f for each wheel and tick. `any` is whether any wheel has noise.
+    """
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
         """The biases are drawn now; `keys` (arenas,)."""
         sizes = [group.stop - group.start for group in groups]
         noise = [noise_of(group.body.drive) for group in groups]
         self._keys = keys
-        self._noisy = np.repeat([of != NO_WHEEL_NOISE for of in noise], sizes)
+        self._noisy = np.repeat([each != NO_WHEEL_NOISE for each in noise], sizes)
         self._wheel_base_m = np.repeat([wheel_base_of(group.body.drive) for group in groups], sizes)
-        self._factor = np.repeat([of.factor for of in noise], sizes)
-        self._factor_std = np.repeat([of.factor_std for of in noise], sizes)
-        mean, spread = np.repeat([(of.bias_mps, of.bias_std_mps) for of in noise], sizes, axis=0).T[:, :, None]
+        self._factor = np.repeat([each.factor for each in noise], sizes)
+        self._factor_std = np.repeat([each.factor_std for each in noise], sizes)
+        mean, spread = np.repeat([(each.bias_mps, each.bias_std_mps) for each in noise], sizes, axis=0).T[:, :, None]
         index = np.arange(len(mean))
         self._bias_mps = mean + spread * draws.normal(keys[:, None, None], index[:, None], 0, WHEEL_NOISE, BIAS)
         self.any = bool(self._noisy.any())
 
     def act(self, tick: int, target: FloatArray) -> None:
-        """Change what engines are given in a tick, (arenas, robots, 3), to what the wheels make of it."""
+        """Apply the noise to the target of the engines in a tick, (arenas, robots, 3), in place."""
         spread = self._wheel_base_m, self._factor, self._factor_std, self._bias_mps
         _act_noise(self._keys, self._noisy, *spread, tick, target)
 
@@ -170,17 +171,14 @@ def _act_noise(keys, noisy, wheel_base_m, factor, factor_std, bias_mps, tick, ta
 
 @njit(cache=True)
 def _factor(key, i, tick, wheel, factor, factor_std):
-    """By what a wheel's speed is multiplied in a tick."""
+    """The factor of a wheel's speed in a tick."""
     if factor_std[i] == 0.0:
         return factor[i]
     return factor[i] + factor_std[i] * normal(key, i, tick, wheel, FACTOR)
 
 
-# --- Motors and wheels that failed: motors brake, a wheel stands still while the other goes on. Compiled.
-
-
 class FailedDrives:
-    """The motors and wheels of all arenas that do not work.
+    """The failed motors and wheels of all arenas: failed motors brake, a failed wheel stands still, the other turns.
 
     Attributes:
         motors: (arenas, robots) whose motors failed.
@@ -195,7 +193,7 @@ class FailedDrives:
         self.fail({})
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
-        """From now on these parts do not work, by name (rows,), and all others do."""
+        """Set the failed parts, by name (rows,); all others work."""
         none = np.zeros(self._shape, np.bool_)
         masks = [failed[part].reshape(self._shape) if part in failed else none for part in (MOTORS, *WHEELS)]
         self.motors: BoolArray = masks[0]
@@ -203,7 +201,7 @@ class FailedDrives:
         self.any = any(bool(mask.any()) for mask in masks)
 
     def act(self, target: FloatArray) -> None:
-        """Change what engines are given, (arenas, robots, 3), to what is left of it."""
+        """Apply the failures to the target of the engines, (arenas, robots, 3), in place."""
         _act_failures(self.motors, self._left, self._right, self._wheel_base_m, target)
 
 
@@ -221,27 +219,24 @@ def _act_failures(motors, left_failed, right_failed, wheel_base_m, target):
                 target[arena, i, 1] = (right - left) / wheel_base_m[i]
 
 
-# --- What the LEDs of all robots show.
-
-
 class ShownLeds:
-    """The LEDs of all robots: dark at the start, and then as their agents switch them.
+    """The LEDs of all robots: dark at the start, then as their agents switch them.
 
     Attributes:
         rgb: (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0: dark or not there; written in place.
-        told: (rows, most LEDs of a robot) the same for observers: replaced when something changes, never written to.
+        told: (rows, most LEDs of a robot) a copy for observers: replaced after a change, never written to.
         not_there: (arenas,) changes of LEDs that their robots do not have.
     """
 
     def __init__(self, groups: Sequence[Group], arenas: int) -> None:
-        self._count = np.repeat([group.body.led_count for group in groups], [of.stop - of.start for of in groups])
+        self._count = np.repeat([group.body.led_count for group in groups], [each.stop - each.start for each in groups])
         self.rgb: IntArray = np.zeros((arenas, len(self._count), self._count.max(initial=0)), np.int64)
         self._row = self.rgb.reshape(arenas * len(self._count), self.rgb.shape[2])
         self.told = self._row.copy()
         self.not_there: IntArray = np.zeros(arenas, np.int64)
 
     def take(self, changes: LedChanges, alive: BoolArray) -> None:
-        """Switch what agents of robots `alive` (rows,) switched in a tick."""
+        """Apply the changes of a tick to the LEDs of robots that are `alive` (rows,)."""
         if not len(changes):
             return
         there = changes.which < self._count[changes.rows % len(self._count)]
@@ -251,29 +246,26 @@ class ShownLeds:
         self.told = self._row.copy()
 
     def tell(self) -> None:
-        """Tell observers what was written to `rgb`."""
+        """Copy `rgb` for observers if it changed."""
         if not np.array_equal(self._row, self.told):
             self.told = self._row.copy()
 
     def darken(self, rows: BoolArray) -> None:
-        """These robots (rows,) go dark."""
+        """Switch off all LEDs of these robots (rows,)."""
         if self._row[rows].any():
             self._row[rows] = 0
             self.told = self._row.copy()
-
-
-# --- What agents ask of motors and LEDs, and what becomes of it.
 
 
 class Actuators:
     """The actuators of all robots.
 
     Attributes:
-        command: (rows, 3) asked for, within the drives' limits: forward m/s, left turn rad/s, to the left m/s; replaced
+        command: (rows, 3) commands within the drives' limits: forward m/s, left turn rad/s, to the left m/s; replaced
             in each tick, never written to after.
-        target: (arenas, robots, 3) the same with noise and failures of wheels: what engines are given; in place.
-        leds: what the LEDs show.
-        failed: motors and wheels that do not work.
+        target: (arenas, robots, 3) the target of the engines: commands with noise and failures of wheels; in place.
+        leds: the LEDs.
+        failed: the failed motors and wheels.
     """
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
@@ -288,13 +280,13 @@ class Actuators:
         self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
 
     def take(self, actions: Actions, alive: BoolArray) -> None:
-        """Take what agents decided in a tick. Robots without a new command keep the last one.
+        """Apply the actions of a tick. Robots without a new command keep the last one.
 
-        Those that are not `alive` (rows,) do nothing.
+        Robots that are not `alive` (rows,) ignore commands.
         """
         self.command = self.command.copy()
-        asked = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
-        clipped, not_finite = take_commands(self._limits, alive, *asked, self.command)
+        commands = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
+        clipped, not_finite = take_commands(self._limits, alive, *commands, self.command)
         self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
         self.target[:] = self.command.reshape(self.target.shape)
         if self._noise.any:
@@ -305,12 +297,12 @@ class Actuators:
         self._ticks += 1
 
     def stop(self, dead: BoolArray) -> None:
-        """These robots (rows,) stand still and are dark."""
+        """Stop these robots (rows,) and switch off their LEDs."""
         self.command = np.where(dead[:, None], 0.0, self.command)
         self.leds.darken(dead)
 
     def counts(self) -> dict[str, IntArray]:
-        """Commands that drives could not follow, or that were not finite and so dropped; LEDs that are not there.
+        """Commands beyond the limits, commands that were not finite, and changes of LEDs that do not exist.
 
         By name, (arenas,) each.
         """

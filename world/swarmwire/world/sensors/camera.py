@@ -1,4 +1,10 @@
-"""Straight lines in space, and the upright bodies that they pass through. Compiled."""
+"""The omnidirectional camera, and lines of sight in space. Compiled.
+
+A mirror at height h with the aperture a sees the floor within h tan a (ARGoS 3,
+`colored_blob_omnidirectional_camera`). The camera sees a LED within that distance if the LED is lower than the mirror
+and the straight line to it, in space, passes through no obstacle and no body except the camera's own. So it may see a
+far LED above a low body.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -16,11 +22,11 @@ from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, 
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 NEVER = (np.inf, -np.inf)
-END = 1.0 - 1e-6  # a LED on the skin of a body is not hidden by what it sits on
+END = 1.0 - 1e-6  # share of the way: the body that carries a LED does not hide it
 
 
 class SightLine(NamedTuple):
-    """A line from an eye to what it looks at, in m; a share t of the way is at x + t dx and so on."""
+    """A line from an eye to its target, in m; the point at the share t of the way is x + t dx, and so on."""
 
     x: float
     y: float
@@ -32,7 +38,7 @@ class SightLine(NamedTuple):
 
 @kernel()
 def through_disc(line, cx, cy, radius):
-    """Between which shares of the way, prolonged, the line is above or below a disc; inf, -inf if it misses it."""
+    """The shares of the way, extended, between which the line is above or below a disc; inf, -inf if it misses it."""
     ox, oy = cx - line.x, cy - line.y
     length2 = line.dx * line.dx + line.dy * line.dy
     apart2 = ox * ox + oy * oy - radius * radius
@@ -47,12 +53,12 @@ def through_disc(line, cx, cy, radius):
 
 
 @kernel()
-def through_polygon(line, things, k):
+def through_polygon(line, obstacles, k):
     """As `through_disc`, for polygon k."""
     enter, leave = -np.inf, np.inf
-    for i in range(things.side_start[k], things.side_start[k + 1]):
-        nx, ny = things.side[i, 2], things.side[i, 3]
-        outside = nx * line.x + ny * line.y - things.side[i, 4]
+    for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
+        nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
+        outside = nx * line.x + ny * line.y - obstacles.side[i, 4]
         speed = nx * line.dx + ny * line.dy
         if speed == 0.0:
             if outside >= 0.0:
@@ -65,8 +71,8 @@ def through_polygon(line, things, k):
 
 
 @kernel()
-def is_cut(line, enter, leave, bottom_m, top_m):
-    """Whether the line, before it arrives, passes between two heights while it is between these shares of the way."""
+def is_blocked(line, enter, leave, bottom_m, top_m):
+    """Whether the line, before its end, passes between two heights within these shares of the way."""
     first, last = max(enter, 0.0), min(leave, END)
     if first >= last:
         return False
@@ -74,26 +80,18 @@ def is_cut(line, enter, leave, bottom_m, top_m):
     return min(one, other) < top_m and max(one, other) > bottom_m
 
 
-# --- Omnidirectional camera: LEDs of other robots within its cone that nothing hides from its mirror. Compiled.
-#
-# A mirror at height h with the aperture a sees the floor within h tan a (ARGoS 3,
-# `colored_blob_omnidirectional_camera`). A LED within that distance is seen if it is lower than the mirror and the
-# straight line to it, in space, passes through no obstacle and no body but the camera's own: a far LED may well be seen
-# above a low body.
-
-
 class Mirror(NamedTuple):
-    """The sheet as kernels take it."""
+    """The spec of a camera for kernels, and a buffer."""
 
-    first: int  # robot of the group
+    first: int  # robot index of the group's first robot
     height_m: float  # above the body's lower side
     reach_m: float
-    overhang_m: float  # how far a LED may stand out of its body
-    found: IntArray  # (things,)
+    overhang_m: float  # the greatest distance of a LED from the rim of its body
+    nearby: IntArray  # (obstacles,) buffer
 
 
 class CameraSensor:
-    """Sense `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
+    """Sensor `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
 
     def __init__(self, scene: Scene, group: Group, spec: CameraSpec) -> None:
         blobs, noise = spec.most_blobs, Noise("normal", 0.0, spec.noise_relative)
@@ -106,83 +104,83 @@ class CameraSensor:
         self._scene, self._shape = scene, (len(scene.keys), group.stop - group.start, blobs)
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
-        self._crowd = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
-        self._standing = ObstacleIndices(scene, reach_m)
-        found = np.empty(len(self._standing.now().shape), np.int64)
-        self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, found)
+        self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
+        self._obstacles = ObstacleIndices(scene, reach_m)
+        nearby = np.empty(len(self._obstacles.now().shape), np.int64)
+        self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, nearby)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The blobs that every robot of the group sees."""
         blobs = tuple(np.full(self._shape, np.nan) for _ in range(3))
         scene = self._scene
-        _watch(blobs, self._crowd, self._standing.now(), self._mirror, scene.leds, scene.led_places_m)
+        _watch(blobs, self._robots, self._obstacles.now(), self._mirror, scene.leds, scene.led_places_m)
         return blobs
 
 
 @kernel(from_python=True)
-def _watch(blobs, crowd, things, mirror, leds, places):
+def _watch(blobs, robots, obstacles, mirror, leds, places):
     """Set distance, bearing and colour (arenas, n, blobs each)."""
-    sort(crowd.cells, crowd.state, crowd.running)
+    sort(robots.cells, robots.state, robots.running)
     for arena in range(blobs[0].shape[0]):
-        if not crowd.running[arena]:
+        if not robots.running[arena]:
             continue
         for i in range(blobs[0].shape[1]):
             own = mirror.first + i
-            x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)
-            y = nearest(0.0, crowd.state[arena, own, 1], crowd.wrap_y, crowd.per_wrap_y)
-            eye_z = crowd.bottom_m[own] + mirror.height_m
-            robots = near_robots(crowd, arena, own, x, y, mirror.reach_m + mirror.overhang_m, -np.inf, np.inf)
-            if robots == 0:
+            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
+            eye_z = robots.bottom_m[own] + mirror.height_m
+            robot_count = near_robots(robots, arena, own, x, y, mirror.reach_m + mirror.overhang_m, -np.inf, np.inf)
+            if robot_count == 0:
                 continue
-            obstacles = obstacles_near(mirror.found, things, arena, x, y, mirror.reach_m, 0.0)
-            eye = x, y, eye_z, crowd.state[arena, own, 2]
-            _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places)
+            obstacle_count = obstacles_near(mirror.nearby, obstacles, arena, x, y, mirror.reach_m, 0.0)
+            eye = x, y, eye_z, robots.state[arena, own, 2]
+            _list_blobs(blobs, arena, i, eye, robots, robot_count, obstacles, obstacle_count, mirror, leds, places)
 
 
 @kernel()
-def _tell(blobs, arena, i, eye, crowd, robots, things, obstacles, mirror, leds, places):
-    """Set the blobs of one row: the lit LEDs in sight of the robots that were found."""
+def _list_blobs(blobs, arena, i, eye, robots, robot_count, obstacles, obstacle_count, mirror, leds, places):
+    """Set the blobs of one row: the lit LEDs in sight on the nearby robots."""
     x, y, eye_z, heading = eye
     c, s, count = np.cos(heading), np.sin(heading), 0
-    for at in range(robots):
-        other = crowd.found[at]
-        turn_c, turn_s = np.cos(crowd.state[arena, other, 2]), np.sin(crowd.state[arena, other, 2])
+    for at in range(robot_count):
+        other = robots.nearby[at]
+        turn_c, turn_s = np.cos(robots.state[arena, other, 2]), np.sin(robots.state[arena, other, 2])
         for led in range(leds.shape[2]):
             if leds[arena, other, led] == 0:
                 continue
             ahead, left, up = places[other, led, 0], places[other, led, 1], places[other, led, 2]
-            to_x = crowd.found_at[at, 0] + turn_c * ahead - turn_s * left - x
-            to_y = crowd.found_at[at, 1] + turn_s * ahead + turn_c * left - y
-            z, apart = crowd.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
+            to_x = robots.nearby_at[at, 0] + turn_c * ahead - turn_s * left - x
+            to_y = robots.nearby_at[at, 1] + turn_s * ahead + turn_c * left - y
+            z, apart = robots.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
             if apart > mirror.reach_m or z >= eye_z:
                 continue
             line = SightLine(x, y, eye_z, to_x, to_y, z - eye_z)
-            if not _is_hidden(line, crowd, robots, things, mirror.found, obstacles):
+            if not _is_hidden(line, robots, robot_count, obstacles, mirror.nearby, obstacle_count):
                 bearing = np.arctan2(c * to_y - s * to_x, c * to_x + s * to_y)
                 count = _keep(blobs, arena, i, count, apart, bearing, leds[arena, other, led])
 
 
 @kernel()
-def _is_hidden(line, crowd, robots, things, found, obstacles):
-    for at in range(robots):
-        other = crowd.found[at]
-        enter, leave = through_disc(line, crowd.found_at[at, 0], crowd.found_at[at, 1], crowd.radius_m[other])
-        if is_cut(line, enter, leave, crowd.bottom_m[other], crowd.top_m[other]):
+def _is_hidden(line, robots, robot_count, obstacles, nearby, obstacle_count):
+    for at in range(robot_count):
+        other = robots.nearby[at]
+        enter, leave = through_disc(line, robots.nearby_at[at, 0], robots.nearby_at[at, 1], robots.radius_m[other])
+        if is_blocked(line, enter, leave, robots.bottom_m[other], robots.top_m[other]):
             return True
-    for at in range(obstacles):
-        k = found[at]
-        if things.side_start[k] == things.side_start[k + 1]:
-            enter, leave = through_disc(line, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
+    for at in range(obstacle_count):
+        k = nearby[at]
+        if obstacles.side_start[k] == obstacles.side_start[k + 1]:
+            enter, leave = through_disc(line, obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2])
         else:
-            enter, leave = through_polygon(line, things, k)
-        if is_cut(line, enter, leave, 0.0, things.shape[k, 3]):
+            enter, leave = through_polygon(line, obstacles, k)
+        if is_blocked(line, enter, leave, 0.0, obstacles.shape[k, 3]):
             return True
     return False
 
 
 @kernel()
 def _keep(blobs, arena, i, count, apart, bearing, colour):
-    """Put a blob in its place by distance, as long as there is room; how many there are then."""
+    """Insert a blob by distance if there is room; returns the number of blobs."""
     distances, bearings, colours = blobs[0][arena, i], blobs[1][arena, i], blobs[2][arena, i]
     if count == len(distances):
         if apart >= distances[count - 1]:

@@ -22,7 +22,7 @@ BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
 
 
 class ImuSensor:
-    """Sense `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
+    """Sensor `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
 
     def __init__(self, scene: Scene, group: Group, spec: ImuSpec) -> None:
         self._scene, self._group = scene, group

@@ -1,4 +1,7 @@
-"""Whether anything stands in a straight line over the floor, looked for in the cells along it. Compiled."""
+"""The light sensor, and the line of sight over the floor that it needs. Compiled.
+
+`obstacle_between` and `robot_between` test a straight line against the obstacles and robots in the cells along it.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -14,36 +17,38 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.rays import ObstacleIndices, nearest, robot_index_of
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
-MARGIN_M = 1e-9  # a line along the border of two cells goes through both
+MARGIN_M = 1e-9  # a line along the border of two cells passes through both
+RANGE_INTENSITIES = 2.5  # the range of a light, in multiples of its intensity
+TURN_RAD = 2.0 * np.pi
 
 
 @kernel()
-def things_between(things, arena, x, y, to_x, to_y, low_m):
+def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
     """Whether an obstacle higher than `low_m` touches the line from x, y to another place."""
-    cells = things.cells
-    apart = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
-    if apart == 0.0 or len(things.shape) == 0:
+    cells = obstacles.cells
+    distance_m = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
+    if distance_m == 0.0 or len(obstacles.shape) == 0:
         return False
-    dx, dy = (to_x - x) / apart, (to_y - y) / apart
+    dx, dy = (to_x - x) / distance_m, (to_y - y) / distance_m
     for column in range(_cell(min(x, to_x), cells.per_x, cells.nx), _cell(max(x, to_x), cells.per_x, cells.nx) + 1):
         low, high = _rows(cells, column, MARGIN_M, x, y, to_x, to_y)
         for row in range(low, high + 1):
             c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
             for at in range(cells.start[c], cells.start[c + 1]):
                 k = cells.item[at]
-                if things.shape[k, 3] > low_m and ray_to_obstacle(x, y, dx, dy, things, k) <= apart:
+                if obstacles.shape[k, 3] > low_m and ray_to_obstacle(x, y, dx, dy, obstacles, k) <= distance_m:
                     return True
     return False
 
 
 @kernel()
-def robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
-    """Whether a robot that is as high as robot `own` somewhere touches the line from its place x, y to another."""
-    cells = crowd.cells
-    apart = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
-    if apart == 0.0:
+def robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
+    """Whether a robot whose height overlaps that of robot `own` touches the line from its place x, y to another."""
+    cells = robots.cells
+    distance_m = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
+    if distance_m == 0.0:
         return False
-    dx, dy = (to_x - x) / apart, (to_y - y) / apart
+    dx, dy = (to_x - x) / distance_m, (to_y - y) / distance_m
     middle_x, middle_y = 0.5 * (x + to_x), 0.5 * (y + to_y)
     first = _cell(min(x, to_x) - widest_m, cells.per_x, cells.nx)
     last = _cell(max(x, to_x) + widest_m, cells.per_x, cells.nx)
@@ -53,25 +58,25 @@ def robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
             c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
             for at in range(cells.start[c], cells.start[c + 1]):
                 other = cells.item[at]
-                beside = crowd.bottom_m[other] < crowd.top_m[own] and crowd.bottom_m[own] < crowd.top_m[other]
+                beside = robots.bottom_m[other] < robots.top_m[own] and robots.bottom_m[own] < robots.top_m[other]
                 if other == own or not beside:
                     continue
-                cx = nearest(middle_x, crowd.state[arena, other, 0], crowd.wrap_x, crowd.per_wrap_x)
-                cy = nearest(middle_y, crowd.state[arena, other, 1], crowd.wrap_y, crowd.per_wrap_y)
-                if ray_to_circle(x, y, dx, dy, cx, cy, crowd.radius_m[other]) <= apart:
+                cx = nearest(middle_x, robots.state[arena, other, 0], robots.wrap_x, robots.per_wrap_x)
+                cy = nearest(middle_y, robots.state[arena, other, 1], robots.wrap_y, robots.per_wrap_y)
+                if ray_to_circle(x, y, dx, dy, cx, cy, robots.radius_m[other]) <= distance_m:
                     return True
     return False
 
 
 @kernel()
 def _cell(at, per, cells):
-    """The column or row of a coordinate, not rolled up."""
+    """The column or row of a coordinate, not wrapped."""
     return int(np.floor(at * per + 0.5 * cells))
 
 
 @kernel()
 def _rows(cells, column, margin_m, x, y, to_x, to_y):
-    """First and last row of a column, not rolled up, where something this wide may touch the line."""
+    """First and last row of a column, not wrapped, where a thing of this width may touch the line."""
     low, high = min(y, to_y), max(y, to_y)
     if to_x != x:
         left = (column - 0.5 * cells.nx) / cells.per_x - margin_m
@@ -83,67 +88,65 @@ def _rows(cells, column, margin_m, x, y, to_x, to_y):
     return _cell(low - margin_m, cells.per_y, cells.ny), _cell(high + margin_m, cells.per_y, cells.ny)
 
 
-# --- Light: photocells around the body that answer to every light in sight, as ARGoS's rot_z_only sensor does.
-#
-# A cell that is turned by dphi from a light at distance d of intensity I (m) answers
-#
-#     exp(-2 d / I) * (1 - 2 |dphi| / pi)    for d <= 2.5 I and |dphi| < pi / 2, else 0;
-#
-# answers of several lights add up, then uniform noise, then clipping to [0, 1]. (ARGoS 3, foot-bot and e-puck
-# `light_rotzonly_sensor`.) A light is hidden if the straight line to it from the centre of the body meets an obstacle
-# or another robot that is at the same height.
-
-
-REACH = 2.5  # a light is dark beyond that many of its intensities
-TURN_RAD = 2.0 * np.pi
-
-
 class LightSensor:
-    """Sense `light`: value (n, sensors), 0 dark to 1. Noise is uniform, and new in every reading."""
+    """Sensor `light`: value (n, sensors), 0 dark to 1, photocells around the body. Noise is uniform, new each reading.
+
+    A cell at the angle dphi from a light at distance d of intensity I (m) responds with
+
+        exp(-2 d / I) * (1 - 2 |dphi| / pi)    for d <= 2.5 I and |dphi| < pi / 2, else 0.
+
+    Responses to several lights add up, then uniform noise, then clipping to [0, 1] (ARGoS 3, foot-bot and e-puck
+    `light_rotzonly_sensor`). A light is hidden if the straight line to it from the centre of the body meets an obstacle
+    or another robot at the same height.
+    """
 
     def __init__(self, scene: Scene, group: Group, spec: LightSpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
         noise = Noise("uniform", spec.noise)
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
-        lights = [(a, light) for a, some in enumerate(scene.lights) for light in some]
+        lights = [(a, light) for a, arena_lights in enumerate(scene.lights) for light in arena_lights]
         self._arena = np.array([a for a, _ in lights], np.int64)
-        self._light = np.array([(of.x_m, of.y_m, of.intensity_m) for _, of in lights], np.float64).reshape(-1, 3)
+        self._light = np.array([(light.x_m, light.y_m, light.intensity_m) for _, light in lights], np.float64).reshape(
+            -1, 3
+        )
         self._widest_m = float(scene.radius_m.max())
-        self._crowd = robot_index_of(scene, 2.0 * self._widest_m)
-        self._standing = ObstacleIndices(scene, 0.0, images_m=0.5 * max(scene.size_m))  # no light is farther on a torus
+        self._robots = robot_index_of(scene, 2.0 * self._widest_m)
+        self._obstacles = ObstacleIndices(
+            scene, 0.0, images_m=0.5 * max(scene.size_m)
+        )  # no light is farther on a torus
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """What every photocell of every robot of the group answers, without noise; more than 1 where lights add up."""
+        """The noise-free response of every photocell of the group; it may exceed 1 where lights add up."""
         scene, group, angle = self._scene, self._group, self._spec.angle_rad
         value = np.zeros((len(scene.keys), group.stop - group.start, len(angle)))
-        around = self._crowd, self._widest_m, self._standing.now()
-        _shine(value, group.start, angle, *around, self._arena, self._light)
+        geometry = self._robots, self._widest_m, self._obstacles.now()
+        _shine(value, group.start, angle, *geometry, self._arena, self._light)
         return (value,)
 
 
 @kernel(from_python=True)
-def _shine(value, start, angle, crowd, widest_m, things, arena_of, lights):
-    """Add what the cells of each robot (arenas, n, sensors) see of each light."""
-    sort(crowd.cells, crowd.state, crowd.running)
+def _shine(value, start, angle, robots, widest_m, obstacles, arena_of, lights):
+    """Add the response of each robot's cells to each light to value (arenas, n, sensors)."""
+    sort(robots.cells, robots.state, robots.running)
     for k in range(len(lights)):
         arena, intensity = arena_of[k], lights[k, 2]
-        if not crowd.running[arena]:
+        if not robots.running[arena]:
             continue
         for i in range(value.shape[1]):
             own = start + i
-            x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)
-            y = nearest(0.0, crowd.state[arena, own, 1], crowd.wrap_y, crowd.per_wrap_y)
-            to_x = nearest(x, lights[k, 0], crowd.wrap_x, crowd.per_wrap_x)
-            to_y = nearest(y, lights[k, 1], crowd.wrap_y, crowd.per_wrap_y)
+            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
+            to_x = nearest(x, lights[k, 0], robots.wrap_x, robots.per_wrap_x)
+            to_y = nearest(y, lights[k, 1], robots.wrap_y, robots.per_wrap_y)
             dx, dy = to_x - x, to_y - y
             distance = np.sqrt(dx * dx + dy * dy)
-            if distance > REACH * intensity:
+            if distance > RANGE_INTENSITIES * intensity:
                 continue
-            if things_between(things, arena, x, y, to_x, to_y, crowd.bottom_m[own]):
+            if obstacle_between(obstacles, arena, x, y, to_x, to_y, robots.bottom_m[own]):
                 continue
-            if robots_between(crowd, widest_m, arena, own, x, y, to_x, to_y):
+            if robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
                 continue
-            glow, bearing = np.exp(-2.0 * distance / intensity), np.arctan2(dy, dx) - crowd.state[arena, own, 2]
+            glow, bearing = np.exp(-2.0 * distance / intensity), np.arctan2(dy, dx) - robots.state[arena, own, 2]
             for cell in range(len(angle)):
                 off = abs(bearing - angle[cell]) % TURN_RAD
                 off = min(off, TURN_RAD - off)

@@ -1,7 +1,10 @@
-"""What goes wrong between the truth and a reading, in this order: noise, outliers, steps, range, drop-out.
+"""The sensor pipeline: from the truth to a reading.
 
-Every draw is keyed by arena, robot, tick, place within the field, and purpose. Those of noise belong to the field;
-whether a reading is an outlier or lost belongs to the sense, so that all its fields go together at one place.
+`Stages` applies the errors of one field, in this order: noise, outliers, quantization steps, range, drop-out. `Staged`
+is one sensor of one group: truth at the sensor's rate, then the stages, then the delay.
+
+Every draw is keyed by arena, robot, tick, index within the field, and purpose. Draws of noise belong to the field.
+Draws of outliers and drop-outs belong to the sensor, so all its fields fail together at one index.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,13 +23,16 @@ from swarmwire.comms.draws_compiled import normal, uniform
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Following, Sensor
 
-NOISE, OUTLIER, OUTLYING, DROP_OUT = range(4)  # places in `purposes`
+NOISE, OUTLIER, OUTLIER_VALUE, DROP_OUT = range(4)  # indices of `purposes`
 FULL_TURN = 2.0 * np.pi
 MIN_ANGLE = np.nextafter(-np.pi, 0.0)
+ROUNDING = 1e-9  # of a tick: a reading or delay that misses a tick by less belongs to it
+
+Reading = tuple[FloatArray, ...]  # a finished reading of each field, (arenas, n) or (arenas, n, width)
 
 
-class Numbers(NamedTuple):
-    """A field's errors as the kernel takes them; `Field` says what they mean."""
+class ErrorParams(NamedTuple):
+    """A field's errors for the kernels; `Field` defines the numbers."""
 
     is_normal: bool
     noise: float
@@ -43,11 +49,11 @@ class Numbers(NamedTuple):
 
 
 class Stages:
-    """All that one field of a sense passes through."""
+    """The error stages of one field of a sensor."""
 
     def __init__(self, sensor: str, field: Field, outlier: float, drop_out: float) -> None:
         low, high = field.span or (field.low, field.high)
-        self._numbers = Numbers(
+        self._params = ErrorParams(
             is_normal=field.noise.kind == "normal",
             noise=float(field.noise.size),
             relative=float(field.noise.relative),
@@ -69,74 +75,74 @@ class Stages:
         )
         self._purposes = np.array([purpose(name) for name in names], np.uint64)
         unbounded = isinf(field.low) and isinf(field.high) and not field.angle
-        errs = field.noise.size or field.noise.relative or outlier or drop_out or field.step
-        self._idle = unbounded and not errs
+        has_errors = field.noise.size or field.noise.relative or outlier or drop_out or field.step
+        self._idle = unbounded and not has_errors
 
     def apply(self, value: FloatArray, keys: KeyArray, start: int, tick: int, running: BoolArray | None = None) -> None:
-        """Put the truth `value` (arenas, n) or (arenas, n, width) through the stages, in place.
+        """Apply the stages to the truth `value` (arenas, n) or (arenas, n, width), in place.
 
-        Only in arenas that are `running` (arenas,); None: in all.
+        Only arenas that are `running` (arenas,) change; None: all do.
         """
         if not self._idle:
             values = value if value.ndim == 3 else value.reshape(*value.shape, 1)
-            present = np.ones(len(keys), np.bool_) if running is None else running
-            _apply(values, keys, present, start, tick, self._numbers, self._purposes)
+            active = np.ones(len(keys), np.bool_) if running is None else running
+            _apply(values, keys, active, start, tick, self._params, self._purposes)
 
 
 @njit(cache=True)
-def _apply(values, keys, running, start, tick, numbers, purposes):
+def _apply(values, keys, running, start, tick, params, purposes):
     for arena in range(len(values)):
         if running[arena]:
-            _apply_to(values[arena], keys[arena], start, tick, numbers, purposes)
+            _apply_to(values[arena], keys[arena], start, tick, params, purposes)
 
 
 @njit(cache=True)
-def _apply_to(values, key, start, tick, numbers, purposes):
-    if numbers.noise > 0.0 or numbers.relative > 0.0:
-        _add_noise(values, key, start, tick, numbers, purposes[NOISE])
-    if numbers.outlier > 0.0:
-        _put_outliers(values, key, start, tick, numbers, purposes[OUTLIER], purposes[OUTLYING])
+def _apply_to(values, key, start, tick, params, purposes):
+    if params.noise > 0.0 or params.relative > 0.0:
+        _add_noise(values, key, start, tick, params, purposes[NOISE])
+    if params.outlier > 0.0:
+        _add_outliers(values, key, start, tick, params, purposes[OUTLIER], purposes[OUTLIER_VALUE])
     flat = values.reshape(values.size)
-    if numbers.step > 0.0:
-        _round(flat, numbers.step)
-    if numbers.low > -np.inf or numbers.high < np.inf:
-        _clip(flat, numbers.low, numbers.high)
-    if numbers.angle:
+    if params.step > 0.0:
+        _round(flat, params.step)
+    if params.low > -np.inf or params.high < np.inf:
+        _clip(flat, params.low, params.high)
+    if params.angle:
         _wrap(flat)
-    if numbers.drop_out > 0.0:
-        _drop(values, key, start, tick, numbers, purposes[DROP_OUT])
+    if params.drop_out > 0.0:
+        _drop(values, key, start, tick, params, purposes[DROP_OUT])
 
 
 @njit(cache=True)
-def _add_noise(values, key, start, tick, numbers, what_for):
+def _add_noise(values, key, start, tick, params, noise_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
             value = values[i, k]
             if np.isfinite(value):
-                size = numbers.noise + numbers.relative * abs(value)
-                if numbers.is_normal:
-                    draw = normal(key, start + i, tick, k, what_for)
+                size = params.noise + params.relative * abs(value)
+                if params.is_normal:
+                    draw = normal(key, start + i, tick, k, noise_purpose)
                 else:
-                    draw = 2.0 * uniform(key, start + i, tick, k, what_for) - 1.0
+                    draw = 2.0 * uniform(key, start + i, tick, k, noise_purpose) - 1.0
                 values[i, k] = value + size * draw
 
 
 @njit(cache=True)
-def _put_outliers(values, key, start, tick, numbers, whether, where):
+def _add_outliers(values, key, start, tick, params, selection_purpose, value_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
-            if uniform(key, start + i, tick, k, whether) < numbers.outlier:
-                share = uniform(key, start + i, tick, k, where)
-                low, high = numbers.outlier_low, numbers.outlier_high
-                values[i, k] = low + share * (high - low)
+            if uniform(key, start + i, tick, k, selection_purpose) < params.outlier:
+                fraction = uniform(key, start + i, tick, k, value_purpose)
+                low, high = params.outlier_low, params.outlier_high
+                values[i, k] = low + fraction * (high - low)
 
 
 @njit(cache=True)
-def _drop(values, key, start, tick, numbers, whether):
+def _drop(values, key, start, tick, params, selection_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
-            if uniform(key, start + i, tick, k, whether) < numbers.drop_out:
-                values[i, k] = numbers.blank
+            if uniform(key, start + i, tick, k, selection_purpose) < params.drop_out:
+                values[i, k] = params.blank
 
 
 @njit(cache=True)
@@ -162,26 +168,18 @@ def _wrap(flat):
 
 @njit(cache=True)
 def _wrapped(angle):
-    """The angle in (-pi, pi], with its own bits if it is there already (`world.placement.angles.wrapped`)."""
+    """The angle in (-pi, pi], unchanged bit for bit if it is there already (as `world.placement.placement.wrapped`)."""
     if -np.pi < angle <= np.pi:
         return angle
     turned = angle - FULL_TURN * np.ceil((angle - np.pi) / FULL_TURN)
     return min(max(turned, MIN_ANGLE), np.pi)
 
 
-# --- A sense as its group reads it: the truth at its rate, through the stages, and shown after its delay.
-
-
-NEAR = 1e-9  # a tick that is due but for rounding is due
-
-Taken = tuple[FloatArray, ...]  # a finished reading of each field, (arenas, n) or (arenas, n, width)
-
-
 class Staged:
-    """One sense of one group in all arenas; in each tick either `read` or `follow` is called, once.
+    """One sensor of one group in all arenas; in each tick either `read` or `follow` is called, once.
 
-    A reading belongs to the tick in which it was taken, so it does not matter how often the group looks. Before the
-    first one is shown, as while a sensor has failed, it reads the field's `blank`.
+    A reading belongs to the tick in which it was measured, so it does not depend on how often the group reads. Before
+    the first reading, and while a sensor has failed, a field reads its `blank`.
 
     Attributes:
         failed: (arenas, n) robots whose sensor has failed; None: no robot's. Set from outside, effective at once.
@@ -197,9 +195,9 @@ class Staged:
         tick_s: float,
         running: BoolArray | None = None,
     ) -> None:
-        """The sense `name` of a group in the arenas of these keys (arenas,).
+        """The sensor `name` of a group in the arenas of these keys (arenas,).
 
-        Nobody reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
+        No agent reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
         """
         self.failed: BoolArray | None = None
         self._sensor, self._keys, self._running, self._group = sensor, keys, running, group
@@ -207,46 +205,46 @@ class Staged:
         self._stages = [Stages(name, field, outlier, spec.drop_out) for field in sensor.fields]
         self._fields = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in sensor.fields]
         self._per_tick = spec.rate_hz * tick_s  # readings; 0: one in each tick
-        self._delay = ceil(spec.delay_s / tick_s - NEAR)  # ticks
-        self._held = self._delay > 0 or 0.0 < self._per_tick < 1.0
-        self._shown: Taken | None = None
-        self._waiting: deque[tuple[int, Taken]] = deque()  # until the tick in which each is shown
+        self._delay = ceil(spec.delay_s / tick_s - ROUNDING)  # ticks
+        self._samples = self._delay > 0 or 0.0 < self._per_tick < 1.0
+        self._shown: Reading | None = None
+        self._waiting: deque[tuple[int, Reading]] = deque()  # with the tick from which each is shown
 
     def read(self, tick: int) -> dict[str, FloatArray]:
-        """Fields "sense.field" -> (rows,) or (rows, width), a row per robot of the group, arena by arena."""
-        if self._held:
-            self._hold(tick)
+        """Fields "sensor.field" -> (rows,) or (rows, width), a row per robot of the group, arena by arena."""
+        if self._samples:
+            self._sample(tick)
             values = tuple(value.copy() for value in self._shown) if self._shown else self._blank()
         else:
-            values = self._take(tick)
+            values = self._measure(tick)
         if self.failed is not None:
             for value, field in zip(values, self._sensor.fields, strict=True):
                 value[self.failed] = field.blank
         return {key: value.reshape(shape) for (key, shape), value in zip(self._fields, values, strict=True)}
 
     def follow(self, tick: int) -> None:
-        """Keep up in a tick in which the group does not act."""
-        if self._held:
-            self._hold(tick)
+        """Update the sensor in a tick in which the group does not act."""
+        if self._samples:
+            self._sample(tick)
         elif isinstance(self._sensor, Following):
             self._sensor.follow(tick)
 
-    def _take(self, tick: int) -> Taken:
+    def _measure(self, tick: int) -> Reading:
         values = self._sensor.truth(tick)
         for value, stages in zip(values, self._stages, strict=True):
             stages.apply(value, self._keys, self._group.start, tick, self._running)
         return values
 
-    def _hold(self, tick: int) -> None:
-        """Take a reading if one is due, and show the newest that is old enough."""
+    def _sample(self, tick: int) -> None:
+        """Measure if a reading is due, and show the newest reading that is old enough."""
         if self._is_due(tick):
-            self._waiting.append((tick + self._delay, self._take(tick)))
+            self._waiting.append((tick + self._delay, self._measure(tick)))
         elif isinstance(self._sensor, Following):
             self._sensor.follow(tick)
         while self._waiting and self._waiting[0][0] <= tick:
             self._shown = self._waiting.popleft()[1]
 
-    def _blank(self) -> Taken:
+    def _blank(self) -> Reading:
         shape = len(self._keys), self._group.stop - self._group.start
         return tuple(
             np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._sensor.fields
@@ -256,4 +254,4 @@ class Staged:
         per_tick = self._per_tick
         if not 0.0 < per_tick < 1.0 or tick == 0:
             return True
-        return floor(tick * per_tick + NEAR) > floor((tick - 1) * per_tick + NEAR)
+        return floor(tick * per_tick + ROUNDING) > floor((tick - 1) * per_tick + ROUNDING)

@@ -1,4 +1,8 @@
-"""The robots of all arenas, sorted into cells in each tick, so that a sensor looks at near ones only. Compiled."""
+"""Sensors that cast a few rays from the rim of the body: proximity (active) and infrared (passive). Compiled.
+
+`RobotIndex` and `ObstacleIndices` find robots and obstacles near a place; the scan, light and camera sensors use them,
+too. `RayArraySight` finds the nearest thing on each ray of a group's robots and applies the response of the sensor.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -15,14 +19,16 @@ from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
-CELLS_PER_ROBOT = 8  # so that few share one where they gather in a corner of a large arena
+CELLS_PER_ROBOT = 8  # so that few robots share a cell where they gather in a corner of a large arena
+RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
+MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, despite rounding
 
 
 class RobotIndex(NamedTuple):
-    """What kernels know of the robots; `cells` is filled by `cells.sort`."""
+    """The robots of all arenas by cell, for kernels; `robot_index.sort` fills `cells` in each tick."""
 
     state: FloatArray  # (arenas, robots, 6)
-    running: BoolArray  # (arenas,) others are passed over
+    running: BoolArray  # (arenas,) others are skipped
     radius_m: FloatArray  # (robots,)
     bottom_m: FloatArray  # (robots,)
     top_m: FloatArray  # (robots,)
@@ -31,14 +37,14 @@ class RobotIndex(NamedTuple):
     per_wrap_x: float  # 1 / wrap_x, or 0
     per_wrap_y: float
     cells: Cells
-    found: IntArray  # (robots,) room for those that `near_robots` finds
-    found_at: FloatArray  # (robots, 2) and for where they are
+    nearby: IntArray  # (robots,) buffer: robots that `near_robots` found
+    nearby_at: FloatArray  # (robots, 2) buffer: their positions
 
 
 def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
-    """The robots of a scene, for looking at whose centre is within `reach_m`."""
-    arenas, robots = scene.state.shape[:2]
-    per_cell_m = np.sqrt(scene.size_m[0] * scene.size_m[1] / (CELLS_PER_ROBOT * robots))
+    """The index of a scene's robots, for queries of centres within `reach_m`."""
+    arenas, robot_count = scene.state.shape[:2]
+    per_cell_m = np.sqrt(scene.size_m[0] * scene.size_m[1] / (CELLS_PER_ROBOT * robot_count))
     torus = scene.boundary == "torus"
     wrap_x, wrap_y = scene.size_m if torus else (0.0, 0.0)
     per_wrap_x, per_wrap_y = (1.0 / wrap_x, 1.0 / wrap_y) if torus else (0.0, 0.0)
@@ -52,25 +58,25 @@ def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
         wrap_y,
         per_wrap_x,
         per_wrap_y,
-        cells_over(scene.size_m, max(reach_m, float(per_cell_m)), arenas, arenas * robots),
-        np.empty(robots, np.int64),
-        np.empty((robots, 2)),
+        cells_over(scene.size_m, max(reach_m, float(per_cell_m)), arenas, arenas * robot_count),
+        np.empty(robot_count, np.int64),
+        np.empty((robot_count, 2)),
     )
 
 
 @kernel()
-def nearest(at, there, wrap, per_wrap):
-    """Where a coordinate `there` is as seen from `at`: on a torus, its image at the least distance."""
-    return there - wrap * np.rint((there - at) * per_wrap)
+def nearest(origin, coordinate, wrap, per_wrap):
+    """The image of a coordinate that is nearest to `origin`; off a torus the coordinate itself."""
+    return coordinate - wrap * np.rint((coordinate - origin) * per_wrap)
 
 
 @kernel()
-def near_robots(crowd, arena, own, x, y, reach_m, low_m, high_m):
-    """Write into `crowd.found` the robots but `own` whose rims are within reach of a place; how many.
+def near_robots(robots, arena, own, x, y, reach_m, low_m, high_m):
+    """Write the robots, except `own`, whose rims are within reach of a place to `robots.nearby`; returns their number.
 
-    Only those that are somewhere between two heights above the floor.
+    Only robots that extend between the two heights above the floor count.
     """
-    cells, count = crowd.cells, 0
+    cells, count = robots.cells, 0
     row, column = row_of(cells, y), column_of(cells, x)
     for j in range(min(cells.ny, 3)):
         r = (row + j - 1) % cells.ny
@@ -78,34 +84,31 @@ def near_robots(crowd, arena, own, x, y, reach_m, low_m, high_m):
             c = (arena * cells.ny + r) * cells.nx + (column + i - 1) % cells.nx
             for k in range(cells.start[c], cells.start[c + 1]):
                 other = cells.item[k]
-                cx = nearest(x, crowd.state[arena, other, 0], crowd.wrap_x, crowd.per_wrap_x)
-                cy = nearest(y, crowd.state[arena, other, 1], crowd.wrap_y, crowd.per_wrap_y)
-                ox, oy, reach = cx - x, cy - y, reach_m + crowd.radius_m[other]
+                cx = nearest(x, robots.state[arena, other, 0], robots.wrap_x, robots.per_wrap_x)
+                cy = nearest(y, robots.state[arena, other, 1], robots.wrap_y, robots.per_wrap_y)
+                ox, oy, reach = cx - x, cy - y, reach_m + robots.radius_m[other]
                 if ox * ox + oy * oy >= reach * reach or other == own:
                     continue
-                if crowd.bottom_m[other] < high_m and low_m < crowd.top_m[other]:
-                    crowd.found[count] = other
-                    crowd.found_at[count, 0], crowd.found_at[count, 1] = cx, cy
+                if robots.bottom_m[other] < high_m and low_m < robots.top_m[other]:
+                    robots.nearby[count] = other
+                    robots.nearby_at[count, 0], robots.nearby_at[count, 1] = cx, cy
                     count += 1
     return count
 
 
-# --- The obstacles of a scene as a sensor looks at them.
-
-
 class ObstacleIndices:
-    """The obstacles of a scene by cell, sorted once, or in each tick where some of them can be pushed."""
+    """The obstacle index of a scene: built once, or in each tick where an obstacle can be pushed."""
 
     def __init__(self, scene: Scene, reach_m: float, images_m: float | None = None) -> None:
-        """For looking `reach_m` far; `images_m` as in `things_within`."""
+        """For queries within `reach_m`; `images_m` as in `obstacles_within`."""
         self._scene, self._reach_m, self._images_m = scene, reach_m, images_m
-        self._things = self._sorted()
+        self._index = self._sorted()
 
     def now(self) -> ObstacleIndex:
-        """The obstacles where they stand in this tick; as many as ever."""
+        """The obstacles at their places in this tick; their number never changes."""
         if self._scene.obstacles_move:
-            self._things = self._sorted()
-        return self._things
+            self._index = self._sorted()
+        return self._index
 
     def _sorted(self) -> ObstacleIndex:
         scene = self._scene
@@ -113,23 +116,16 @@ class ObstacleIndices:
         return obstacles_within(scene.obstacles, scene.size_m, self._reach_m, torus, self._images_m)
 
 
-# --- A few rays from the rim of each robot, and the nearest thing on each. Compiled; for active and passive infrared.
-
-
-RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
-MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, however numbers are rounded
-
-
 class RayArray(NamedTuple):
-    """The sheet as kernels take it, and room for what they find out of one robot."""
+    """The spec of a ray array for kernels, and buffers for one robot."""
 
-    first: int  # robot of the group
+    first: int  # robot index of the group's first robot
     cos: FloatArray  # (rays,) directions in the body's frame
     sin: FloatArray  # (rays,)
     range_m: float
-    half_x: float  # where walls stand; inf: nowhere
+    half_x: float  # of the walls, in m; inf: no walls
     half_y: float
-    form: int  # of the response, a place in FORMS; `ResponseCurve` says what the numbers mean
+    form: int  # of the response, an index into FORMS; `ResponseCurve` defines the numbers
     a: float
     b: float
     c: float
@@ -137,21 +133,21 @@ class RayArray(NamedTuple):
     reach_m: float
     dx: FloatArray  # (rays,) directions in the arena's frame
     dy: FloatArray  # (rays,)
-    hidden_m: FloatArray  # (rays,) how far one sees
-    found: IntArray  # (things,)
+    visible_m: FloatArray  # (rays,) distance to the first opaque thing
+    nearby: IntArray  # (obstacles,) buffer
 
 
 class RayArraySight:
-    """What the rays of a group's robots meet: everything if they are active, else only robots alive and in sight."""
+    """The nearest hit of each ray: of anything for an active sensor, else of robots that are alive and in sight."""
 
     def __init__(self, scene: Scene, group: Group, spec: RayArraySpec, active: bool) -> None:
         reach_m = group.body.radius_m + spec.range_m
         self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
         self._active, self._alive, curve = active, scene.alive, spec.response
-        self._crowd = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
-        self._standing = ObstacleIndices(scene, reach_m)
+        self._robots = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
+        self._obstacles = ObstacleIndices(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
-        self._fan = RayArray(
+        self._rays = RayArray(
             group.start,
             np.cos(spec.angle_rad),
             np.sin(spec.angle_rad),
@@ -167,122 +163,126 @@ class RayArraySight:
             np.empty(self._shape[2]),
             np.empty(self._shape[2]),
             np.empty(self._shape[2]),
-            np.empty(len(self._standing.now().shape), np.int64),
+            np.empty(len(self._obstacles.now().shape), np.int64),
         )
 
     def answer(self) -> FloatArray:
-        """What an ideal sensor answers to what each ray meets, (arenas, n, rays), 0 to 1."""
+        """The noise-free response of each ray, (arenas, n, rays), 0 to 1."""
         value = np.zeros(self._shape)
-        _look(value, self._crowd, self._alive, self._standing.now(), self._fan, self._active, True)
+        _look(value, self._robots, self._alive, self._obstacles.now(), self._rays, self._active, True)
         return value
 
     def distance_m(self) -> FloatArray:
         """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
         near = np.full(self._shape, np.inf)
-        _look(near, self._crowd, self._alive, self._standing.now(), self._fan, self._active, False)
+        _look(near, self._robots, self._alive, self._obstacles.now(), self._rays, self._active, False)
         return near
 
 
 @kernel(from_python=True)
-def _look(value, crowd, alive, things, fan, active, answers):
-    """Set value (arenas, n, rays) of robots that have anything near; with `answers` the response to the distance."""
-    sort(crowd.cells, crowd.state, crowd.running)
+def _look(value, robots, alive, obstacles, rays, active, answers):
+    """Set value (arenas, n, rays) of robots with anything near: distances, or with `answers` the responses."""
+    sort(robots.cells, robots.state, robots.running)
     for arena in range(value.shape[0]):
-        if not crowd.running[arena]:
+        if not robots.running[arena]:
             continue
         for i in range(value.shape[1]):
-            own = fan.first + i
-            x = nearest(0.0, crowd.state[arena, own, 0], crowd.wrap_x, crowd.per_wrap_x)
-            y = nearest(0.0, crowd.state[arena, own, 1], crowd.wrap_y, crowd.per_wrap_y)
-            rim = crowd.radius_m[own]
-            reach = rim + fan.range_m
-            low, high = crowd.bottom_m[own], crowd.top_m[own]
-            robots = near_robots(crowd, arena, own, x, y, reach, low, high)
-            if not active and robots == 0:
+            own = rays.first + i
+            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
+            radius = robots.radius_m[own]
+            reach = radius + rays.range_m
+            low, high = robots.bottom_m[own], robots.top_m[own]
+            robot_count = near_robots(robots, arena, own, x, y, reach, low, high)
+            if not active and robot_count == 0:
                 continue
-            count = obstacles_near(fan.found, things, arena, x, y, reach, low)
-            at_wall = abs(x) + reach >= fan.half_x or abs(y) + reach >= fan.half_y
-            if robots == 0 and count == 0 and not at_wall:
+            count = obstacles_near(rays.nearby, obstacles, arena, x, y, reach, low)
+            at_wall = abs(x) + reach >= rays.half_x or abs(y) + reach >= rays.half_y
+            if robot_count == 0 and count == 0 and not at_wall:
                 continue
-            _turn(fan, crowd.state[arena, own, 2])
+            _turn(rays, robots.state[arena, own, 2])
             near = value[arena, i]
             near[:] = np.inf
             if at_wall:
-                _meet_walls(near, x, y, rim, fan)
-            _meet_things(near, x, y, rim, fan, things, count)
-            _meet_robots(near, x, y, rim, fan, crowd, robots, alive[arena], False)
+                _meet_walls(near, x, y, radius, rays)
+            _meet_obstacles(near, x, y, radius, rays, obstacles, count)
+            _meet_robots(near, x, y, radius, rays, robots, robot_count, alive[arena], False)
             if not active:
                 for ray in range(len(near)):
-                    fan.hidden_m[ray], near[ray] = near[ray], np.inf
-            _meet_robots(near, x, y, rim, fan, crowd, robots, alive[arena], True)
+                    rays.visible_m[ray], near[ray] = near[ray], np.inf
+            _meet_robots(near, x, y, radius, rays, robots, robot_count, alive[arena], True)
             for ray in range(len(near)):
                 d = near[ray]
-                if d > fan.range_m or (not active and d > fan.hidden_m[ray]):
+                if d > rays.range_m or (not active and d > rays.visible_m[ray]):
                     d = np.inf
-                near[ray] = _answer(d, fan) if answers else d
+                near[ray] = _answer(d, rays) if answers else d
 
 
 @kernel()
-def _turn(fan, heading):
-    """Set the directions of the rays of a robot."""
+def _turn(rays, heading):
+    """Rotate the ray directions of a robot into the arena's frame."""
     c, s = np.cos(heading), np.sin(heading)
-    for ray in range(len(fan.dx)):
-        fan.dx[ray] = c * fan.cos[ray] - s * fan.sin[ray]
-        fan.dy[ray] = s * fan.cos[ray] + c * fan.sin[ray]
+    for ray in range(len(rays.dx)):
+        rays.dx[ray] = c * rays.cos[ray] - s * rays.sin[ray]
+        rays.dy[ray] = s * rays.cos[ray] + c * rays.sin[ray]
 
 
 @kernel()
-def _meet_walls(near, x, y, rim, fan):
+def _meet_walls(near, x, y, radius, rays):
     for ray in range(len(near)):
-        for at, step, end in ((x, fan.dx[ray], fan.half_x), (y, fan.dy[ray], fan.half_y)):
+        for at, step, end in ((x, rays.dx[ray], rays.half_x), (y, rays.dy[ray], rays.half_y)):
             if step != 0.0:
                 wall = end if step > 0.0 else -end
-                near[ray] = min(near[ray], max((wall - at - rim * step) / step, 0.0))
+                near[ray] = min(near[ray], max((wall - at - radius * step) / step, 0.0))
 
 
 @kernel()
-def _meet_things(near, x, y, rim, fan, things, count):
+def _meet_obstacles(near, x, y, radius, rays, obstacles, count):
     for at in range(count):
         for ray in range(len(near)):
-            dx, dy = fan.dx[ray], fan.dy[ray]
-            near[ray] = min(near[ray], ray_to_obstacle(x + rim * dx, y + rim * dy, dx, dy, things, fan.found[at]))
+            dx, dy = rays.dx[ray], rays.dy[ray]
+            near[ray] = min(
+                near[ray], ray_to_obstacle(x + radius * dx, y + radius * dy, dx, dy, obstacles, rays.nearby[at])
+            )
 
 
 @kernel()
-def _meet_robots(near, x, y, rim, fan, crowd, count, alive, living):
-    """Those of the robots found that are alive, or those that are dead."""
+def _meet_robots(near, x, y, radius, rays, robots, count, alive, is_alive):
+    """Intersect the rays with the nearby robots that are alive, or with those that are dead."""
     for at in range(count):
-        if alive[crowd.found[at]] != living:
+        if alive[robots.nearby[at]] != is_alive:
             continue
-        cx, cy, radius = crowd.found_at[at, 0], crowd.found_at[at, 1], crowd.radius_m[crowd.found[at]]
+        cx, cy, other_radius = robots.nearby_at[at, 0], robots.nearby_at[at, 1], robots.radius_m[robots.nearby[at]]
         ox, oy = cx - x, cy - y
         for ray in range(len(near)):
-            dx, dy = fan.dx[ray], fan.dy[ray]
-            if abs(ox * dy - oy * dx) <= radius + MARGIN_M:
-                near[ray] = min(near[ray], ray_to_circle(x + rim * dx, y + rim * dy, dx, dy, cx, cy, radius))
+            dx, dy = rays.dx[ray], rays.dy[ray]
+            if abs(ox * dy - oy * dx) <= other_radius + MARGIN_M:
+                near[ray] = min(
+                    near[ray], ray_to_circle(x + radius * dx, y + radius * dy, dx, dy, cx, cy, other_radius)
+                )
 
 
 @kernel()
-def _answer(distance, fan):
-    """What a sensor answers to a distance (`ResponseCurve.value`)."""
-    if distance > fan.reach_m:
+def _answer(distance, rays):
+    """The response to a distance (`ResponseCurve.value`)."""
+    if distance > rays.reach_m:
         return 0.0
-    if fan.form == QUADRATIC:
-        value = fan.a * distance * distance + fan.b * distance + fan.c
-    elif distance < fan.full_m:
+    if rays.form == QUADRATIC:
+        value = rays.a * distance * distance + rays.b * distance + rays.c
+    elif distance < rays.full_m:
         value = 1.0
-    elif fan.form == RATIONAL:
-        value = fan.a / (distance + fan.b)
+    elif rays.form == RATIONAL:
+        value = rays.a / (distance + rays.b)
     else:
-        value = fan.a / ((distance + fan.b) * (distance + fan.b))
+        value = rays.a / ((distance + rays.b) * (distance + rays.b))
     return min(max(value, 0.0), 1.0)
 
 
-# --- Proximity: rays from the rim that end at the nearest robot, obstacle or wall, seen through the sensor's response.
-
-
 class ProximitySensor:
-    """Sense `proximity`: value (n, rays), the sensors' answers, 0 to 1. Noise is uniform, and new in every reading."""
+    """Sensor `proximity`: value (n, rays), 0 to 1, the response to the nearest robot, obstacle or wall on each ray.
+
+    Rays start at the rim. Noise is uniform, and new in every reading.
+    """
 
     def __init__(self, scene: Scene, group: Group, spec: ProximitySpec) -> None:
         self._sight = RayArraySight(scene, group, spec, active=True)
@@ -290,7 +290,7 @@ class ProximitySensor:
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """What every ray of every robot of the group would answer without noise."""
+        """The noise-free response of every ray of every robot of the group."""
         return (self._sight.answer(),)
 
     def distance_m(self) -> FloatArray:
@@ -298,11 +298,11 @@ class ProximitySensor:
         return self._sight.distance_m()
 
 
-# --- Passive infrared: rays from the rim that end at the nearest robot alive, unless something stands before it.
-
-
 class InfraredSensor:
-    """Sense `infrared`: value (n, rays), the answers to other robots' light, 0 to 1. Noise is uniform."""
+    """Sensor `infrared`: value (n, rays), 0 to 1, the response to the infrared light of other robots.
+
+    Rays start at the rim and end at the nearest robot that is alive, unless something blocks them. Noise is uniform.
+    """
 
     def __init__(self, scene: Scene, group: Group, spec: InfraredSpec) -> None:
         self._sight = RayArraySight(scene, group, spec, active=False)
@@ -310,5 +310,5 @@ class InfraredSensor:
         self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """What every ray of every robot of the group would answer without noise."""
+        """The noise-free response of every ray of every robot of the group."""
         return (self._sight.answer(),)

@@ -17,28 +17,28 @@ from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, 
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
 TURN_RAD = 2.0 * np.pi
-SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, however numbers are rounded
+SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, despite rounding
 
 
 class Laser(NamedTuple):
-    """The sheet as kernels take it, and room for what they find out of one robot."""
+    """The spec of a scanner for kernels, and buffers for one robot."""
 
-    first: int  # robot of the group
+    first: int  # robot index of the group's first robot
     cos: FloatArray  # (rays,) directions in the body's frame
     sin: FloatArray  # (rays,)
     first_rad: float
     step_rad: float
     range_m: float
     at_m: float
-    half_x: float  # where walls stand; inf: nowhere
+    half_x: float  # of the walls, in m; inf: no walls
     half_y: float
     dx: FloatArray  # (rays,) directions in the arena's frame
     dy: FloatArray  # (rays,)
-    found: IntArray  # (things,)
+    nearby: IntArray  # (obstacles,) buffer
 
 
 class ScanSensor:
-    """Sense `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
+    """Sensor `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
 
     def __init__(self, scene: Scene, group: Group, spec: ScanSpec) -> None:
         noise = Noise("normal", spec.noise_m, spec.noise_relative)
@@ -46,8 +46,8 @@ class ScanSensor:
             Field("range_m", spec.rays, noise, spec.step, low=spec.range_min_m, high=spec.range_m, blank=np.inf),
         )
         self._shape = len(scene.keys), group.stop - group.start, spec.rays
-        self._crowd = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
-        self._standing = ObstacleIndices(scene, spec.range_m)
+        self._robots = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
+        self._obstacles = ObstacleIndices(scene, spec.range_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._laser = Laser(
             group.start,
@@ -60,45 +60,47 @@ class ScanSensor:
             0.5 * height if walled else np.inf,
             np.empty(spec.rays),
             np.empty(spec.rays),
-            np.empty(len(self._standing.now().shape), np.int64),
+            np.empty(len(self._obstacles.now().shape), np.int64),
         )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The distance along every ray of every robot of the group."""
         near = np.empty(self._shape)
-        _scan(near, self._crowd, self._standing.now(), self._laser)
+        _scan(near, self._robots, self._obstacles.now(), self._laser)
         return (near,)
 
 
 @kernel(from_python=True)
-def _scan(near, crowd, things, laser):
+def _scan(near, robots, obstacles, laser):
     """Set near (arenas, n, rays)."""
-    sort(crowd.cells, crowd.state, crowd.running)
+    sort(robots.cells, robots.state, robots.running)
     for arena in range(near.shape[0]):
-        if not crowd.running[arena]:
+        if not robots.running[arena]:
             continue
         for i in range(near.shape[1]):
             own, rays = laser.first + i, near[arena, i]
-            heading = crowd.state[arena, own, 2]
-            c, s, low, high = np.cos(heading), np.sin(heading), crowd.bottom_m[own], crowd.top_m[own]
-            x = crowd.state[arena, own, 0] + laser.at_m * c
-            y = crowd.state[arena, own, 1] + laser.at_m * s
-            x = nearest(0.0, x, crowd.wrap_x, crowd.per_wrap_x)
-            y = nearest(0.0, y, crowd.wrap_y, crowd.per_wrap_y)
+            heading = robots.state[arena, own, 2]
+            c, s, low, high = np.cos(heading), np.sin(heading), robots.bottom_m[own], robots.top_m[own]
+            x = robots.state[arena, own, 0] + laser.at_m * c
+            y = robots.state[arena, own, 1] + laser.at_m * s
+            x = nearest(0.0, x, robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, y, robots.wrap_y, robots.per_wrap_y)
             for ray in range(len(rays)):
                 laser.dx[ray] = c * laser.cos[ray] - s * laser.sin[ray]
                 laser.dy[ray] = s * laser.cos[ray] + c * laser.sin[ray]
                 rays[ray] = np.inf
             _meet_walls(rays, x, y, laser)
-            for at in range(obstacles_near(laser.found, things, arena, x, y, laser.range_m, low)):
-                k = laser.found[at]
-                if things.side_start[k] == things.side_start[k + 1]:
-                    _meet_disc(rays, x, y, heading, laser, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
+            for at in range(obstacles_near(laser.nearby, obstacles, arena, x, y, laser.range_m, low)):
+                k = laser.nearby[at]
+                if obstacles.side_start[k] == obstacles.side_start[k + 1]:
+                    _meet_disc(
+                        rays, x, y, heading, laser, obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]
+                    )
                 else:
-                    _meet_polygon(rays, x, y, heading, laser, things, k)
-            for at in range(near_robots(crowd, arena, own, x, y, laser.range_m, low, high)):
-                radius = crowd.radius_m[crowd.found[at]]
-                _meet_disc(rays, x, y, heading, laser, crowd.found_at[at, 0], crowd.found_at[at, 1], radius)
+                    _meet_polygon(rays, x, y, heading, laser, obstacles, k)
+            for at in range(near_robots(robots, arena, own, x, y, laser.range_m, low, high)):
+                radius = robots.radius_m[robots.nearby[at]]
+                _meet_disc(rays, x, y, heading, laser, robots.nearby_at[at, 0], robots.nearby_at[at, 1], radius)
             for ray in range(len(rays)):
                 if rays[ray] > laser.range_m:
                     rays[ray] = np.inf
@@ -133,12 +135,12 @@ def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
 
 
 @kernel()
-def _meet_polygon(rays, x, y, heading, laser, things, k):
-    right, width = _seen(x, y, things, k)
+def _meet_polygon(rays, x, y, heading, laser, obstacles, k):
+    right, width = _seen(x, y, obstacles, k)
     for past_last in range(2):
         first, stop = _span(right - heading, width, past_last, laser)
         for ray in range(first, stop):
-            rays[ray] = min(rays[ray], ray_to_polygon(x, y, laser.dx[ray], laser.dy[ray], things, k))
+            rays[ray] = min(rays[ray], ray_to_polygon(x, y, laser.dx[ray], laser.dy[ray], obstacles, k))
 
 
 @kernel()
@@ -155,15 +157,15 @@ def _span(right, width, past_last, laser):
 
 
 @kernel()
-def _seen(x, y, things, k):
+def _seen(x, y, obstacles, k):
     """The direction of the rightmost corner of a polygon, and how wide it looks; all around from inside."""
-    begin, end = things.side_start[k], things.side_start[k + 1]
+    begin, end = obstacles.side_start[k], obstacles.side_start[k + 1]
     outside = False
-    right_x, right_y = things.side[begin, 0] - x, things.side[begin, 1] - y
+    right_x, right_y = obstacles.side[begin, 0] - x, obstacles.side[begin, 1] - y
     left_x, left_y = right_x, right_y
     for i in range(begin, end):
-        outside = outside or things.side[i, 2] * x + things.side[i, 3] * y > things.side[i, 4]
-        cx, cy = things.side[i, 0] - x, things.side[i, 1] - y
+        outside = outside or obstacles.side[i, 2] * x + obstacles.side[i, 3] * y > obstacles.side[i, 4]
+        cx, cy = obstacles.side[i, 0] - x, obstacles.side[i, 1] - y
         if right_x * cy - right_y * cx < 0.0:
             right_x, right_y = cx, cy
         if left_x * cy - left_y * cx > 0.0:

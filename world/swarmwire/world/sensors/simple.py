@@ -1,4 +1,4 @@
-"""The battery's gauge: its charge, and a voltage that falls evenly with it."""
+"""Sensors that read the robot's own state: battery, bumper, compass, positioning, odometry and ground colour."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -24,9 +24,11 @@ from swarmwire.comms.kernels import kernel
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
+SLIP, WHEEL = purpose("odometry slip"), purpose("odometry wheel")
+
 
 class BatterySensor:
-    """Sense `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,)."""
+    """Sensor `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,), which falls linearly with the charge."""
 
     def __init__(self, scene: Scene, group: Group, spec: BatterySpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
@@ -42,26 +44,20 @@ class BatterySensor:
         return charge, empty_v + charge * (self._spec.full_v - empty_v)
 
 
-# --- The bumper: whether the body touched anything in the tick before.
-
-
 class BumperSensor:
-    """Sense `bumper`: pressed (n,), 1 if the body touched a robot, an obstacle or a wall in the tick before, else 0."""
+    """Sensor `bumper`: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
 
     def __init__(self, scene: Scene, group: Group, spec: BumperSpec) -> None:
         self._scene, self._group = scene, group
         self.fields = (Field("pressed", blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """Which robots of the group touched anything."""
+        """The contact flag of every robot of the group."""
         return (self._scene.touched[:, self._group.start : self._group.stop].copy(),)
 
 
-# --- The compass: heading in the arena's frame, with a normal error that is new in every tick.
-
-
 class CompassSensor:
-    """Sense `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x."""
+    """Sensor `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x; normal noise, new in every tick."""
 
     def __init__(self, scene: Scene, group: Group, spec: CompassSpec) -> None:
         self._scene, self._group = scene, group
@@ -69,15 +65,15 @@ class CompassSensor:
         self.fields = (Field("heading_rad", noise=noise, step=spec.step, angle=True, span=(-pi, pi)),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The heading of every robot of the group, with the full turns that it has made."""
+        """The heading of every robot of the group, not wrapped."""
         return (self._scene.state[:, self._group.start : self._group.stop, 2].copy(),)
 
 
-# --- Positioning: where a robot is in the arena's frame, with a normal error that is new in every tick.
-
-
 class PositioningSensor:
-    """Sense `positioning`: x_m, y_m (n,), in m, arena frame. An outlier is anywhere in the arena."""
+    """Sensor `positioning`: x_m, y_m (n,), in m, arena frame; normal noise, new in every tick.
+
+    An outlier is anywhere in the arena.
+    """
 
     def __init__(self, scene: Scene, group: Group, spec: PositioningSpec) -> None:
         self._scene, self._group = scene, group
@@ -93,63 +89,54 @@ class PositioningSensor:
         return state[:, :, 0].copy(), state[:, :, 1].copy()
 
 
-# --- Wheel encoders: travel since the start, with errors that add up, in whole steps.
-
-
-SLIP, WHEEL = purpose("odometry slip"), purpose("odometry wheel")
-
-
 class OdometrySensor:
-    """Sense `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
+    """Sensor `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
 
-    Errors belong to the travel, each tick's slip and each wheel's size, so they are part of what is counted, not of a
-    reading.
+    Errors add up: slip changes the travel of each tick, the size of a wheel changes all of it. They are part of the
+    measured travel, not of a reading.
     """
 
     def __init__(self, scene: Scene, group: Group, spec: OdometrySpec) -> None:
         self._scene, self._group, self._spec = scene, group, spec
         self.fields = (Field("left_m", step=spec.step), Field("right_m", step=spec.step))
-        self._rolled_m = scene.travel_m[:, group.start : group.stop].copy()
-        self._told_m = self._rolled_m.copy()
+        self._counted_m = scene.travel_m[:, group.start : group.stop].copy()
+        self._measured_m = self._counted_m.copy()
         robots = np.arange(group.start, group.stop)
         drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(2), WHEEL)
         self._scale = 1.0 + spec.wheel_error_std * drawn  # (arenas, n, wheels)
 
     def follow(self, tick: int) -> None:
-        """Add the travel since the last tick, with a slip of its own: how often an agent looks changes nothing."""
+        """Add the travel since the last tick, with its slip; the result does not depend on how often an agent reads."""
         scene, start = self._scene, self._group.start
-        of, arenas = (self._told_m, self._rolled_m, scene.travel_m), (scene.keys, scene.running)
-        _add_travel(*of, start, self._scale, *arenas, tick, self._spec.slip)
+        travel, arena_state = (self._measured_m, self._counted_m, scene.travel_m), (scene.keys, scene.running)
+        _add_travel(*travel, start, self._scale, *arena_state, tick, self._spec.slip)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The travel that the encoders of every robot show."""
+        """The travel that the encoders of every robot measure."""
         self.follow(tick)
         step_m = self._spec.step_m
-        shown = np.floor(self._told_m / step_m) * step_m if step_m > 0.0 else self._told_m
+        shown = np.floor(self._measured_m / step_m) * step_m if step_m > 0.0 else self._measured_m
         return shown[:, :, 0].copy(), shown[:, :, 1].copy()
 
 
 @njit(cache=True)
-def _add_travel(told, rolled, travel, start, scale, keys, running, tick, slip):
-    """Add the new travel of both wheels to what was told: times the wheel's scale, times 1 + slip x a normal draw."""
-    for arena in range(told.shape[0]):
+def _add_travel(measured, counted, travel, start, scale, keys, running, tick, slip):
+    """Add the new travel of both wheels to `measured`: times the wheel's scale, times 1 + slip x a normal draw."""
+    for arena in range(measured.shape[0]):
         if not running[arena]:
             continue
-        for i in range(told.shape[1]):
+        for i in range(measured.shape[1]):
             for wheel in range(2):
-                now = travel[arena, start + i, wheel]
-                new = (now - rolled[arena, i, wheel]) * scale[arena, i, wheel]
+                total = travel[arena, start + i, wheel]
+                step_travel = (total - counted[arena, i, wheel]) * scale[arena, i, wheel]
                 if slip > 0.0:
-                    new *= 1.0 + slip * normal(keys[arena], start + i, tick, wheel, SLIP)
-                told[arena, i, wheel] += new
-                rolled[arena, i, wheel] = now
-
-
-# --- Ground colour: the shade of the floor at points of the body's frame. Compiled.
+                    step_travel *= 1.0 + slip * normal(keys[arena], start + i, tick, wheel, SLIP)
+                measured[arena, i, wheel] += step_travel
+                counted[arena, i, wheel] = total
 
 
 class GroundSensor:
-    """Sense `ground`: shade (n, points), 0 black to 1 white, of the floor under each point. Noise is uniform."""
+    """Sensor `ground`: shade (n, points), 0 black to 1 white, of the floor under each point. Noise is uniform."""
 
     def __init__(self, scene: Scene, group: Group, spec: GroundSpec) -> None:
         self._scene, self._group = scene, group
