@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import zenoh
 
-from swarmwire.agent.runner import TickInbox, answers, given_robots
+from swarmwire.agent.runner import TickInbox, answers, assigned_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
@@ -34,7 +34,7 @@ class EncodedBackend:
         """Let each runner join, decode its robots and make its agents."""
         for number in range(self._parts):
             name, inbox = f"r{number}", TickInbox()
-            assignment, memory = given_robots(self._lockstep.join(name, JoinRequest().encode()))
+            assignment, memory = assigned_robots(self._lockstep.join(name, JoinRequest().encode()))
             self._runners[name] = inbox, answers(assignment, memory, inbox)
             self._lockstep.answer(name, next(self._runners[name][1]))
 

@@ -12,7 +12,7 @@ from swarmwire.agent import API_VERSION
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
-from swarmwire.agent.runner import given_robots
+from swarmwire.agent.runner import assigned_robots
 from swarmwire.comms.config import check_format
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.run_views import ObservedRun
@@ -112,7 +112,7 @@ WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
     "frame": (BadFrame, lambda v: frames.decode(packed(v=v, kind="", tick=0, arrays={}, values={}))),
     "request to join": (BadFrame, lambda v: JoinRequest.decode(packed(v=v))),
     "offer": (BadFrame, lambda v: SessionInfo.decode(packed(v=v))),
-    "assignment": (BadFrame, lambda v: given_robots(packed(v=v))),
+    "assignment": (BadFrame, lambda v: assigned_robots(packed(v=v))),
     "terms of a medium": (BadFrame, lambda v: BridgeInfo.decode(packed(v=v))),
     "scene": (BadFrame, lambda v: observer_frames.decode_scene(frame("scene", v))),
     "truth": (BadFrame, lambda v: observer_frames.decode_truth(frame("truth", v), ObservedRun.__new__(ObservedRun))),

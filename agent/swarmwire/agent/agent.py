@@ -1,4 +1,8 @@
-"""Agent: the code that decides for one robot."""
+"""Agent: the code that controls one robot; and the loading of an agent class from the text that names it.
+
+`load_agent` refuses a class before it runs, with the reason (`NoAgent`): no step method, another API version, a
+parameter of another type, or a mutable class attribute, which all robots would share.
+"""
 
 import hashlib
 import inspect
@@ -14,13 +18,13 @@ from swarmwire.comms.plugins import NotLoaded, load_named
 
 
 class Agent(ABC):
-    """Decides for one robot, from what that robot alone senses and hears. One instance per robot.
+    """Controls one robot, from the sensors and received packets of that robot alone. One instance per robot.
 
-    Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs; what it should
-    remember it keeps in attributes of its own, made in `__init__`. `needs` names the senses of the body that it reads
-    ("proximity", "compass", "odometry"), what it reads of a packet ("radio.range", "radio.bearing"), and
-    "radio.tx_status" if it wants to know what became of packets that it sent to one robot. `api = 1` in its class says
-    for which version of swarmwire.agent it was written: any other refuses it.
+    Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs. Its memory is in
+    attributes that it makes in `__init__`. `needs` names the sensors of the body that it reads ("proximity", "compass",
+    "odometry"), the measurements of a packet that it reads ("radio.range", "radio.bearing"), and "radio.tx_status" for
+    one status per unicast packet that it sends. `api = 1` in its class names the version of swarmwire.agent that it was
+    written for; any other version refuses it.
     """
 
     api: ClassVar[int] = API_VERSION
@@ -28,42 +32,39 @@ class Agent(ABC):
 
     @abstractmethod
     def step(self, robot: Robot) -> None:
-        """Called once a tick in which the robot acts: read `robot`, then drive and send."""
+        """Called once per tick in which the robot acts: read `robot`, then drive and send."""
 
     def on_receive(self, robot: Robot) -> None:  # noqa: B027 - most agents read in `step` alone
-        """If it is defined: called between steps when packets have come, in real time with a subtick; read and send.
+        """Optional: called between steps when packets have arrived, in real time with a sub-tick; read and send.
 
-        What it is given, the next step is not. The senses are those of the last step, the time is now. Driving, lights,
-        actuators and notes are for `step`. Elsewhere (lockstep, real time without a subtick, a real robot) it is never
-        called, and all packets wait for the step: an agent must do without.
+        Its packets are not passed to the next step again. The sensors are those of the last step; the time is now.
+        Driving, LEDs, actuators and notes belong in `step`. Elsewhere (lockstep, real time without a sub-tick, a real
+        robot) it is never called and all packets wait for the step, so an agent must work without it.
         """
 
 
-# --- From the text that names an agent to its class.
-
-
-AgentClass = type[Agent] | type[VectorAgent[Any]]  # what a scenario's `agent` names
+AgentClass = type[Agent] | type[VectorAgent[Any]]  # named by a scenario's `agent`
 
 
 class NoAgent(ValueError):
-    """The text does not lead to an agent class; the message says at which point."""
+    """The text does not name a usable agent class; the message says why."""
 
 
 def load_agent(spec: str) -> AgentClass:
     """The class of "package.module:Class" or "/path/file.py:Class"; NoAgent if it is none."""
     try:
-        found = load_named(spec)
+        loaded = load_named(spec)
     except NotLoaded as error:
         raise NoAgent(str(error)) from error.__cause__
-    place, _, name = spec.rpartition(":")
-    if not isinstance(found, type) or not issubclass(found, Agent | VectorAgent):
-        raise NoAgent(f"{place} holds no Agent or VectorAgent: {name!r}")
-    kind = cast(AgentClass, found)
+    module, _, name = spec.rpartition(":")
+    if not isinstance(loaded, type) or not issubclass(loaded, Agent | VectorAgent):
+        raise NoAgent(f"{module} holds no Agent or VectorAgent: {name!r}")
+    kind = cast(AgentClass, loaded)
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
     if kind.api != API_VERSION:
         raise NoAgent(f"{name}.api: expected {API_VERSION}, which swarmwire.agent has here, got {kind.api!r}")
-    needs: Any = kind.needs  # the user's: it may be anything
+    needs: Any = kind.needs  # user code: any type
     if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
         raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')
     shared = [attribute for base in kind.__mro__ for attribute in vars(base).items() if _is_shared(*attribute)]
@@ -78,9 +79,9 @@ def load_agent(spec: str) -> AgentClass:
 
 
 def agent_sha256(kind: AgentClass) -> str:
-    """The sha256 of the file in which an agent's class is defined, by which two machines tell that they have the same.
+    """The sha256 of an agent's source file, by which two machines check that they have the same agent.
 
-    NoAgent if it has none: a class that was typed in at a prompt.
+    NoAgent if it has none, such as a class that was typed in at a prompt.
     """
     try:
         path = inspect.getfile(kind)

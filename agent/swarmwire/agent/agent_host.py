@@ -1,14 +1,15 @@
-"""An agent host: one process that imports what runners need, then forks a runner for each name it is given.
+"""An agent host: a process that imports the code of runners, then forks a runner for each name on its command line.
 
-Forking after the import makes a thousand runners cheap: they start in milliseconds and share the code's memory. The
-agent host itself never opens a zenoh session (one opened in a child of a process that has had one hangs). It is a
-program of its own rather than multiprocessing's fork server, which would run the user's script again in every runner.
+Forking after the import makes a thousand runners cheap: they start in milliseconds and share the memory of the code.
+The agent host itself never opens a zenoh session, because a session opened in the child of a process that has had one
+hangs. It is a program of its own rather than multiprocessing's fork server, which would run the user's script again in
+every runner.
 
-Only some runners are on their way to their robots at a time; the next is forked as soon as one has got its own. If a
-thousand connected and asked at once, each would wait for all others, and some longer than a query is kept.
+Only some runners join at a time; the next is forked as soon as one has its robots. If a thousand joined at once, each
+would wait for all others, some for longer than a query lasts.
 
-Standard input is the life line: when it ends, the world is gone, and so are all runners. A runner that ends badly is
-reported as one line on standard output: its name and its exit code.
+Standard input is the life line: its end means that the world is gone, and all runners are killed. A runner that fails
+is reported as one line on standard output: its name and its exit code.
 """
 
 import gc
@@ -34,17 +35,17 @@ from swarmwire.comms.wire.sessions import PRIVATE
 __all__ = ["host", "main"]  # the host is imported here so that its code is shared
 
 POLL_MS = 50
-AT_ONCE = 32  # runners that have no robots yet
-PID = struct.Struct("i")  # as a runner that got its robots writes it
+AT_ONCE = 32  # runners that have no robots yet; more are forked later
+PID = struct.Struct("i")  # written by a runner that has its robots
 
 
 def main(arguments: list[str]) -> int:
     """`endpoint run_id agent,agent,… runner runner …`: fork the runners and wait for them all."""
     endpoint, run_id, agents, *names = arguments
     reports = os.dup(1)
-    os.dup2(2, 1)  # what agents print is for people, not for the world that reads the reports
+    os.dup2(2, 1)  # output of agents must not reach the world that reads the reports
     for agent in agents.split(","):
-        with suppress(NoAgent):  # the runner finds it again and reports it
+        with suppress(NoAgent):  # the runner fails as well, and reports it
             load_agent(agent)
     gc.freeze()  # the collector would write to, and so copy, every shared page
     joined, tell_joined = os.pipe()
@@ -82,9 +83,9 @@ def _runner(endpoint: str, run_id: str, name: str, tell_joined: int) -> int:
 
 def _tend(names: Sequence[str], forked: Callable[[str], int], joined: int, reports: int) -> bool:
     """Fork a runner of each name, and whether all ended; False: the world did, and they were ended with it."""
-    news = select.poll()
-    news.register(0, select.POLLIN | select.POLLHUP)  # the life line
-    news.register(joined, select.POLLIN)
+    poll = select.poll()
+    poll.register(0, select.POLLIN | select.POLLHUP)  # the life line
+    poll.register(joined, select.POLLIN)
     to_fork, joining, children = list(reversed(names)), set[int](), dict[int, str]()
     while to_fork or children:
         while to_fork and len(joining) < AT_ONCE:
@@ -92,12 +93,12 @@ def _tend(names: Sequence[str], forked: Callable[[str], int], joined: int, repor
             child = forked(name)
             children[child] = name
             joining.add(child)
-        received = {of for of, _ in news.poll(POLL_MS)}
-        if 0 in received:
+        readable = {file for file, _ in poll.poll(POLL_MS)}
+        if 0 in readable:
             for child in children:
                 os.kill(child, signal.SIGKILL)
             return False
-        if joined in received:
+        if joined in readable:
             joining.difference_update(pid for (pid,) in PID.iter_unpack(os.read(joined, AT_ONCE * PID.size)))
         child, status = os.waitpid(-1, os.WNOHANG)
         while child:
@@ -110,7 +111,7 @@ def _tend(names: Sequence[str], forked: Callable[[str], int], joined: int, repor
 
 
 def _remove_socket(endpoint: str) -> None:
-    """A world that was killed cannot take away the private directory of its socket."""
+    """Remove the private directory of the socket of a world that was killed."""
     directory = Path(endpoint.partition("/")[2]).parent
     if directory.name.startswith(PRIVATE):
         shutil.rmtree(directory, ignore_errors=True)

@@ -1,4 +1,8 @@
-"""`swarmwire-agent`: runs an agent on a robot, says whether it could, lists drivers, stops motors, joins a run."""
+"""The command `swarmwire-agent`: run or check an agent on a robot, list drivers, stop motors, join a run.
+
+`run` turns this process into the guard, which starts the agent in a child process (the hidden option `--heartbeats`
+names the pipe to the guard). Modules of a robot are imported in their commands, to keep the guard's start short.
+"""
 
 import argparse
 import os
@@ -34,8 +38,8 @@ ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in e
 
 Keep a hand near the robot's switch, and lift it off the floor the first time. Motors stop when
 the agent is late, fails, freezes or is killed, on Ctrl-C and on an emergency stop. A robot that
-is out of reach does what it was told last, unless it has a watchdog of its own, and is stopped
-first of all when it answers again."""
+is out of reach keeps executing its last command, unless it has a watchdog of its own, and is
+stopped first of all when it answers again."""
 EXAMPLE = """examples:
   swarmwire-agent drivers
   swarmwire-agent check avoid.py:Avoid --driver epuck2 --address 192.168.1.23
@@ -60,18 +64,18 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and end."""
+        """Print the fault, and exit."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}; {self.prog} --help tells more\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The exit code of a command."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    parsed = _parser().parse_args(given, argparse.Namespace(given=given))
+    """Run a command; returns the exit code."""
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
+    parsed = _parser().parse_args(command_line, argparse.Namespace(command_line=command_line))
     try:
         return _COMMANDS[parsed.command](parsed)
     except BadInput as error:
-        sys.stderr.write(f"{_told(error, parsed)}\n")
+        sys.stderr.write(f"{_with_flag(error, parsed)}\n")
         return BAD_INPUT
     except SwarmwireError as error:
         sys.stderr.write(f"{error}\n")
@@ -80,8 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _told(error: BadInput, parsed: argparse.Namespace) -> BadInput:
-    """The fault, told of the flag that it came by, if it did."""
+def _with_flag(error: BadInput, parsed: argparse.Namespace) -> BadInput:
+    """The fault, attributed to the flag that caused it, if one did."""
     if parsed.command in ("drivers", "join") or error.where != _where(parsed):
         return error
     return by_flag(error, error.where, flags_in(parsed))
@@ -101,17 +105,17 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
         command.add_argument("--config", metavar="FILE", type=Path, help="the robot's settings; flags override them")
         add_flags(command, only_driver=name == "stop-motors")
-        shown = None if name == "run" else argparse.SUPPRESS
+        hidden = None if name == "run" else argparse.SUPPRESS
         command.add_argument(
             "--duration-s",
             metavar="S",
             type=_duration,
-            help=shown or "end after so long; else it runs until it is ended",
+            help=hidden or "end after so long; else it runs until it is ended",
         )
         command.add_argument(
             "--no-guard",
             action="store_true",
-            help=shown or "do without the process that stops the motors if this one dies: for debuggers",
+            help=hidden or "do without the process that stops the motors if this one dies: for debuggers",
         )
         command.add_argument("--heartbeats", type=int, help=argparse.SUPPRESS)
         command.add_argument("--standby", action="store_true", help=argparse.SUPPRESS)
@@ -133,7 +137,7 @@ def _run(parsed: argparse.Namespace) -> int:
     if parsed.heartbeats is None and not parsed.no_guard:
         from swarmwire.agent.on_robot.guarded import become_guard
 
-        become_guard(settings, parsed.given, ["stop-motors", *parsed.given[1:]])
+        become_guard(settings, parsed.command_line, ["stop-motors", *parsed.command_line[1:]])
     from swarmwire.agent.on_robot.assembly import run_robot
     from swarmwire.agent.on_robot.guard import CLOSED
     from swarmwire.agent.on_robot.plan import robot_config
@@ -144,7 +148,7 @@ def _run(parsed: argparse.Namespace) -> int:
         with by_signals(end, patient=pipe is not None):
             plan = robot_config(settings, _where(parsed), clock)
             return run_robot(plan, clock, end, wall.utc_stamp(), parsed.duration_s, pipe)
-    finally:  # all is closed, whatever was raised
+    finally:  # everything is closed, also after an error
         if pipe is not None:
             with suppress(BrokenPipeError):
                 os.write(pipe, CLOSED)
@@ -164,8 +168,8 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
 
     settings = _settings(parsed, needs_agent=False)
     driver, _ = driver_of(settings, _where(parsed), WallClock())
-    if parsed.standby:  # the guard's: the agent is dead, whatever holds its lock
-        if not _wanted():
+    if parsed.standby:  # started by the guard: the agent is dead, whoever holds its lock
+        if not _is_requested():
             return ENDED
     elif (holder := RobotLock(settings.driver.name, driver, WallClock()).stopped_by_holder()) is not None:
         sys.stdout.write(f"{settings.name}: stopped, for good, by process {holder}, which drives it\n")
@@ -175,13 +179,13 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
         driver.stop()
     finally:
         driver.close()
-    if not parsed.standby:  # whose guard says so
+    if not parsed.standby:  # the guard reports it
         sys.stdout.write(f"{settings.name}: stopped\n")
     return ENDED
 
 
-def _wanted() -> bool:
-    """Wait until the guard asks for it, or needs it no more; whoever ends all processes at once does not end this."""
+def _is_requested() -> bool:
+    """Wait for the guard: whether it requests the stop. Signals sent to all processes do not end this one."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     return sys.stdin.buffer.read(1) != b""

@@ -1,4 +1,10 @@
-"""Vectors: a field's answer, one vector for each packet or robot."""
+"""Vector fields for VectorAgents: from packets and rays to a steering command.
+
+Fields of neighbours give a vector per packet, and `mean_received` averages them per robot. They are Reynolds's three
+rules (Flocks, Herds, and Schools, 1987) as primitives of one formula each, with lengths between 0 and 1. Fields of rays
+give a vector per robot, away from near objects. `low_pass` and `hysteresis` keep a command from flickering, and
+`steered` turns a vector into speeds.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,32 +16,32 @@ from swarmwire.agent.readings import ProximityReading
 from swarmwire.comms.arrays import BoolArray, FloatArray
 
 
-@dataclass(slots=True)  # not frozen, which would make each of the many that a step adds up take four times as long
+@dataclass(slots=True)  # not frozen: a step makes many of them, and a frozen one takes four times as long
 class Vectors:
-    """Vectors in the frame of the robot each belongs to, all without a unit, or all in the same one.
+    """Vectors, each in the frame of its robot, all without a unit, or all in the same unit.
 
-    They add up, and a number or an array weighs them: `0.6 * pull - 3.0 * near`.
+    They can be added, and multiplied by a number or an array: `0.6 * pull - 3.0 * near`.
     """
 
     x: FloatArray  # ahead, (k,) for packets or (n,) for robots
     y: FloatArray  # to the left
 
-    __array_ufunc__ = None  # so that an array on the left weighs the vectors, not each element for itself
+    __array_ufunc__ = None  # so that an array on the left multiplies the vectors as a whole
 
     @property
     def length(self) -> FloatArray:
-        """How long they are."""
+        """Lengths."""
         return np.hypot(self.x, self.y)
 
     @property
     def angle_rad(self) -> FloatArray:
-        """Where they point, in [-pi, pi], 0 ahead, positive to the left; 0 for a vector of no length."""
+        """Directions in [-pi, pi], 0 ahead, positive to the left; 0 for a vector of no length."""
         return np.arctan2(self.y, self.x)
 
     def turned(self, by_rad: FloatArray) -> "Vectors":
-        """The same turned to the left, by an angle for each.
+        """The vectors turned to the left, each by its angle.
 
-        By the robot's heading they are along the axes of the compass, by its negative they are back in its frame.
+        Turned by the robot's heading they are along the axes of the compass, by its negative in the robot's frame.
         """
         cosine, sine = np.cos(by_rad), np.sin(by_rad)
         return Vectors(self.x * cosine - self.y * sine, self.x * sine + self.y * cosine)
@@ -62,12 +68,6 @@ def ahead(n: int) -> Vectors:
     return Vectors(np.ones(n), np.zeros(n))
 
 
-# --- Fields of neighbours that were received: a vector for each packet, and their mean over the packets of a robot.
-#
-# The three rules are Reynolds's (Flocks, Herds, and Schools, 1987) as primitives of one formula each. All their vectors
-# are between 0 and 1 long.
-
-
 def attraction(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> Vectors:
     """Towards each neighbour farther than `rest_m`, (k,): min((d - rest_m) / rest_m, 1) long, 0 nearer.
 
@@ -87,37 +87,34 @@ def spacing(range_m: FloatArray, bearing_rad: FloatArray, rest_m: float) -> Vect
 
 
 def alignment(their_heading_rad: FloatArray, own_heading_rad: FloatArray) -> Vectors:
-    """Where each neighbour is heading, (k,), of length 1; both headings (k,) by compasses that agree.
+    """The direction in which each neighbour heads, (k,), of length 1; both headings (k,) by compasses that agree.
 
-    Of packets received the receiver's own is `heading_rad[received.row]`.
+    For received packets, `own_heading_rad` is `heading_rad[received.row]`.
     """
     return along(their_heading_rad - own_heading_rad)
 
 
 def mean_received(received: Packets[Any], of: Vectors) -> Vectors:
-    """The mean of vectors (k,) over the packets that each robot received, (n,); no length for who received nothing."""
+    """The mean of vectors (k,) over the packets that each robot received, (n,); length 0 without packets."""
     packets = np.maximum(received.count(), 1)
     return Vectors(received.sum(of.x) / packets, received.sum(of.y) / packets)
 
 
-# --- Fields of what rays see: a vector for each robot, away from what is near.
-
-
 def repulsion_of_rays(proximity: ProximityReading[Any]) -> Vectors:
-    """Away from what the rays of `proximity` see, (n,): minus the sum of the rays' vectors, each `value` (0 to 1) long.
+    """Away from objects in the rays of `proximity`, (n,): minus the sum of the rays' vectors, each `value` long.
 
-    One that sees a thing at touching distance is a vector of length 1; what is far adds nothing.
+    A `value` is 0 to 1: a ray that touches an object has length 1, a ray that sees none has length 0.
     """
     x, y = proximity.vector_sum()
     return Vectors(-x, -y)
 
 
 def repulsion_of_ranges(range_m: FloatArray, angle_rad: FloatArray, reach_m: float) -> Vectors:
-    """Away from what is nearer than `reach_m`, (n,): minus the mean of the rays' vectors, each 1 - d / reach_m long.
+    """Away from objects nearer than `reach_m`, (n,): minus the mean of the rays' vectors, each 1 - d / reach_m long.
 
-    `range_m` (n, rays) is inf or more than `reach_m` where a ray sees nothing, `angle_rad` (rays,) is where it looks,
-    as a laser scan has them. As a mean over all rays it is the same for a scanner with more of them; a wall that
-    fills the half ahead at distance 0 gives 1 / pi.
+    `range_m` (n, rays) is inf or more than `reach_m` where a ray sees nothing, `angle_rad` (rays,) is its direction, as
+    in a laser scan. As a mean over all rays it does not depend on their number; a wall that fills the half ahead at
+    distance 0 gives 1 / pi.
 
     It is minus the gradient of Khatib's (1986) repulsive potential in the bounded form reach (1 - d / reach)^2 / 2.
     """
@@ -127,29 +124,23 @@ def repulsion_of_ranges(range_m: FloatArray, angle_rad: FloatArray, reach_m: flo
     return Vectors(-x / rays, -y / rays)
 
 
-# --- What keeps a command from flickering: a low-pass and a hysteresis, per robot.
-
-
 def low_pass(before: FloatArray, wanted: FloatArray, period_s: float, time_constant_s: float) -> FloatArray:
-    """What `before` (n,) has become a period later on its way to `wanted` (n,), in their unit.
+    """The low-passed value a period after `before` (n,), with the input `wanted` (n,), in their unit.
 
         y <- y + (u - y) T / (tau + T)
 
-    the first-order lag tau dy/dt = u - y by the backward Euler rule, so that no tau is too short for the period: with
-    tau = 0 it is at once what is wanted.
+    the first-order lag tau dy/dt = u - y by the backward Euler rule, which is stable for any tau: with tau = 0 the
+    value equals the input at once.
     """
     return before + (wanted - before) * (period_s / (time_constant_s + period_s))
 
 
 def hysteresis(on: BoolArray, value: FloatArray, rises_to: float, falls_to: float) -> BoolArray:
-    """Whether each is on, (n,): goes on at `rises_to` or more, off at `falls_to` or less, stays as it was in between.
+    """Whether each is on, (n,): on at `rises_to` or more, off at `falls_to` or less, unchanged in between.
 
     Schmitt's trigger, with `falls_to` below `rises_to`, all in the unit of `value` (n,); nan changes nothing.
     """
     return (on | (value >= rises_to)) & ~(value <= falls_to)
-
-
-# --- From the vector that a robot wants to follow to how it drives.
 
 
 def steered(wanted: Vectors, speed_mps: float, turn_gain_per_s: float) -> tuple[FloatArray, FloatArray]:
@@ -157,8 +148,8 @@ def steered(wanted: Vectors, speed_mps: float, turn_gain_per_s: float) -> tuple[
 
         v = speed_mps max(cos a, 0),    w = turn_gain_per_s a
 
-    with a the angle to what is wanted: the more a robot has to turn the slower it drives, and what is behind it it
-    turns to on the spot. Where nothing is wanted it drives straight on.
+    with a the angle of the vector: the more a robot has to turn the slower it drives, and it turns on the spot towards
+    a vector to its rear. For a vector of length 0 it drives straight on.
     """
     angle = wanted.angle_rad
     return speed_mps * np.maximum(np.cos(angle), 0.0), turn_gain_per_s * angle

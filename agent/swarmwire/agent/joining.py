@@ -1,5 +1,10 @@
-"""Joining a run from elsewhere: which run it is, what it offers, and with which agents of its own a runner comes."""
+"""Joining a run from another machine, and the command `swarmwire-agent join`.
 
+`join` opens a session, chooses the run at the endpoint, asks the world for its session info, loads this machine's
+agents, and runs the robots that the world assigns. The command adds flags, messages and exit codes.
+"""
+
+# zenoh's stubs leave out the types of the answers of a session.
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import argparse
@@ -36,30 +41,27 @@ from swarmwire.comms.wire.sessions import closed_after, open_runner
 if TYPE_CHECKING:
     from swarmwire.agent.runner import TickInbox
 
-# zenoh's stubs leave out the types of what a session answers.
-
-
-POLL_S = 5.0  # for worlds at an endpoint: a router may have to find its own first
-OTHERS_S = 0.3  # for further worlds after the first
-OFFER_S = 10.0
-BY_ALL = ""  # in place of a group's name
+POLL_S = 5.0  # for worlds at an endpoint: a router may have to find them first
+FURTHER_POLL_S = 0.3  # for further worlds after the first
+SESSION_INFO_TIMEOUT_S = 10.0
+ALL_GROUPS = ""  # in place of a group's name
 
 
 @dataclass(frozen=True)
 class Joining:
-    """How somebody joins a run.
+    """The settings of a runner that joins a run.
 
     Attributes:
-        endpoint: where the world, or a router before it, listens.
-        robots: how many; None, and no names: all that are free, or the next part.
-        names: of the robots.
-        agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; else as the scenario writes them, beside it if
-            it was named, else here.
+        endpoint: the endpoint of the world, or of a router in front of it.
+        robots: number of robots; None, without names: all free robots, or the next part.
+        names: names of the robots.
+        agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; otherwise the scenario's, relative to the folder
+            of `scenario` or else to the working directory.
         scenario: a file that must be that of the run; None: any.
-        name: of the runner; None: that of its certificate, or one made up.
-        run: its id; None: the only one at the endpoint.
+        name: name of the runner; None: that of its certificate, or a generated one.
+        run: id of the run; None: the only one at the endpoint.
         network: the certificates.
-        connect_s: how long the endpoint is called.
+        connect_s: timeout of the connection to the endpoint.
     """
 
     endpoint: str
@@ -73,7 +75,7 @@ class Joining:
     connect_s: float = 10.0
 
     def check(self) -> None:
-        """BadInput for what cannot be asked for at all."""
+        """BadInput for settings that no run can satisfy."""
         self.network.check_endpoint(self.endpoint, "", "ENDPOINT")
         if self.robots is not None and self.names is not None:
             raise BadInput("--robots", "", "expected only one of --robots and --names")
@@ -86,7 +88,7 @@ class Joining:
 
     @property
     def runner(self) -> str:
-        """The runner's name: with certificates it must be the one on its own."""
+        """The runner's name; with certificates it must be the name on its own."""
         if self.name is not None:
             return self.name
         if self.network.certificate is not None:
@@ -96,9 +98,9 @@ class Joining:
 
 
 def join(joining: Joining, inbox: TickInbox, say: Callable[[str], None]) -> Ended:
-    """Play robots of a run to its end, or until `inbox.leave()`; `say` is told what people should know.
+    """Run robots of a run to its end, or until `inbox.leave()`; `say` gets messages for the user.
 
-    BadInput for what cannot be asked for, RunnerLost if the world is not there, or says no.
+    BadInput for wrong settings, RunnerLost if the world is not there or refuses the runner.
     """
     joining.check()
     runner = joining.runner
@@ -107,14 +109,16 @@ def join(joining: Joining, inbox: TickInbox, say: Callable[[str], None]) -> Ende
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
         why = "" if "Timeout" in reason else f": {reason}"
-        raise RunnerLost(runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_or_else(joining)}{why}") from error
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"nobody answers at {joining.endpoint}{_certificate_hint(joining)}{why}"
+        ) from error
     with closed_after(session):
         run_id = _chosen_run(session, runner, joining)
         keys = Keys(run_id)
 
         def asked() -> Asked:
-            offer = _offer(session, keys, runner)
-            agents, hashes = _own_agents(offer, joining, say)
+            info = _session_info(session, keys, runner)
+            agents, hashes = _own_agents(info, joining, say)
             return Asked(JoinRequest(joining.robots, joining.names, hashes, _sha256(joining.scenario)), agents)
 
         def joined(assignment: Assignment) -> None:
@@ -123,16 +127,16 @@ def join(joining: Joining, inbox: TickInbox, say: Callable[[str], None]) -> Ende
         return play(session, keys, runner, inbox, asked, joined)
 
 
-def _or_else(joining: Joining) -> str:
+def _certificate_hint(joining: Joining) -> str:
     return ", or one certificate or the other is not accepted" if joining.network.proves else ""
 
 
 def _chosen_run(session: zenoh.Session, runner: str, joining: Joining) -> str:
-    """The id of the run that is meant, or of the only one at the endpoint."""
+    """The id of the chosen run, or of the only one at the endpoint."""
     endpoint = joining.endpoint
     replies = session.liveliness().get(EVERY_WORLD, timeout=POLL_S)
-    found = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
-    runs = sorted(found or _runs_to_come(session))
+    present = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
+    runs = sorted(present or _awaited_runs(session))
     if joining.run in runs:
         return joining.run
     if len(runs) == 1 and joining.run is None:
@@ -143,21 +147,26 @@ def _chosen_run(session: zenoh.Session, runner: str, joining: Joining) -> str:
     raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
 
 
-def _runs_to_come(session: zenoh.Session) -> set[str]:
-    """The runs that appear soon. Beside a subscription to the same keys, zenoh answers a `get` only sometimes."""
+def _awaited_runs(session: zenoh.Session) -> set[str]:
+    """The runs that appear within a few seconds.
+
+    By a subscription alone: beside one to the same keys, zenoh answers a `get` only sometimes.
+    """
     arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-    looking = session.liveliness().declare_subscriber(EVERY_WORLD, Callback(arrived.put, indirect=False), history=True)
-    found, patience_s = set[str](), POLL_S
+    subscriber = session.liveliness().declare_subscriber(
+        EVERY_WORLD, Callback(arrived.put, indirect=False), history=True
+    )
+    runs, timeout_s = set[str](), POLL_S
     with suppress(queue.Empty):
         while True:
-            found.add(run_of(str(arrived.get(timeout=patience_s).key_expr)))
-            patience_s = OTHERS_S
-    looking.undeclare()
-    return found
+            runs.add(run_of(str(arrived.get(timeout=timeout_s).key_expr)))
+            timeout_s = FURTHER_POLL_S
+    subscriber.undeclare()
+    return runs
 
 
-def _offer(session: zenoh.Session, keys: Keys, runner: str) -> SessionInfo:
-    for reply in session.get(keys.offer(runner), payload=msgpack.packb({"v": VERSION}), timeout=OFFER_S):
+def _session_info(session: zenoh.Session, keys: Keys, runner: str) -> SessionInfo:
+    for reply in session.get(keys.offer(runner), payload=msgpack.packb({"v": VERSION}), timeout=SESSION_INFO_TIMEOUT_S):
         if reply.err is not None:
             raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string())
         if reply.ok is not None:
@@ -169,18 +178,18 @@ def _offer(session: zenoh.Session, keys: Keys, runner: str) -> SessionInfo:
 
 
 def _own_agents(
-    offer: SessionInfo, joining: Joining, say: Callable[[str], None]
+    info: SessionInfo, joining: Joining, say: Callable[[str], None]
 ) -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """By group, the spec and the sha256 of this machine's own agent; what is not here is told, and left out."""
-    given = _given(joining.agents, [group.name for group in offer.groups])
+    """The spec and the sha256 of this machine's own agent, by group; a missing agent is reported and left out."""
+    by_group = _agents_by_group(joining.agents, [group.name for group in info.groups])
     specs: dict[str, str] = {}
     hashes: dict[str, str] = {}
-    for group in offer.groups:
+    for group in info.groups:
         if joining.names is not None and not set(group.free) & set(joining.names):
             continue
-        own = given.get(group.name, given.get(BY_ALL))
-        beside = Path.cwd() if own or joining.scenario is None else joining.scenario.parent
-        spec = resolve(own or group.agent, beside)
+        own = by_group.get(group.name, by_group.get(ALL_GROUPS))
+        folder = Path.cwd() if own or joining.scenario is None else joining.scenario.parent
+        spec = resolve(own or group.agent, folder)
         try:
             hashes[group.name] = agent_sha256(load_agent(spec))
             specs[group.name] = spec
@@ -189,21 +198,18 @@ def _own_agents(
     return specs, hashes
 
 
-def _given(texts: Sequence[str], groups: Sequence[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
+def _agents_by_group(texts: Sequence[str], groups: Sequence[str]) -> dict[str, str]:
+    specs: dict[str, str] = {}
     for text in texts:
         group, equals, spec = text.partition("=")
         if equals and group not in groups:
             raise BadInput("--agent", text, f"expected a group of the run: {', '.join(groups)}")
-        found[group if equals else BY_ALL] = spec if equals else text
-    return found
+        specs[group if equals else ALL_GROUPS] = spec if equals else text
+    return specs
 
 
 def _sha256(path: Path | None) -> str | None:
     return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-# --- `swarmwire-agent join`: plays robots of a run elsewhere, with the agent that is installed here.
 
 
 ABOUT = """Play robots of a run that a world elsewhere has opened with `swarmwire world`.
@@ -212,7 +218,7 @@ The agent is the one that is installed here; its file must be the same as the wo
 
 
 def add_join(command: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
+    """Add the arguments of `swarmwire-agent join`."""
     command.add_argument("endpoint", metavar="ENDPOINT", help="where the world listens: tls/10.0.0.5:7447")
     which = command.add_mutually_exclusive_group()
     which.add_argument("--robots", type=int, metavar="N", help="so many; else all that are free, or the next part")
@@ -230,8 +236,8 @@ def add_join(command: argparse.ArgumentParser) -> None:
 
 
 def join_parsed(parsed: argparse.Namespace) -> int:
-    """Play, and tell how it ended; the exit code."""
-    # Imported here, as below: zenoh takes a moment, which the agent of a robot should not.
+    """Run `swarmwire-agent join`; returns the exit code."""
+    # Imported here, as below: zenoh loads slowly, and the agent of a robot may not use it.
     from swarmwire.comms.wire.network import Network
 
     network = Network(
@@ -240,7 +246,7 @@ def join_parsed(parsed: argparse.Namespace) -> int:
         key=parsed.key,
         insecure=parsed.insecure,
     )
-    return play_told(
+    return join_and_report(
         Joining(
             endpoint=parsed.endpoint,
             robots=parsed.robots,
@@ -259,8 +265,8 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def play_told(joining: "Joining") -> int:
-    """Play, tell on standard error what people should know, and how it ended; the exit code. Errors as `join`."""
+def join_and_report(joining: "Joining") -> int:
+    """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`."""
     from swarmwire.agent.runner import TickInbox
 
     if replace(joining.network, connect=(joining.endpoint,)).warning is not None:
@@ -268,17 +274,17 @@ def play_told(joining: "Joining") -> int:
     inbox = TickInbox()
     with _leaving_by_signals(inbox):
         ended = join(joining, inbox, _say)
-    _say(_TOLD[ended.how] + (f": {ended.why}" if ended.why else ""))
-    return _CODES[ended.how]
+    _say(_END_TEXTS[ended.how] + (f": {ended.why}" if ended.why else ""))
+    return _EXIT_CODES[ended.how]
 
 
-_TOLD = {
+_END_TEXTS = {
     "over": "the run is over",
     "left": "left the run",
     "let go": "the world let it go",
     "gone": "the world is gone, or out of reach",
 }
-_CODES = {"over": ENDED, "left": INTERRUPTED, "let go": FAILED, "gone": FAILED}
+_EXIT_CODES = {"over": ENDED, "left": INTERRUPTED, "let go": FAILED, "gone": FAILED}
 
 
 def _say(text: str) -> None:
@@ -287,13 +293,13 @@ def _say(text: str) -> None:
 
 @contextmanager
 def _leaving_by_signals(inbox: "TickInbox") -> Generator[None]:
-    """While it holds, the first Ctrl-C, or a signal to end, leaves the run; a second Ctrl-C ends at once."""
+    """Within this context, the first Ctrl-C or stop signal leaves the run; a second Ctrl-C ends at once."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {number: now for number in numbers if (now := signal.getsignal(number)) != signal.SIG_IGN}
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         inbox.leave()
-        if signal.SIGINT in before:  # a shell's script has what it starts in the background ignore it
+        if signal.SIGINT in before:  # a background job of a shell script ignores it
             signal.signal(signal.SIGINT, before[signal.SIGINT])
 
     for number in before:

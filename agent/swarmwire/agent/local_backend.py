@@ -1,4 +1,7 @@
-"""The local backend: all agents of a run in this process."""
+"""The local backend: all agents of a run in this process.
+
+Arrays from the wire are read-only. The arrays passed here belong to the world, so they are made read-only as well.
+"""
 
 from swarmwire.agent.host import AgentExecutor
 from swarmwire.comms.arrays import AnyArray
@@ -8,48 +11,42 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 
 
 class LocalBackend:
-    """A AgentBackend whose agents are called directly.
-
-    Arrays are passed, messages are encoded and decoded all the same.
-    """
+    """An AgentBackend that calls its agents directly; messages are still encoded and decoded."""
 
     def __init__(self, assignment: Assignment) -> None:
         self._assignment = assignment
-        self._host: AgentExecutor | None = None
+        self._executor: AgentExecutor | None = None
 
     def start(self) -> None:
         """Make the agents."""
-        self._host = AgentExecutor(self._assignment)
+        self._executor = AgentExecutor(self._assignment)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What every robot does in this tick."""
+        """The actions of all robots in this tick."""
         return self._started().act(tick, _read_only(readings), _received_read_only(received), tx_status)
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Keep this until the robots that it is for step, or hear."""
+        """Keep this until its robots step or read it."""
         self._started().receive(_received_read_only(received), tx_status)
 
     def on_receive(self, tick: int, at_ns: int) -> SentPackets:
-        """Let agents that read between ticks read, at a time in this tick; what they sent."""
+        """Call `on_receive` of agents that define it, at a time in this tick; returns their packets."""
         return self._started().on_receive(tick, at_ns)
 
     def counts(self) -> dict[str, int]:
-        """Nothing is lost within a process."""
+        """Empty: nothing is lost within a process."""
         return {}
 
     def close(self) -> None:
-        """Forget the agents."""
-        self._host = None
+        """Drop the agents."""
+        self._executor = None
 
     def _started(self) -> AgentExecutor:
-        if self._host is None:
+        if self._executor is None:
             raise RuntimeError("the backend has not been started")
-        return self._host
-
-
-# What comes over the wire cannot be written to; what is handed over here must not be either, since it is the world's.
+        return self._executor
 
 
 def _frozen(array: AnyArray) -> AnyArray:

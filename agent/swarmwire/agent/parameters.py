@@ -1,4 +1,7 @@
-"""Parameters of an agent class: its annotated attributes, typed, with defaults; values are checked when it is made."""
+"""Parameters of an agent class: its annotated attributes, typed, with defaults.
+
+`checked` compares the parameters of a scenario with those that the class declares; `make` builds an instance from them.
+"""
 
 import math
 from dataclasses import dataclass
@@ -11,12 +14,12 @@ from swarmwire.comms.config import did_you_mean
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
-OF_THE_CLASS = "needs", "api"  # what a class says of itself, never to be given
+CLASS_ATTRIBUTES = "needs", "api"  # declared by the class, never parameters
 REQUIRED = object()  # in place of a default
 
 
 class BadParameter(ValueError):
-    """A parameter that the agent does not have, lacks or cannot take; `key` is its name."""
+    """A parameter that is unknown, missing or of a wrong value; `key` is its name."""
 
     def __init__(self, key: str, expected: str) -> None:
         self.key, self.expected = key, expected
@@ -34,26 +37,26 @@ class Parameter:
 
 
 def parameters_of(kind: type) -> dict[str, Parameter]:
-    """The parameters that an agent class declares, bases first; TypeError if a type is one that no scenario gives."""
-    found: dict[str, Parameter] = {}
+    """The parameters of an agent class, those of its bases first; TypeError for a type that no scenario can give."""
+    parameters: dict[str, Parameter] = {}
     for name, hint in get_type_hints(kind).items():
-        if name.startswith("_") or name in OF_THE_CLASS or ClassVar in (hint, get_origin(hint)):
+        if name.startswith("_") or name in CLASS_ATTRIBUTES or ClassVar in (hint, get_origin(hint)):
             continue
         per_robot = get_origin(hint) is PerRobot
         if per_robot and VectorAgent not in kind.__mro__:
             raise TypeError(f"{kind.__name__}.{name}: only a VectorAgent has parameters per robot")
-        of = get_args(hint)[0] if per_robot else hint
-        if of not in TYPES:
+        value_type = get_args(hint)[0] if per_robot else hint
+        if value_type not in TYPES:
             raise TypeError(f"{kind.__name__}.{name}: a parameter is a float, int, bool or str")
         default = getattr(kind, name, REQUIRED)
         if isinstance(default, PerRobotDefault):
             default = default.value
-        found[name] = Parameter(name, of, default, per_robot)
-    return found
+        parameters[name] = Parameter(name, value_type, default, per_robot)
+    return parameters
 
 
 def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, Any]:
-    """The given parameters of so many robots, each as its type; BadParameter names the first that is wrong."""
+    """The parameters `params` of `robots` robots, each of its type; BadParameter names the first wrong one."""
     declared = parameters_of(kind)
     for name in params:
         if name not in declared:
@@ -69,13 +72,13 @@ def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, An
 
 def make(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:
     """An instance with these parameters, set before its `__init__` runs; those per robot are arrays (robots,)."""
-    agent, given = kind.__new__(kind), checked(kind, params, robots)
+    agent, values = kind.__new__(kind), checked(kind, params, robots)
     for name, parameter in parameters_of(kind).items():
         if parameter.per_robot:
-            value = given.get(name, parameter.default)
+            value = values.get(name, parameter.default)
             setattr(agent, name, np.array(np.broadcast_to(value, robots), parameter.type))
-        elif name in given:
-            setattr(agent, name, given[name])
+        elif name in values:
+            setattr(agent, name, values[name])
     kind.__init__(agent)
     return agent
 

@@ -1,12 +1,16 @@
-"""A runner: a process that plays some robots of a world behind zenoh, in lockstep or in real time.
+"""A runner: a process that runs the agents of some robots of a world, over zenoh, in lockstep or in real time.
 
-It joins (gets robots), declares its token, builds the agents, says "ready", then answers `tick` frames with one
-`actions` frame each until the world says "end" or is gone, or until it is asked to leave, which it says. In real time
-`packets` frames may come between ticks: agents that read between their steps answer with a `sent` frame, for all others
-they wait for the tick. All that arrives lands in one queue, put there by the network thread itself: no Python thread
-per subscription, so a runner stays small. Where the world keeps memory, each answer carries what the agents remember.
+A runner joins (the world assigns robots), declares its liveliness token, makes the agents and sends "ready". Then it
+answers each `tick` frame with one `actions` frame until the world sends "end" or is gone, or until it is asked to
+leave, which it announces. In real time `packets` frames may arrive between ticks: agents that define `on_receive`
+answer with a `sent` frame, and for all others the packets wait for the tick. Where the world keeps memory, each answer
+carries the memory of the robots.
+
+The network thread puts all that arrives into one queue (`TickInbox`): there is no Python thread per subscription, so a
+runner stays small.
 """
 
+# zenoh's stubs leave out the return types of put, reply and close.
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import math
@@ -34,44 +38,45 @@ from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
-# zenoh's stubs leave out the return types of put, reply and close.
-
-
-JOIN_S = 60.0  # for each step: as long as a world waits for the next runner to join
-POLL_S = 5.0  # for the world, each time
-FAREWELL_S = 3.0
+JOIN_TIMEOUT_S = 60.0  # of each step: as long as a world waits for the next runner to join
+POLL_S = 5.0  # for the world's token
+FAREWELL_TIMEOUT_S = 3.0
 NO_ROBOTS = ""
-TIMED_OUT = "Timeout"  # what zenoh says for a world that says nothing
-NO_ANSWER = f"the world did not answer to join within {JOIN_S:g} s: it stands still, or this machine is too busy"
+TIMED_OUT = "Timeout"  # zenoh's error for a world that does not answer
+NO_ANSWER = (
+    f"the world did not answer to join within {JOIN_TIMEOUT_S:g} s: it stands still, or this machine is too busy"
+)
 
 
 class Ended(NamedTuple):
-    """How a runner's play ended."""
+    """The end of a runner: the run is over, it left, the world removed it, or the world is gone."""
 
     how: Literal["over", "left", "let go", "gone"]
-    why: str = ""  # it was let go
+    why: str = ""  # the world's reason, if it removed the runner
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What a runner asks for when it joins, and its own agents."""
+    """A runner's request to join, and its own agents."""
 
     request: JoinRequest = field(default_factory=JoinRequest)
-    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group; else as the world names them
+    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group, in place of the world's
 
 
-PLAIN = Asked()  # the next part that is free, with the world's own agents
+NEXT_FREE = Asked()  # the next free part, with the world's agents
 
 
 def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], None] = lambda _: None) -> Ended:
-    """Play robots of the run at `endpoint` until it ends; RunnerLost if there is no world or it gives no robots."""
+    """Run robots of the run at `endpoint` to its end; RunnerLost without a world, or if it assigns no robots."""
     try:
-        session = open_runner(endpoint, JOIN_S)
+        session = open_runner(endpoint, JOIN_TIMEOUT_S)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        raise RunnerLost(runner, NO_ROBOTS, f"no connection to its world within {JOIN_S:g} s: {reason}") from error
+        raise RunnerLost(
+            runner, NO_ROBOTS, f"no connection to its world within {JOIN_TIMEOUT_S:g} s: {reason}"
+        ) from error
     with closed_after(session):
-        return play(session, Keys(run_id), runner, TickInbox(), lambda: PLAIN, joined)
+        return play(session, Keys(run_id), runner, TickInbox(), lambda: NEXT_FREE, joined)
 
 
 def play(
@@ -82,11 +87,11 @@ def play(
     asked: Callable[[], Asked],
     joined: Callable[[Assignment], None] = lambda _: None,
 ) -> Ended:
-    """Play robots of a run. `asked` is called once its world is there, `joined` when it gave robots.
+    """Run robots of a run. `asked` is called once its world is there, `joined` when it has assigned robots.
 
-    RunnerLost if there is no world or it gives no robots.
+    RunnerLost without a world, or if it assigns no robots.
     """
-    declared = (  # zenoh takes back what nobody holds on to
+    declared = (  # zenoh undeclares objects without a reference
         session.declare_subscriber(keys.frame(runner), Callback(inbox.put_frame, indirect=False)),
         session.liveliness().declare_token(keys.alive(runner)),
     )
@@ -109,12 +114,12 @@ def play(
 
 
 class TickInbox:
-    """What arrives from the world, put in by the network thread: frames, and whether the world is there.
+    """The queue of a runner, filled by the network thread: frames of the world, and changes of its token.
 
     Attributes:
-        dropped: frames that were no tick to come, or not acted on since a newer one was there.
-        missed: frames with packets that never came.
-        ended: how it ended; meaningless before.
+        dropped: frames that were malformed or out of order, or replaced by a newer tick before they were acted on.
+        missed: `packets` frames that never arrived.
+        ended: how the run ended; meaningless before.
     """
 
     def __init__(self) -> None:
@@ -125,7 +130,7 @@ class TickInbox:
         self.ended = Ended("gone")
 
     def leave(self) -> None:
-        """End the play before its time; may be called from a signal's handler, and before it began."""
+        """Leave the run; may be called from a signal handler, and before the start."""
         self._arrived.put(None)
 
     def put_token(self, token: zenoh.Sample) -> None:
@@ -133,7 +138,7 @@ class TickInbox:
         self._arrived.put(token.kind == zenoh.SampleKind.PUT)
 
     def wait_for_world(self, timeout_s: float) -> bool | None:
-        """Whether the world's token appeared or vanished, None: neither; it declares it last, when it can answer."""
+        """True if the world's token appeared, False if it vanished, None at a timeout. A world declares it last."""
         try:
             while not isinstance(arrived := self._arrived.get(timeout=timeout_s), bool):
                 if arrived is None:
@@ -144,7 +149,7 @@ class TickInbox:
         return arrived
 
     def forget_frames(self) -> None:
-        """Drop what the world sent before it gave robots: to another runner of this name, which it lost."""
+        """Drop the frames from before the assignment: they were for a lost runner of the same name."""
         for _ in range(self._arrived.qsize()):
             arrived = self._arrived.get()
             if arrived is None or isinstance(arrived, bool):
@@ -157,9 +162,9 @@ class TickInbox:
         assignment: Assignment,
         receive: Callable[[ReceivedPackets, TxStatuses], None] = lambda _received, _tx_status: None,
     ) -> Iterator[tuple[int, Readings, ReceivedPackets, TxStatuses] | tuple[int, int]]:
-        """What the newest tick brings, each time, until the world says "end" or is gone; lockstep has but one.
+        """The newest tick's inputs, each time, until the world sends "end" or is gone; in lockstep there is only one.
 
-        What comes between ticks goes to `receive`; where no newer tick is there, its tick and time are given out.
+        Packets between ticks go to `receive`; unless a newer tick has arrived, their tick and time are yielded.
         """
         measures, rows = assignment.measures or (), {group.name: group.rows for group in assignment.groups}
         every = math.gcd(*(group.act_every_ticks for group in assignment.groups))
@@ -196,34 +201,34 @@ class TickInbox:
                     continue
                 if frame.kind != "tick" or frame.tick <= tick or frame.tick % every:
                     raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-                told = decode_tick(frame, measures, rows.keys())
-                check_rows(told[0], told[1], rows)
+                readings, received, tx_status = decode_tick(frame, measures, rows.keys())
+                check_rows(readings, received, rows)
             except BadFrame:
                 self.dropped += 1
                 continue
             self.dropped += newest is not None
-            newest, tick = (frame.tick, *told), frame.tick
+            newest, tick = (frame.tick, readings, received, tx_status), frame.tick
 
     def wait_for_farewell(self) -> None:
-        """Until the world says that it has read that the runner left, or is gone; not for long."""
+        """Wait, for a short time, until the world confirms that the runner left, or is gone."""
         with suppress(queue.Empty, BadFrame):
-            while arrived := self._arrived.get(timeout=FAREWELL_S):
+            while arrived := self._arrived.get(timeout=FAREWELL_TIMEOUT_S):
                 if not isinstance(arrived, bool) and frames.decode(arrived.payload.to_bytes()).kind == "end":
                     return
 
 
 def _watched_world(session: zenoh.Session, keys: Keys, inbox: TickInbox) -> "zenoh.Subscriber[None] | None":
-    """What tells of the world's token, which is there; None: it did not appear in time.
+    """A subscriber to the world's token, once it is there; None if it did not appear in time.
 
-    Where very many come at once, zenoh now and then tells one of them nothing of a token that is there: it asks again.
+    When very many runners join at once, zenoh sometimes does not report an existing token: the runner asks again.
     """
-    for _ in range(round(JOIN_S / POLL_S)):
+    for _ in range(round(JOIN_TIMEOUT_S / POLL_S)):
         watched = session.liveliness().declare_subscriber(
             keys.world, Callback(inbox.put_token, indirect=False), history=True
         )
-        there = inbox.wait_for_world(POLL_S)
-        if there is not None:
-            return watched if there else None
+        present = inbox.wait_for_world(POLL_S)
+        if present is not None:
+            return watched if present else None
         watched.undeclare()
     return None
 
@@ -234,58 +239,57 @@ def _end(frame: frames.Frame) -> Ended:
 
 
 def _join(session: zenoh.Session, keys: Keys, runner: str, asked: Asked) -> tuple[Assignment, Memory | None]:
-    """The robots that the world gives, and what is remembered of them; None: nothing is to be kept."""
-    for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_S):
+    """The robots that the world assigns, and their memory; None: the world keeps no memory."""
+    for reply in session.get(keys.join(runner), payload=asked.request.encode(), timeout=JOIN_TIMEOUT_S):
         if reply.ok is None:
             why = reply.err.payload.to_string() if reply.err else TIMED_OUT
             raise RunnerLost(runner, NO_ROBOTS, NO_ANSWER if why == TIMED_OUT else why)
         try:
-            assignment, kept = given_robots(reply.ok.payload.to_bytes(), asked.agents)
+            return assigned_robots(reply.ok.payload.to_bytes(), asked.agents)
         except BadFrame as fault:
             raise RunnerLost(runner, NO_ROBOTS, f"the world's answer to join is none: {fault}") from fault
-        return assignment, kept
     raise RunnerLost(runner, NO_ROBOTS, "the world did not answer to join")
 
 
-def given_robots(data: bytes, agents: Mapping[str, str] = PLAIN.agents) -> tuple[Assignment, Memory | None]:
-    """The robots that a world gives, and what is remembered of them; BadFrame if these bytes tell none.
+def assigned_robots(data: bytes, agents: Mapping[str, str] = NEXT_FREE.agents) -> tuple[Assignment, Memory | None]:
+    """The robots that a world assigns, and their memory; BadFrame for malformed bytes.
 
     `agents` are the runner's own, by group.
     """
-    given = versioned(data, frames.MAX_BYTES)
-    assignment, memory = Assignment.from_mapping(given).with_agents(agents), given.get("memory")
+    answer = versioned(data, frames.MAX_BYTES)
+    assignment, memory = Assignment.from_mapping(answer).with_agents(agents), answer.get("memory")
     if memory is not None and not isinstance(memory, bytes):
         raise BadFrame("malformed", "memory: expected a frame")
     return assignment, None if memory is None else _memory(assignment, memory)
 
 
 def _memory(assignment: Assignment, data: bytes) -> Memory:
-    """What earlier agents remembered; nothing of those whose memory does not fit these agents, or that is of others."""
+    """The memory of earlier agents, without that which does not fit these agents or is of other robots."""
     frame = frames.decode(data)
     memory: Memory = {}
     for group in assignment.groups:
-        with suppress(BadFrame, NoAgent):  # without memory it starts afresh, and a missing agent is told of later
-            found = decode_memory(frame, {group.name: layout_of(load_agent(group.agent))})
-            if all(np.isin(of.rows, group.rows).all() for of in found.values()):
-                memory |= found
+        with suppress(BadFrame, NoAgent):  # without memory it starts with defaults; a missing agent fails later
+            decoded = decode_memory(frame, {group.name: layout_of(load_agent(group.agent))})
+            if all(np.isin(of_group.rows, group.rows).all() for of_group in decoded.values()):
+                memory |= decoded
     return memory
 
 
 def answers(assignment: Assignment, memory: Memory | None, inbox: TickInbox) -> Iterator[bytes]:
-    """A frame "ready", then an answer to every tick; a failure, if there is one, is the last."""
+    """A frame "ready", then an answer to every tick; a failure is the last frame."""
     try:
-        host = AgentExecutor(assignment, memory)
+        executor = AgentExecutor(assignment, memory)
         yield frames.encode("ready", -1, {})
-        for told in inbox.ticks(assignment, host.receive):
-            if len(told) == 2:
-                if len(sent := host.on_receive(*told)):
+        for inputs in inbox.ticks(assignment, executor.receive):
+            if len(inputs) == 2:
+                if len(sent := executor.on_receive(*inputs)):
                     missed, inbox.missed = inbox.missed, 0
-                    yield encode_sent(told[0], sent, missed)
+                    yield encode_sent(inputs[0], sent, missed)
                 continue
-            tick, readings, received, tx_status = told
-            actions = host.act(tick, readings, received, tx_status)
+            tick, readings, received, tx_status = inputs
+            actions = executor.act(tick, readings, received, tx_status)
             dropped, inbox.dropped = inbox.dropped, 0
-            yield encode_actions(tick, actions, dropped, None if memory is None else host.memory(readings))
+            yield encode_actions(tick, actions, dropped, None if memory is None else executor.memory(readings))
         return
     except AgentFailed as error:
         failure = {"robots": error.robots, "traceback": error.traceback}

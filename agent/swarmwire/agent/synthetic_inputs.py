@@ -1,4 +1,8 @@
-"""Trial: which robots, for how long, with what parameters."""
+"""Synthetic readings, packets and tx statuses for a group of robots, keyed by a seed.
+
+`inputs` yields them tick by tick: readings drawn anew, the packets that the robots sent a tick ago, each received by
+some of the others, tx statuses of unicast packets, and robots that drop out and return.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -25,66 +29,59 @@ from swarmwire.comms.packets import (
 )
 from swarmwire.comms.tick_io import GroupReadings
 
+RATE_HZ = 10
+MEASURES = ("range_m", "bearing_rad", "rssi_dbm")
+DROP_OUT_SHARE = 0.1  # share of the robots missing in a tick
+RECEPTION_SHARE = 0.4  # share of the senders that a robot receives
+STATUS_SHARE = 0.6  # share of the outstanding tx statuses that arrive in a tick
+
 
 @dataclass(frozen=True)
 class Trial:
-    """What to try an agent with: robots whose senses and packets are made up.
+    """A test case for an agent: robots with synthetic readings and packets.
 
-    All that the body senses is drawn anew in each tick. What robots send is received a tick later, by each of the
-    others with probability 0.4, and tx statuses of all kinds are told to an agent that needs them. A tenth of the
-    robots is missing in each tick and starts afresh when it is back.
+    All readings are drawn anew in each tick. A packet is received a tick later, by each of the others with probability
+    0.4, and an agent that needs tx statuses gets all kinds of them. A tenth of the robots is missing in each tick and
+    starts with defaults when it returns.
     """
 
     robots: int = 7  # of one group
     ticks: int = 12  # of a tenth of a second
-    seed: int = 1  # of what they sense, hear and draw
-    body: str | Body = "epuck"  # one that comes with swarmwire, or any other
+    seed: int = 1  # of readings, reception and the robots' draws
+    body: str | Body = "epuck"  # the name of a bundled body, or any body
     params: dict[str, Any] | None = None  # as in a scenario: a list has a value for each robot
 
     @cached_property
     def spec(self) -> Body:
-        """The body's data sheet."""
+        """The body with its specs."""
         return load_body(self.body) if isinstance(self.body, str) else self.body
 
 
-# --- What robots of a trial sense and hear, made up and keyed by its seed.
-#
-# Ragged packets (what robots sent a tick ago, received by some), tx statuses of addressed ones, robots that drop out
-# and come back.
-
-
-RATE_HZ = 10
-GIVEN = ("range_m", "bearing_rad", "rssi_dbm")
-DROP_OUT = 0.1  # share of the robots missing in a tick
-HEARING = 0.4  # share of the senders that a robot hears
-LEARNING = 0.6  # share of the tx statuses still to come that come in a tick
-
-
-class _Ether:
-    """What was sent a tick ago, received at random, and what became of it, told at random."""
+class _Medium:
+    """Delivers the packets of the last tick at random, and their tx statuses at random ticks."""
 
     def __init__(self, key: int) -> None:
         self._key, self._sent = key, SentPackets.none()
-        self._untold = NO_TX_STATUSES
+        self._outstanding = NO_TX_STATUSES
 
     def show(self, sent: SentPackets) -> None:
         self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        asked = np.flatnonzero(self._sent.tx_status_ids != NOT_MEASURED)
-        row, id_ = self._sent.sender[asked], self._sent.tx_status_ids[asked]
+        unicast = np.flatnonzero(self._sent.tx_status_ids != NOT_MEASURED)
+        row, id_ = self._sent.sender[unicast], self._sent.tx_status_ids[unicast]
         chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
         new = TxStatuses(row, id_, (chance * len(TxResult)).astype(np.int64))
-        self._untold = TxStatuses.joined([self._untold, new])
+        self._outstanding = TxStatuses.joined([self._outstanding, new])
 
     def tx_status(self, tick: int) -> TxStatuses:
-        """As the medium would tell them: also to robots that have dropped out, and to those that have forgotten."""
-        comes = _uniform(self._key, tick, "learning", (len(self._untold),)) < LEARNING
-        told, self._untold = (self._untold.select(np.flatnonzero(now)) for now in (comes, ~comes))
-        return told
+        """As from the radio medium: also for robots that are missing, and for those that started anew since."""
+        arrives = _uniform(self._key, tick, "learning", (len(self._outstanding),)) < STATUS_SHARE
+        now, self._outstanding = (self._outstanding.select(np.flatnonzero(mask)) for mask in (arrives, ~arrives))
+        return now
 
     def received(self, tick: int, rows: IntArray) -> ReceivedPackets:
         chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
-        receiver, payload = np.nonzero((chance < HEARING) & (self._sent.sender != rows[:, None]))
-        given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in GIVEN}
+        receiver, payload = np.nonzero((chance < RECEPTION_SHARE) & (self._sent.sender != rows[:, None]))
+        given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in MEASURES}
         at_ns = np.full(len(receiver), tick_start_ns(tick, RATE_HZ) - 1, np.int64)
         sender = self._sent.sender[payload]
         payloads: Payloads = self._sent.payloads
@@ -92,7 +89,7 @@ class _Ether:
 
 
 class SyntheticInputs(NamedTuple):
-    """What a group is given in a tick: time (its number, start and length in ns), senses, packets and tx statuses."""
+    """The inputs of a group in a tick: time (tick, start and length in ns), readings, packets and tx statuses."""
 
     time: tuple[int, int, int]
     readings: GroupReadings
@@ -101,15 +98,15 @@ class SyntheticInputs(NamedTuple):
 
 
 def inputs(trial: Trial) -> Iterator[tuple[SyntheticInputs, Callable[[SentPackets], None]]]:
-    """What the robots are given, tick by tick, and whom to show what they sent."""
+    """The inputs of the robots, tick by tick, each with a call that takes the packets that they send."""
     key, body = draws.derive_key("inputs", trial.seed), trial.spec
-    ether = _Ether(key)
+    medium = _Medium(key)
     for tick in range(trial.ticks):
-        rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT)
+        rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT_SHARE)
         time_ns = tick_start_ns(tick, RATE_HZ)
         time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
-        sensors = GroupReadings(rows, _readings(body, key, tick, rows))
-        yield SyntheticInputs(time, sensors, ether.received(tick, rows), ether.tx_status(tick)), ether.show
+        readings = GroupReadings(rows, _readings(body, key, tick, rows))
+        yield SyntheticInputs(time, readings, medium.received(tick, rows), medium.tx_status(tick)), medium.show
 
 
 def _readings(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
@@ -139,12 +136,12 @@ def _readings(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, Floa
         if isinstance(spec, CustomSensorSpec):
             for field, width in spec.fields.items():
                 fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
-    fields.update(_seen(body, key, tick, n))
+    fields.update(_around_and_below(body, key, tick, n))
     return fields
 
 
-def _seen(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
-    """What senses show that look around or down."""
+def _around_and_below(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
+    """Readings of infrared, scan, ground sensors and camera."""
     fields = dict[str, FloatArray]()
     if body.infrared is not None:
         value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))

@@ -1,6 +1,7 @@
-"""Checks for agents: two classes that are the same rule, and rows that do not see one another.
+"""Checks for agents: two classes implement the same rule, or the rows of a VectorAgent are independent.
 
-Both feed made-up senses and packets through the same host that runs agents anywhere.
+Both run the same robots twice, in two ways, with synthetic inputs through the host that runs agents anywhere, and
+compare the actions bit for bit.
 """
 
 from collections.abc import Iterator
@@ -24,16 +25,17 @@ from swarmwire.comms.tick_io import Actions, GroupReadings
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 
-Action = tuple[int, str, str]  # robot, what it did, and the value, exactly
+Action = tuple[int, str, str]  # robot, name of the action, and its exact value
+MAX_SHOWN = 8  # actions of a robot in a message
 SPEEDS = ("linear_mps", "angular_radps", "lateral_mps")
 
 
 def actions_of(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
-    """What each robot did, by its row: the exact value of each deed, by its name."""
-    found: dict[int, dict[str, str]] = {robot: {} for robot in actions.rows.tolist()}
-    for robot, what, value in chain(_driven(actions), _shown(actions), _actuated(actions, body), _sent(actions.sent)):
-        found[robot][what] = value
-    return found
+    """The actions of each robot, by its row: the exact value of each action, by its name."""
+    by_robot: dict[int, dict[str, str]] = {robot: {} for robot in actions.rows.tolist()}
+    for robot, name, value in chain(_driven(actions), _shown(actions), _actuated(actions, body), _sent(actions.sent)):
+        by_robot[robot][name] = value
+    return by_robot
 
 
 def _driven(actions: Actions) -> Iterator[Action]:
@@ -63,7 +65,7 @@ def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
 
 
 def _sent(sent: SentPackets) -> Iterator[Action]:
-    packets: dict[int, int] = {}  # of each robot, up to now
+    packets: dict[int, int] = {}  # of each robot so far
     columns = sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()
     for at, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
         number = packets[robot] = packets.get(robot, 0) + 1
@@ -86,22 +88,16 @@ def _fields(payload: bytes) -> list[tuple[str, str]]:
     return [("bytes", payload.hex(" "))]
 
 
-# --- Comparison: two agents that are given the same, and where what they do comes apart.
-
-
-MAX_SHOWN = 8  # deeds of a robot
-
-
 @dataclass(frozen=True)
 class Comparison:
-    """Who is compared, and what is said if they differ."""
+    """Compares the actions of two agents with the same inputs."""
 
-    text: str
+    text: str  # start of the message if they differ
     names: tuple[str, str]
     body: Body
 
     def check(self, tick: int, first: Actions, second: Actions) -> None:
-        """AssertionError with the first robot that does not do the same in both, and what it does in each."""
+        """AssertionError with the first robot whose actions differ, and its actions in both."""
         one, other = actions_of(first, self.body), actions_of(second, self.body)
         different = [robot for robot in one if one[robot] != other[robot]]
         if different:
@@ -113,19 +109,16 @@ class Comparison:
 
     def _lines(self, one: dict[str, str], other: dict[str, str]) -> list[str]:
         first, second = self.names
-        apart = [what for what in one | other if one.get(what) != other.get(what)]
+        different = [name for name in one | other if one.get(name) != other.get(name)]
         lines = [
-            f"  {what}: {one.get(what, 'nothing')} ({first}), {other.get(what, 'nothing')} ({second})"
-            for what in apart[:MAX_SHOWN]
+            f"  {name}: {one.get(name, 'nothing')} ({first}), {other.get(name, 'nothing')} ({second})"
+            for name in different[:MAX_SHOWN]
         ]
-        return lines + [f"  and {len(apart) - MAX_SHOWN} more"] * (len(apart) > MAX_SHOWN)
-
-
-# --- The checks themselves: the same robots twice, in two ways, and what they do compared.
+        return lines + [f"  and {len(different) - MAX_SHOWN} more"] * (len(different) > MAX_SHOWN)
 
 
 def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless both do exactly the same, bit for bit, for robots that sense and hear the same.
+    """AssertionError unless both act exactly alike, bit for bit, tick_inputs the same readings and packets.
 
     It names the tick, a robot, and each number, LED, note and field of a message in which the two differ.
     """
@@ -133,21 +126,23 @@ def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial
     one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
     names = single.__name__, vector.__name__
     comparison = Comparison(f"{single.__name__} and {vector.__name__} differ", names, trial.spec)
-    for tick, (given, show) in enumerate(inputs(trial)):
-        first = one.act(*given)
-        comparison.check(tick, first, other.act(*given))
+    for tick, (tick_inputs, show) in enumerate(inputs(trial)):
+        first = one.act(*tick_inputs)
+        comparison.check(tick, first, other.act(*tick_inputs))
         show(first.sent)
 
 
 def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless n rows at once do exactly what each row does alone, bit for bit: so no row peeks."""
+    """AssertionError unless n rows at once act exactly as each row alone, bit for bit: no row reads another."""
     trial = trial or Trial()
     together = _host(vector, trial, np.arange(trial.robots))
     alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
     comparison = Comparison(f"rows of {vector.__name__} are not independent", ("together", "alone"), trial.spec)
-    for tick, (given, show) in enumerate(inputs(trial)):
-        first = together.act(*given)
-        comparison.check(tick, first, Actions.joined([host.act(*_only(row, given)) for row, host in enumerate(alone)]))
+    for tick, (tick_inputs, show) in enumerate(inputs(trial)):
+        first = together.act(*tick_inputs)
+        comparison.check(
+            tick, first, Actions.joined([host.act(*_only(row, tick_inputs)) for row, host in enumerate(alone)])
+        )
         show(first.sent)
 
 
@@ -158,10 +153,13 @@ def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> AgentGroup:
     return agent_group(GroupAssignment("trial", "", params, trial.spec, rows, names, keys), kind)
 
 
-def _only(row: int, given: SyntheticInputs) -> SyntheticInputs:
-    at = np.flatnonzero(given.readings.rows == row)
-    own = GroupReadings(given.readings.rows[at], {name: column[at] for name, column in given.readings.fields.items()})
-    received = given.received.select(np.flatnonzero(given.received.receiver == row))
+def _only(row: int, tick_inputs: SyntheticInputs) -> SyntheticInputs:
+    """The inputs of one row."""
+    time, readings, received, tx_status = tick_inputs
+    at = np.flatnonzero(readings.rows == row)
     return SyntheticInputs(
-        given.time, own, received, given.tx_status.select(np.flatnonzero(given.tx_status.row == row))
+        time,
+        GroupReadings(readings.rows[at], {name: column[at] for name, column in readings.fields.items()}),
+        received.select(np.flatnonzero(received.receiver == row)),
+        tx_status.select(np.flatnonzero(tx_status.row == row)),
     )

@@ -1,4 +1,7 @@
-"""VectorAgent: the code that decides for n robots at a time, and the State that the framework keeps for it."""
+"""VectorAgent: the code that controls n robots at a time, and the State that the framework keeps for it.
+
+`State` is a table with a row per robot; `PerRobot` is a parameter with a value per robot.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -15,12 +18,11 @@ FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
 IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
 BoolColumn = NDArray[np.bool_]  # bool, (n,), or (n, width)
 
-
-FROZEN = "_frozen"  # attribute of a VectorAgent once it is made
+FROZEN = "_frozen"  # set on a VectorAgent after its construction
 
 
 class _Default:
-    """What a state's column starts with."""
+    """The initial value of a state's column."""
 
     def __init__(self, value: float | int | bool, width: int) -> None:
         self.value, self.shape = value, (width,) if width else ()
@@ -29,13 +31,13 @@ class _Default:
 def column(default: float | int | bool, width: int = 0) -> Any:
     """A column of a State: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
 
-    With a `width` each robot has so many numbers, (n, width), all of which start with `default`.
+    With a `width` each robot has `width` numbers, (n, width), which all start with `default`.
     """
     return _Default(default, width)
 
 
 class State:
-    """What a VectorAgent remembers: a table with a row per robot, arrays that `step` reads and writes in place.
+    """The memory of a VectorAgent: a table with a row per robot, whose arrays `step` reads and writes in place.
 
     The framework owns it: rows are added, removed and moved to another runner with their robots.
     """
@@ -79,7 +81,7 @@ class State:
         column[...] = value
 
     def moved(self, old_rows: IntArray, new_rows: IntArray) -> Self:
-        """The state of robots `new_rows`: rows of those in `old_rows` (both rising) are kept, others start afresh."""
+        """The state of robots `new_rows`: rows in `old_rows` (both rising) are kept, the others start with defaults."""
         state = type(self).fresh(len(new_rows))
         _, old, new = np.intersect1d(old_rows, new_rows, assume_unique=True, return_indices=True)
         for name in self.columns:
@@ -96,12 +98,12 @@ else:
 
 
 class VectorAgent(ABC, Generic[S]):
-    """Decides for the robots of a group, n at a time, each row from its own senses and packets alone.
+    """Controls the robots of a group, n at a time, each row from its own sensors and packets alone.
 
-    One instance serves all robots of a group in a process, over all arenas; so nothing can be set on `self` once it is
-    made: it has parameters (annotated class attributes, as for Agent, or `PerRobot`) and what `__init__` makes of them.
-    What it remembers of its robots is in its State, which `class Search(VectorAgent[Memory])` names.
-    `api = 1` is as for Agent.
+    One instance serves all robots of a group in a process, over all arenas, so attributes of `self` cannot be set after
+    `__init__`: they are its parameters (annotated class attributes, as for Agent, or `PerRobot`) and values that
+    `__init__` derives from them. The memory of its robots is in its State, named by
+    `class Search(VectorAgent[Memory])`. `api = 1` is as for Agent.
     """
 
     api: ClassVar[int] = API_VERSION
@@ -116,21 +118,21 @@ class VectorAgent(ABC, Generic[S]):
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Called before anything runs with the parameters that were given for so many robots, each of its type.
+        """Called before a run with the parameters of a scenario for `robots` robots, each of its type.
 
-        Raises BadParameter of swarmwire.agent.parameters for values that do not go together; here none are refused.
+        Override it to raise BadParameter of swarmwire.agent.parameters for values that do not go together.
         """
 
     @abstractmethod
     def step(self, robots: Robots, state: S) -> None:
-        """Called once a tick with the robots that act in it: read `robots`, then drive and send."""
+        """Called once per tick with the robots that act in it: read `robots`, then drive and send."""
 
     def on_receive(self, robots: Robots, state: S) -> None:
-        """If it is defined: called between steps when packets have come, as for Agent, with the last step's robots."""
+        """Optional: called between steps when packets have arrived, as for Agent, with the last step's robots."""
 
 
 def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray]) -> None:
-    """Let nothing be set on an agent any more, but, by calling this again, parameters per robot."""
+    """Refuse any further assignment to an agent's attributes; another call sets parameters per robot."""
     vars(agent).update(per_robot, **{FROZEN: True})
 
 
@@ -144,17 +146,14 @@ def state_of(kind: type[VectorAgent[Any]]) -> type[State]:
     return State
 
 
-# --- PerRobot: a parameter of a VectorAgent that has a value for each robot.
-
-
 T = TypeVar("T", int, float)
 
 
 class PerRobot(Generic[T]):
-    """Declares `lane: PerRobot[int] = per_robot(0)`, without default `lane: PerRobot[int]`.
+    """A parameter of a VectorAgent with a value per robot: `lane: PerRobot[int] = per_robot(0)`.
 
-    A scenario gives one number for all or a list with one for each robot, by its index in the group. In `step`,
-    `self.lane` is the array (n,) of the robots that act: int64 or float64.
+    Without a default: `lane: PerRobot[int]`. A scenario gives one number for all robots, or a list with one per robot,
+    by its index in the group. In `step`, `self.lane` is the array (n,) of the robots that act: int64 or float64.
     """
 
     if TYPE_CHECKING:
@@ -167,7 +166,7 @@ class PerRobot(Generic[T]):
 
 
 class PerRobotDefault:
-    """One number for all robots, unless the scenario says otherwise."""
+    """The default of a PerRobot parameter."""
 
     def __init__(self, value: float) -> None:
         self.value = value

@@ -14,7 +14,7 @@ import zenoh
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
-from swarmwire.agent.runner import TickInbox, answers, given_robots
+from swarmwire.agent.runner import TickInbox, answers, assigned_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
@@ -177,7 +177,7 @@ class EncodedJoiners:
             asked = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
             given = self.roster.join(name, JoinRequest(**(asked if robots else {})).encode())
             inbox = TickInbox()
-            self._runners[name] = inbox, answers(*given_robots(given), inbox)
+            self._runners[name] = inbox, answers(*assigned_robots(given), inbox)
             self._deliver(self.roster.answer(name, next(self._runners[name][1])))
         elif what == "leave":
             self.roster.answer(name, frames.encode("leave", -1, {}))

@@ -21,7 +21,7 @@ def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, caps
     monkeypatch.setattr("swarmwire.agent.joining.join", killed)
     before, ended_by = signal.signal(signal.SIGINT, interrupt), signal.getsignal(signal.SIGTERM)
     try:
-        assert joining.play_told(Joining("tcp/127.0.0.1:1")) == INTERRUPTED
+        assert joining.join_and_report(Joining("tcp/127.0.0.1:1")) == INTERRUPTED
         assert signal.getsignal(signal.SIGINT) is interrupt
         assert signal.getsignal(signal.SIGTERM) is ended_by
     finally:

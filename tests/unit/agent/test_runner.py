@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from swarmwire.agent import runner
-from swarmwire.agent.runner import PLAIN, TickInbox, given_robots
+from swarmwire.agent.runner import NEXT_FREE, TickInbox, assigned_robots
 from swarmwire.comms.errors import BadFrame, RunnerLost
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
@@ -146,9 +146,9 @@ def test_why_a_runner_ended_is_told() -> None:
 )  # fmt: skip
 def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> None:
     given = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None}
-    assert given_robots(msgpack.packb(given))[0].robot_names == ("flock-0",)
+    assert assigned_robots(msgpack.packb(given))[0].robot_names == ("flock-0",)
     with pytest.raises(BadFrame):
-        given_robots(msgpack.packb({**given, **wrong}))
+        assigned_robots(msgpack.packb({**given, **wrong}))
 
 
 class Deaf:
@@ -179,7 +179,7 @@ class Token:
 def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
     received: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "JOIN_S", 0.04)
+    monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.04)
     monkeypatch.setattr(runner, "POLL_S", 0.01)
     session = Deaf(received)
     watched = runner._watched_world(session, Keys("run1"), TickInbox())  # pyright: ignore[reportArgumentType]
@@ -206,5 +206,5 @@ class NoAnswer:
 
 def test_a_world_that_takes_too_long_to_answer_is_named_as_what_is_wrong() -> None:
     with pytest.raises(RunnerLost, match="the world did not answer to join within") as lost:
-        runner._join(NoAnswer(), Keys("run1"), "r7", PLAIN)  # pyright: ignore[reportArgumentType]
+        runner._join(NoAnswer(), Keys("run1"), "r7", NEXT_FREE)  # pyright: ignore[reportArgumentType]
     assert lost.value.runner == "r7"

@@ -47,12 +47,12 @@ def join_command(
       swarmwire join tls/10.0.0.5:7447 --robots 5 --certs lab-certs --name r1
     """
     # Imported here: zenoh takes a moment, which --help and typing errors should not.
-    from swarmwire.agent.joining import Joining, names_in, play_told
+    from swarmwire.agent.joining import Joining, join_and_report, names_in
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.purposes import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, files=(ca, certificate, key), insecure=insecure)
-    code = play_told(
+    code = join_and_report(
         Joining(
             endpoint=endpoint,
             robots=robots,

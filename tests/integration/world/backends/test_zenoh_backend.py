@@ -222,7 +222,7 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
 
 
 def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "JOIN_S", 0.1)
+    monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
     with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
         runner.run(endpoint, RUN, "r0")
 

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from swarmwire.agent.agent import NoAgent
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.agent.runner import given_robots
+from swarmwire.agent.runner import assigned_robots
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
@@ -80,7 +80,7 @@ class Join(DocumentTarget):
         free = roster.missing_robots
         try:
             roster.offer(data)
-            assignment, _ = given_robots(roster.join(runner, data))
+            assignment, _ = assigned_robots(roster.join(runner, data))
         except JoinRefused:
             if roster.missing_robots != free or roster._by_runner:
                 raise AssertionError("refused, and yet robots are allocated") from None
@@ -119,7 +119,7 @@ class Assignments(DocumentTarget):
         return [msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one}) for part, one in memories]
 
     def feed(self, case: bytes) -> None:
-        AgentExecutor(*given_robots(case))
+        AgentExecutor(*assigned_robots(case))
 
 
 class Control(DocumentTarget):

@@ -3,7 +3,7 @@ import signal
 import pytest
 
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
-from swarmwire.agent.on_robot.robot_lock import STOP_SIGNAL, OUT_OF_REACH, STOPPED, NotStopped, RobotLock
+from swarmwire.agent.on_robot.robot_lock import OUT_OF_REACH, STOP_SIGNAL, STOPPED, NotStopped, RobotLock
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from tests.support.agent.on_robot.scripted import DatedFakeClock, ScriptedDriver
