@@ -1,1 +1,1 @@
-"""Events: what a scenario does to robots and radios while a run goes on. One file per action, parameters and effect."""
+"""Events: the changes to robots and radios during a run that a scenario lists."""

@@ -1,4 +1,7 @@
-"""Region: a disc or a rectangle of the arena."""
+"""Partitions: sets of robots that cannot communicate with one another, by name or by region.
+
+The side of a robot is the number of its set, from 1; 0 is in no set.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,24 +15,27 @@ from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import LastingEvent, within
 from swarmwire.comms.events.selection import Groups, Swarm, members_of
 
+KINDS = ("between", "region", "halves", "isolate", "bridge")
+FIRST, SECOND = 1, 2  # sides
+
 
 @dataclass(frozen=True)
 class Region:
-    """{ at, radius_m } is a disc, { at, size_m } a rectangle; the edge belongs to it."""
+    """A disc { at, radius_m } or a rectangle { at, size_m } of the arena, with its edge."""
 
     at: tuple[float, float] = parameter((0.0, 0.0), help="its centre, in the arena's frame", unit="m")
     radius_m: float | None = parameter(None, help="radius of the disc", unit="m", above=0, at_most=10_000)
     size_m: tuple[float, float] | None = parameter(None, help="full extents of the rectangle along x and y", unit="m")
 
     def check(self) -> None:
-        """Raise BadInput, with a key within this table, unless it is just one of the two."""
+        """Raise BadInput, with a key within this table, unless it is exactly one of the two."""
         if (self.radius_m is None) == (self.size_m is None):
             raise BadInput("", "", "expected either radius_m or size_m")
         if self.size_m is not None and min(self.size_m) <= 0.0:
             raise BadInput("", "size_m", f"expected two numbers above 0 (m), got {list(self.size_m)}")
 
     def holds(self, pose: FloatArray) -> BoolArray:
-        """Which robots that stand at `pose` (rows, 3) have their centre in it, (rows,)."""
+        """The robots at `pose` (rows, 3) whose centre is in it, (rows,)."""
         from_centre_m = pose[:, :2] - self.at
         if self.radius_m is not None:
             return np.hypot(from_centre_m[:, 0], from_centre_m[:, 1]) <= self.radius_m
@@ -37,22 +43,16 @@ class Region:
         return inside[:, 0] & inside[:, 1]
 
 
-# --- Sides: the set of a partition in which each robot is, from 1; 0 is in none.
-
-
-FIRST, SECOND = 1, 2
-
-
 def sides_of_sets(sets: Sequence[Sequence[str]], swarm: Swarm) -> IntArray:
     """Each robot in the set that names it or its group, (rows,)."""
     side: IntArray = np.zeros(swarm.robots, np.int64)
-    for place, names in enumerate(sets):
-        side[_indices(names, swarm)] = place + 1
+    for i, names in enumerate(sets):
+        side[_indices(names, swarm)] = i + 1
     return np.tile(side, len(swarm.keys))
 
 
 def sides_of_loners(names: Sequence[str], swarm: Swarm) -> IntArray:
-    """Each robot named in a set of its own, all others in the first, (rows,)."""
+    """Each named robot in a separate set, all others in the first, (rows,)."""
     side = np.full(swarm.robots, FIRST)
     alone = _indices(names, swarm)
     side[alone] = SECOND + np.arange(len(alone))
@@ -60,7 +60,7 @@ def sides_of_loners(names: Sequence[str], swarm: Swarm) -> IntArray:
 
 
 def sides_of_bridge(names: Sequence[str], swarm: Swarm) -> IntArray:
-    """The robots named in no set; of the others, in their order, the first half against the second, (rows,)."""
+    """The named robots in no set; of the others, in their order, the first half against the second, (rows,)."""
     side: IntArray = np.zeros(swarm.robots, np.int64)
     others = np.setdiff1d(np.arange(swarm.robots), _indices(names, swarm))
     side[others] = np.where(np.arange(len(others)) < (len(others) + 1) // 2, FIRST, SECOND)
@@ -68,7 +68,7 @@ def sides_of_bridge(names: Sequence[str], swarm: Swarm) -> IntArray:
 
 
 def sides_of_halves(axis: str, pose: FloatArray) -> IntArray:
-    """Robots that stand left of (below) the arena's middle against all others, by `axis` "x" ("y"), (rows,)."""
+    """Robots left of (below) the arena's centre against all others, by `axis` "x" ("y"), (rows,)."""
     return two_sides(pose[:, 0 if axis == "x" else 1] < 0.0)
 
 
@@ -78,7 +78,7 @@ def two_sides(first: BoolArray) -> IntArray:
 
 
 def without(side: IntArray, names: Sequence[str], swarm: Swarm) -> IntArray:
-    """The same sets, with the robots named in none of them, (rows,)."""
+    """The same sets without the named robots, (rows,)."""
     named = np.zeros(swarm.robots, np.bool_)
     named[_indices(names, swarm)] = True
     return np.where(np.tile(named, len(swarm.keys)), 0, side)
@@ -89,18 +89,12 @@ def _indices(names: Sequence[str], swarm: Swarm) -> IntArray:
     return np.array(sorted({index for name in names for index in members_of(name, swarm.groups)}), np.int64)
 
 
-# --- Partition: sets of robots that cannot hear one another.
-
-
-KINDS = ("between", "region", "halves", "isolate", "bridge")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Partition(LastingEvent):
-    """No packet gets from a robot of one set to a robot of another; robots in none of the sets hear all, and all them.
+    """No packet gets from a robot of one set to a robot of another; robots in no set communicate with all.
 
-    One of `between`, `region`, `halves`, `isolate` and `bridge` says who is in which set; `bridge` may also stand
-    beside `halves`. Sets by place are those of the moment at which the partition begins, whoever moves where after.
+    One of `between`, `region`, `halves`, `isolate` and `bridge` defines the sets; `bridge` may also stand beside
+    `halves`. Sets by position are taken once, at the begin of the partition.
     """
 
     do: str = parameter("partition", help="sets of robots cannot hear one another", choices=("partition",))
@@ -127,9 +121,9 @@ class Partition(LastingEvent):
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput for sets that are too few, empty, unknown or overlap."""
-        given = tuple(kind for kind in KINDS if getattr(self, kind) is not None)
-        if len(given) != 1 and given != ("halves", "bridge"):
-            listed = ", ".join(given) if given else "none"
+        kinds = tuple(kind for kind in KINDS if getattr(self, kind) is not None)
+        if len(kinds) != 1 and kinds != ("halves", "bridge"):
+            listed = ", ".join(kinds) if kinds else "none"
             raise BadInput("", "", f"expected one of {', '.join(KINDS)}, or halves and bridge; got {listed}")
         if self.between is not None:
             _check_sets(self.between, groups)
@@ -142,16 +136,16 @@ class Partition(LastingEvent):
         if self.one_way and (self.isolate is not None or len(self.between or (1, 2)) != 2):
             raise BadInput("", "one_way", "expected two sets with it: the second does not hear the first")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
-        """Hold the sets apart."""
-        self._held(conditions)[serial] = self._sides(swarm)
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Separate the sets."""
+        self._partitions(effects)[serial] = self._sides(swarm)
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
         """All robots in one of the sets."""
-        return self._held(conditions)[serial] > 0
+        return self._partitions(effects)[serial] > 0
 
-    def _held(self, conditions: ActiveEffects) -> dict[int, IntArray]:
-        return conditions.one_way if self.one_way else conditions.partitions
+    def _partitions(self, effects: ActiveEffects) -> dict[int, IntArray]:
+        return effects.one_way if self.one_way else effects.partitions
 
     def _sides(self, swarm: Swarm) -> IntArray:
         if self.between is not None:

@@ -1,4 +1,4 @@
-"""Blackout: radios neither send nor receive."""
+"""Events that act on radios: blackout, antenna gain, jammer, and ramp of a radio parameter."""
 
 from dataclasses import dataclass, replace
 
@@ -16,13 +16,16 @@ from swarmwire.comms.radio.config.radio import Radio, check_radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
 from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOTS, Jammers
 
+PHASE_PURPOSE = purpose("jammer phase")
+MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: so short a period is the same as constant noise
+
 
 @dataclass(frozen=True, kw_only=True)
 class Blackout(LastingEvent):
-    """The robots go on, deaf and mute, and do not know it.
+    """Radios neither send nor receive; the robots' agents continue without a notice.
 
-    What they send meanwhile ends, unless `backlog` has it wait until the radio is on again: then it goes on air, packet
-    after packet. Where blackouts overlap, the strictest backlog counts.
+    Packets sent meanwhile are dropped, unless `backlog` keeps them in the queue until the radio is on again. Then they
+    go on air one after the other. Where blackouts overlap, the strictest backlog applies.
     """
 
     do: str = parameter("blackout", help="radios neither send nor receive", choices=("blackout",))
@@ -34,24 +37,21 @@ class Blackout(LastingEvent):
     )
     needs_radio = True
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
-        """Hold the radios off."""
-        conditions.backlogs[serial] = BACKLOGS.index(self.backlog)
-        conditions.blackouts[serial] = self.robots.rows(serial, swarm, conditions.alive)
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Switch the radios off."""
+        effects.backlogs[serial] = BACKLOGS.index(self.backlog)
+        effects.blackouts[serial] = self.robots.rows(serial, swarm, effects.alive)
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
-        """Those whose radios nothing else holds off."""
-        return alone(serial, conditions.blackouts)
-
-
-# --- Gain: antennas that send or hear better or worse than they should.
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
+        """Those whose radios no other blackout switches off."""
+        return alone(serial, effects.blackouts)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gain(LastingEvent):
-    """The antennas of robots gain or lose, for what they send and what they hear each for itself; gains add up.
+    """The antenna gain of robots changes, separately for sending and receiving; gains of several events add up.
 
-    A robot whose `receive_db` alone has fallen is received as before, but hears less: links differ by their direction.
+    A robot with a lower `receive_db` alone is received as before, but receives less: its links are asymmetric.
     """
 
     do: str = parameter("gain", help="antennas send or hear better or worse", choices=("gain",))
@@ -65,35 +65,28 @@ class Gain(LastingEvent):
     needs_radio = needs_signals = True
 
     def check(self, groups: Groups) -> None:
-        """Raise BadInput for robots that there are not, or if nothing would change."""
+        """Raise BadInput for unknown robots, or if nothing would change."""
         super().check(groups)
         if self.send_db == 0.0 and self.receive_db == 0.0:
             raise BadInput("", "", "expected send_db or receive_db")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Change the antennas."""
-        chosen = self.robots.rows(serial, swarm, conditions.alive)
-        conditions.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
+        chosen = self.robots.rows(serial, swarm, effects.alive)
+        effects.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
-        """All that were chosen."""
-        return (conditions.gains[serial] != 0.0).any(axis=0)
-
-
-# --- Jammer: noise that drowns what robots near it should hear.
-
-
-PHASE = purpose("jammer phase")
-MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: noise that comes and goes so fast is constant noise
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
+        """All chosen robots."""
+        return (effects.gains[serial] != 0.0).any(axis=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Jammer(LastingEvent):
-    """A jammer adds its power to the noise of every robot of its arena: frames drown, and the medium counts as busy.
+    """A jammer adds its power to the noise of every robot of its arena: frames are lost, and the channel is busy.
 
-    It stands at a place, or robots carry it; who carries one is spared by it, and goes on carrying it when dead. Its
-    power falls by the radio's own path loss, shadowing and walls. It is on for `duty` of each period, from a phase
-    drawn for each jammer. A packet that would have been right without ends as `jammed`.
+    It stands at a place, or robots carry it, also when dead; a jammer does not affect its carrier. Its power falls by
+    the radio's path loss, shadowing and walls. It is on for `duty` of each period, from a phase drawn for each jammer.
+    A packet that would have been received without it ends as `jammed`.
     """
 
     do: str = parameter("jammer", help="noise drowns what robots near it should hear", choices=("jammer",))
@@ -107,7 +100,7 @@ class Jammer(LastingEvent):
     needs_radio = needs_signals = True
 
     def check(self, groups: Groups) -> None:
-        """Raise BadInput for neither or both of place and robots, or robots that there are not."""
+        """Raise BadInput for neither or both of place and robots, or unknown robots."""
         if (self.at is None) == (self.robots is None):
             raise BadInput("", "", "expected either at = [x, y] or robots")
         super().check(groups)
@@ -115,51 +108,48 @@ class Jammer(LastingEvent):
             raise BadInput("", "period_s", f"expected at least {MIN_PERIOD_S:f} s, got {self.period_s!r}")
 
     def check_radio(self, radio: Radio) -> None:
-        """Raise BadInput for a disk, or where nothing on air disturbs anything."""
+        """Raise BadInput for a unit disk, or a radio whose frames do not interfere."""
         super().check_radio(radio)
         if radio.access_or_default.method == "none":
             raise BadInput("", "do", 'expected another radio.access.method than "none", with which nothing disturbs')
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
-        """Put them up."""
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Place the jammers."""
         if self.robots is None:
             arena = np.arange(len(swarm.keys))
             carrier = np.full(len(arena), NO_ROBOTS)
         else:
-            carrier = np.flatnonzero(self.robots.rows(serial, swarm, conditions.alive))
+            carrier = np.flatnonzero(self.robots.rows(serial, swarm, effects.alive))
             arena = carrier // swarm.robots
-        conditions.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
+        effects.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
-        """Those who carry one, or all robots."""
-        changed = np.full(conditions.rows, self.robots is None)
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
+        """The carriers; all robots for a jammer at a place."""
+        changed = np.full(effects.rows, self.robots is None)
         if self.robots is not None:
-            changed[conditions.jammers[serial].carrier] = True
+            changed[effects.jammers[serial].carrier] = True
         return changed
 
     def _jammers(self, serial: int, swarm: Swarm, arena: IntArray, carrier: IntArray) -> Jammers:
-        k, period_ns = len(arena), to_ns(self.period_s)
+        jammers, period_ns = len(arena), to_ns(self.period_s)
         index = np.where(carrier == NO_ROBOTS, swarm.robots, carrier % swarm.robots)
-        u = uniform(swarm.keys[arena], index, serial, 0, PHASE)
+        u = uniform(swarm.keys[arena], index, serial, 0, PHASE_PURPOSE)
         x_m, y_m = self.at or (0.0, 0.0)
         return Jammers(
             arena=arena,
             carrier=carrier,
-            x_m=np.full(k, x_m),
-            y_m=np.full(k, y_m),
-            power_dbm=np.full(k, self.power_dbm),
-            on_ns=np.full(k, max(round(self.duty * period_ns), 1)),
-            period_ns=np.full(k, period_ns),
+            x_m=np.full(jammers, x_m),
+            y_m=np.full(jammers, y_m),
+            power_dbm=np.full(jammers, self.power_dbm),
+            on_ns=np.full(jammers, max(round(self.duty * period_ns), 1)),
+            period_ns=np.full(jammers, period_ns),
             phase_ns=(u * period_ns).astype(np.int64),
         )
 
 
-# --- Ramp: a number of the radio moves to another value.
-
-
 @dataclass(frozen=True, kw_only=True)
 class Ramp(LastingEvent):
-    """A number of `[radio]` moves evenly to `to`, tick by tick, and stays there; undone, it is at once what it was.
+    """A number of `[radio]` moves linearly to `to`, tick by tick, and stays there; undone, it returns at once.
 
     Any number that the scenario or its preset gives, but `send_offset`, which holds for the whole run; groups' own
     power and gain stay, and bursts given by steps move by `bad_s` and `good_s`. Packets that wait or are on air stay
@@ -178,21 +168,21 @@ class Ramp(LastingEvent):
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput for what is no number of this radio, or a value that contradicts its other keys."""
         check_number(radio, self.what, self.to)
-        slope = replace(self._slope(), start_ns=0)
+        ramp = replace(self._parameter_ramp(), start_ns=0)
         # Some keys take only certain values, which may lie at the end of the way but not along it.
-        for key, at_ns in (("to", slope.lasts_ns), ("over_s", slope.lasts_ns // 2)):
+        for key, at_ns in (("to", ramp.lasts_ns), ("over_s", ramp.lasts_ns // 2)):
             try:
-                check_radio(radio_at(radio, [slope], at_ns), "")
+                check_radio(radio_at(radio, [ramp], at_ns), "")
             except BadInput as error:
                 raise BadInput("", key, f"{error.key}: {error.expected}") from None
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
-        """Let the number move; without it, it is at once what it was."""
-        conditions.slopes[serial] = self._slope()
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Start the ramp."""
+        effects.slopes[serial] = self._parameter_ramp()
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
         """All robots."""
-        return np.ones(conditions.rows, np.bool_)
+        return np.ones(effects.rows, np.bool_)
 
-    def _slope(self) -> ParameterRamp:
+    def _parameter_ramp(self) -> ParameterRamp:
         return ParameterRamp(self.what, self.to, to_ns(self.at_s), to_ns(self.over_s))

@@ -1,7 +1,7 @@
-"""Actions by the name that a scenario's `do` gives. A new one is a file like `kill.py` and its line here.
+"""The registry of event actions, by the name in a scenario's `do`. A new action needs a class like `Kill` and a line.
 
-What an action changes lies in `Conditions`: a new kind of effect is a new field there, read by world or, as part of
-the `Disruption` that it makes, by the medium.
+Actions change `ActiveEffects`. A new kind of effect is a new field there, which the world reads, or the radio medium as
+part of the `Disruption`.
 """
 
 from swarmwire.comms.events.event import Event
@@ -9,5 +9,5 @@ from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
 from swarmwire.comms.events.robot_events import Fail, Impulse, Kill, Revive
 
-# All that `do` may name.
+# The actions that `do` can name.
 ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Impulse)

@@ -1,4 +1,4 @@
-"""Kill: robots stop where they stand, and are obstacles from then on."""
+"""Events that act on robots: kill, revive, fail (a part stops working), impulse (a sudden change of velocity)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,54 +19,48 @@ from swarmwire.comms.events.selection import Groups, Selection, Swarm
 
 @dataclass(frozen=True, kw_only=True)
 class Kill(LastingEvent):
-    """A killed robot brakes, no longer acts, and its radio forgets its queue; undone, it is revived."""
+    """A killed robot brakes, stops acting, loses its radio's queue, and is an obstacle; undone, it is revived."""
 
     do: str = parameter("kill", help="robots stop where they stand", choices=("kill",))
     robots: Selection = parameter(help="which robots; share and count choose among those alive")
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
-        """Hold the robots dead."""
-        conditions.kills[serial] = self.robots.rows(serial, swarm, conditions.alive)
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Kill the robots."""
+        effects.kills[serial] = self.robots.rows(serial, swarm, effects.alive)
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
-        """Those that nothing else holds dead."""
-        return alone(serial, conditions.kills)
-
-
-# --- Revive: robots that were killed act again, with a fresh memory.
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
+        """Those that no other kill applies to."""
+        return alone(serial, effects.kills)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Revive(Event):
-    """Whatever killed them, the robots are alive again; those that are so already do not notice.
+    """Robots are alive again, whatever killed them, with a new memory; robots that are alive do not change.
 
-    One whose battery was empty gets a full one.
+    A robot whose battery was empty gets a full one.
     """
 
     do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
     robots: Selection = parameter(help="which robots; share and count choose among those dead")
 
-    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
-        """Free the robots of every kill; changed are those that were dead."""
-        dead = ~conditions.alive
+    def begin(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> BoolArray:
+        """Remove the robots from every kill; changed are those that were dead."""
+        dead = ~effects.alive
         chosen = self.robots.rows(serial, swarm, dead)
-        for held in conditions.kills.values():
-            held[chosen] = False
-        for failing in conditions.failures.values():
+        for killed in effects.kills.values():
+            killed[chosen] = False
+        for failing in effects.failures.values():
             if failing.part == BATTERY:
                 failing.renew(chosen, to_ns(self.at_s))
         return chosen & dead
 
 
-# --- Fail: a part of robots no longer works.
-
-
 @dataclass(frozen=True, kw_only=True)
 class Fail(LastingEvent):
-    """The robots' agents go on and do not know it, but for a dead battery, which leaves no agent and no radio.
+    """A part of robots fails; their agents continue without a notice, except that a dead battery stops the robot.
 
-    Motors that failed brake, and a wheel that failed stands still; a sense that failed reads as if every reading were
-    lost. With `per_hour` each robot fails when its own draw says so, from `at_s` on, and again after it was mended.
+    Failed motors brake, and a failed wheel stands still; a failed sensor reads as if every reading were lost. With
+    `per_hour` each robot fails at a time of its own draw, from `at_s` on, and again after it has recovered.
     """
 
     do: str = parameter("fail", help="a part of robots no longer works", choices=("fail",))
@@ -78,7 +72,7 @@ class Fail(LastingEvent):
 
     @property
     def lasts_s(self) -> float | None:
-        """`for_s`, unless each robot's failure has its own time."""
+        """`for_s`; None if each robot's failure has its own time."""
         return self.for_s if self.per_hour is None else None
 
     @property
@@ -95,52 +89,49 @@ class Fail(LastingEvent):
         """Raise BadInput for a part that a body of these robots does not have."""
         for group in self.robots.groups(groups):
             body = bodies[group]
-            has = [BATTERY, MOTORS, *(() if isinstance(body.drive, Holonomic) else WHEELS), *body.sensors]
-            if self.part not in has:
+            parts = [BATTERY, MOTORS, *(() if isinstance(body.drive, Holonomic) else WHEELS), *body.sensors]
+            if self.part not in parts:
                 raise BadInput(
-                    "", "part", f"expected one of {', '.join(has)} of the body {body.name}; got {self.part!r}"
+                    "", "part", f"expected one of {', '.join(parts)} of the body {body.name}; got {self.part!r}"
                 )
 
-    def hold(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> None:
+    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Let the part fail, now or at the rate."""
-        chosen = self.robots.rows(serial, swarm, conditions.alive)
+        chosen = self.robots.rows(serial, swarm, effects.alive)
         if self.per_hour is None:
             failing = Failures(self.part, chosen)
         else:
             failing = self._lifetimes(serial, swarm).begun(self.part, chosen, to_ns(self.at_s))
-        conditions.failures[serial] = failing
+        effects.failures[serial] = failing
         if self.part == BATTERY:
-            conditions.kills[serial] = failing.failed.copy()
+            effects.kills[serial] = failing.failed.copy()
 
-    def changed(self, serial: int, conditions: ActiveEffects) -> BoolArray:
-        """Those of which nothing else holds the part."""
-        return alone(serial, conditions.failed_by_event(self.part))
+    def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
+        """Those whose part failed by no other event."""
+        return alone(serial, effects.failed_by_event(self.part))
 
-    def go_on(self, serial: int, now_ns: int, swarm: Swarm, conditions: ActiveEffects) -> tuple[BoolArray, BoolArray]:
-        """Let fail and be mended what is due by now; returns whose part failed, and whose works again, (rows,) each."""
-        before = conditions.failed(self.part)
-        self._lifetimes(serial, swarm).go_on(conditions.failures[serial], now_ns)
-        after = conditions.failed(self.part)
-        fell, mended = after & ~before, before & ~after
+    def go_on(self, serial: int, now_ns: int, swarm: Swarm, effects: ActiveEffects) -> tuple[BoolArray, BoolArray]:
+        """Apply the failures and recoveries that are due; return the failed and the recovered robots, (rows,) each."""
+        before = effects.failed(self.part)
+        self._lifetimes(serial, swarm).go_on(effects.failures[serial], now_ns)
+        after = effects.failed(self.part)
+        failed, recovered = after & ~before, before & ~after
         if self.part == BATTERY:
-            conditions.kills[serial] = conditions.kills[serial] & ~mended | fell
-        return fell, mended
+            effects.kills[serial] = effects.kills[serial] & ~recovered | failed
+        return failed, recovered
 
     def _lifetimes(self, serial: int, swarm: Swarm) -> Lifetimes:
         assert self.per_hour is not None, "it fails at once"
         return Lifetimes(self.per_hour, None if self.for_s is None else to_ns(self.for_s), swarm.keys, serial)
 
 
-# --- Impulse: robots get another velocity at once, as by a blow.
-
-
 @dataclass(frozen=True, kw_only=True)
 class Impulse(Event):
-    """The robots' velocity changes by so much in a direction; what follows is up to their motors, and to what they hit.
+    """The robots' velocity changes at once, as by a blow; motors and contacts determine the motion after it.
 
-    A robot on wheels is brought back to its command's speed as fast as its motors' force allows, which may be within a
-    tick; a dead one only brakes. How many newton seconds that takes is its mass times the speed. Bodies without
-    contacts, which go where they are told, take no impulse.
+    The motors of a robot on wheels bring it back to its commanded speed as fast as their force allows, which may be
+    within a tick; a dead robot only brakes. The impulse in newton seconds is the robot's mass times the speed. Bodies
+    without contacts, which follow their commands exactly, take no impulse.
     """
 
     do: str = parameter("impulse", help="robots get another velocity at once", choices=("impulse",))
@@ -154,9 +145,9 @@ class Impulse(Event):
         at_most=7,
     )
 
-    def begin(self, serial: int, swarm: Swarm, conditions: ActiveEffects) -> BoolArray:
-        """Apply it; changed are all that were chosen, dead ones too."""
-        chosen = self.robots.rows(serial, swarm, conditions.alive)
-        by_mps = self.speed_mps * np.array([cos(self.direction_rad), sin(self.direction_rad)])
-        conditions.impulses_mps[serial] = np.where(chosen[:, None], by_mps, 0.0)
+    def begin(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> BoolArray:
+        """Apply it; changed are all chosen robots, also dead ones."""
+        chosen = self.robots.rows(serial, swarm, effects.alive)
+        change_mps = self.speed_mps * np.array([cos(self.direction_rad), sin(self.direction_rad)])
+        effects.impulses_mps[serial] = np.where(chosen[:, None], change_mps, 0.0)
         return chosen

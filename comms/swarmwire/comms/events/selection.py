@@ -1,4 +1,7 @@
-"""The robots of a run, as events name them."""
+"""The robots of a run as events name them, and the `Selection` of the robots that an event affects.
+
+A selection is a group, a list of names, or a number of robots drawn with a keyed draw.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +14,8 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 
 Groups = Mapping[str, range]  # by name: indices within an arena
+CHOICE_PURPOSE = purpose("event robots")
+ROUNDING = 1e-9  # 0.145 x 100 is slightly below 14.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +25,7 @@ class Swarm:
     groups: Groups
     robots: int  # in each arena
     keys: KeyArray  # (arenas,) for draws
-    pose: FloatArray  # (rows, 3) where robots stand at the moment: x, y in m, heading in rad
+    pose: FloatArray  # (rows, 3) present x, y in m, heading in rad
 
     @property
     def rows(self) -> int:
@@ -29,7 +34,7 @@ class Swarm:
 
 
 def index_of(name: str, groups: Groups) -> int | None:
-    """The index within an arena of the robot `group-i`; None if there is none of this name."""
+    """The index within an arena of the robot `group-i`; None if no robot has this name."""
     group, _, number = name.rpartition("-")
     members = groups.get(group, range(0))
     known = number.isdecimal() and number == str(int(number)) and int(number) < len(members)
@@ -37,21 +42,14 @@ def index_of(name: str, groups: Groups) -> int | None:
 
 
 def members_of(name: str, groups: Groups) -> range:
-    """Indices within an arena of a group, or the one of a robot; empty if there is neither of this name."""
+    """Indices within an arena of the group or robot with this name; empty if there is neither."""
     index = index_of(name, groups)
     return groups.get(name, range(0)) if index is None else range(index, index + 1)
 
 
-# --- Which robots an event befalls: by group, by name, or so many by keyed choice.
-
-
-CHOICE = purpose("event robots")
-ROUNDING = 1e-9  # 0.145 x 100 is a hair below 14.5
-
-
 @dataclass(frozen=True)
 class Selection:
-    """{ group }, { names }, or { share } or { count } of a group or of all; every arena draws for itself."""
+    """{ group }, { names }, or { share } or { count } of a group or of all; each arena has its own draws."""
 
     group: str | None = parameter(None, help="the robots of this group; of all groups if left out")
     names: tuple[str, ...] | None = parameter(None, help="the robots of these names")
@@ -61,7 +59,7 @@ class Selection:
     count: int | None = parameter(None, help="so many of those eligible, drawn; all if there are fewer", at_least=1)
 
     def check(self, groups: Groups) -> None:
-        """Raise BadInput, with a key within this table, for what contradicts itself or does not fit these groups."""
+        """Raise BadInput, with a key within this table, for values that contradict each other or the groups."""
         if self.names is not None:
             if (self.group, self.share, self.count) != (None, None, None):
                 raise BadInput("", "", "expected either names or some of group, share and count")
@@ -78,10 +76,10 @@ class Selection:
             raise BadInput("", "group", f"expected {did_you_mean(groups, self.group)}; got {self.group!r}")
 
     def rows(self, serial: int, swarm: Swarm, eligible: BoolArray) -> BoolArray:
-        """The robots chosen for the event with this place in the scenario, (rows,).
+        """The robots selected for the event with this index in the scenario, (rows,).
 
-        Group and names take all that they name; share and count choose, in each arena for itself, among those
-        `eligible` (rows,), by a draw keyed by (robot, event).
+        `group` and `names` select all that they name. `share` and `count` select among the `eligible` robots (rows,) of
+        each arena by a draw keyed by (robot, event).
         """
         named = np.zeros(swarm.robots, np.bool_)
         named[self._indices(swarm)] = True
@@ -90,23 +88,23 @@ class Selection:
         chosen = np.zeros((len(swarm.keys), swarm.robots), np.bool_)
         for arena, candidates in enumerate(eligible.reshape(chosen.shape) & named):
             index = np.flatnonzero(candidates)
-            rank = uniform(int(swarm.keys[arena]), index, serial, 0, CHOICE)
-            chosen[arena, index[np.argsort(rank, kind="stable")[: self._how_many(len(index))]]] = True
+            rank = uniform(int(swarm.keys[arena]), index, serial, 0, CHOICE_PURPOSE)
+            chosen[arena, index[np.argsort(rank, kind="stable")[: self._count(len(index))]]] = True
         return chosen.reshape(-1)
 
     def groups(self, groups: Groups) -> list[str]:
-        """The groups that it may choose from."""
+        """The groups that it selects from."""
         if self.names is not None:
             return list(dict.fromkeys(name.rpartition("-")[0] for name in self.names))
         return list(groups) if self.group is None else [self.group]
 
     def _indices(self, swarm: Swarm) -> IntArray:
         if self.names is not None:
-            found = [index_of(name, swarm.groups) for name in self.names]
-            return np.array([index for index in found if index is not None], np.int64)
+            indices = [index_of(name, swarm.groups) for name in self.names]
+            return np.array([index for index in indices if index is not None], np.int64)
         return np.array(range(swarm.robots) if self.group is None else swarm.groups[self.group], np.int64)
 
-    def _how_many(self, candidates: int) -> int:
+    def _count(self, candidates: int) -> int:
         if self.share is None:
             return self.count or 0
         return max(1, int(np.floor(self.share * candidates + 0.5 + ROUNDING)))

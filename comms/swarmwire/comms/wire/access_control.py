@@ -1,19 +1,11 @@
-"""Who may send what in the robots' network, as zenoh's `access_control` for one of its peers.
+"""zenoh's `access_control` for the robots' network, and for the worlds and routers of a run.
 
-The other end of a link is known by the common name of its certificate. Each peer judges for itself: what arrives must
-be what its sender may send (ingress), and what leaves must be what the peer itself may send, to a member (egress). So
-no peer of ours passes on what others sent, and what arrives on a link was made by the name at its other end.
+The member at the other end of a link is identified by the common name of its certificate. Messages that no rule allows
+are denied without a report: a put arrives nowhere, a query gets no reply. A rule matches only if its keys include the
+whole key of a message: a subscription to `radio/*/*` needs a rule for all of these keys, not for one of them.
 
-A rule holds only if its keys include the whole key of a message: a subscription to `radio/*/*` needs a rule for all of
-these, not for one of them. And whoever may not subscribe at a peer never learns that, nor is sent anything by it.
-
-    robot R     puts radio/R/*, air/R/sent; is alive/R; answers control/R; asks air/R/join;
-                hears radio, poses and air/R/received
-    tracker     puts pose/*, air/*/received; answers air/*/join; hears radio and air/*/sent
-    operator    asks control/*; hears radio and poses
-    a name that is revoked, another name, no certificate: nothing
-
-The tracker is a camera system that tells poses, or the world of a run, which tells poses and serves the medium.
+`access_control` is for a peer of the robots' network. `agents_access`, `observers_access` and `router_access` are for
+the endpoints of a run.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -25,12 +17,31 @@ from swarmwire.comms.wire.keys import Keys, ObserverKeys, fault_of_name
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import SwarmKeys
 
-TRACKER, OPERATOR = "tracker", "operator"  # the usual names on their certificates
-Right = tuple[list[str], list[str]]  # messages as zenoh names them, and the keys that they may have
+TRACKER, OPERATOR, WORLD = "tracker", "operator", "world"  # default names on their certificates
+ANY = "*"  # any runner, or any run
+LOCAL = {"link_protocols": ["unixsock-stream"]}
+LIVELINESS = ["liveliness_query", "declare_liveliness_subscriber"]
+Right = tuple[list[str], list[str]]  # kinds of messages as zenoh names them, and their allowed keys
+Rights = list[tuple[list[str], list[str]]]
+
+
+# The robots' network. Each peer checks for itself: a message that arrives must be one that its sender may send
+# (ingress), and a message that leaves must be one that the peer itself may send to a member (egress). So no peer passes
+# on messages of others, and the member at the other end of a link is the author of the messages that arrive on it. A
+# member that may not subscribe at a peer gets no error, and no messages.
+#
+#     robot R     puts radio/R/*, bridge/R/sent; is alive/R; answers control/R; queries bridge/R/join;
+#                 subscribes to radio, poses and bridge/R/received
+#     tracker     puts pose/*, bridge/*/received; answers bridge/*/join; subscribes to radio and bridge/*/sent
+#     operator    queries control/*; subscribes to radio and poses
+#     a revoked name, another name, no certificate: no rights
+#
+# The tracker is a camera system that publishes poses, or the world of a run, which publishes poses and serves the radio
+# medium.
 
 
 def access_of(network: Network, keys: SwarmKeys, robots: Sequence[str], own: str) -> dict[str, Any] | None:
-    """`access_control` by these settings; None without certificates, when nobody can tell who is at the other end."""
+    """`access_control` by these settings; None without certificates, which identify the other end of a link."""
     if not network.proves:
         return None
     return access_control(keys, robots, own, network.tracker, network.operator, network.revoked)
@@ -44,22 +55,21 @@ def access_control(
     operator: str = OPERATOR,
     revoked: Collection[str] = (),
 ) -> dict[str, Any]:
-    """The value of `access_control` for the peer whose certificate is on `own`: what is not named is refused.
+    """The value of `access_control` for the peer whose certificate has the name `own`.
 
-    `robots` are all names in the swarm. Refusals are silent: a put that is refused arrives nowhere, a query gets no
-    answer. BadInput for a name that is none, that stands for two, or if `own` is unknown or revoked.
+    `robots` are all names in the swarm. BadInput for an invalid or repeated name, or if `own` is unknown or revoked.
     """
     _check([*robots, tracker, operator], own, revoked)
-    rights = {robot: _of_robot(keys, robot) for robot in robots}
-    rights |= {tracker: _of_tracker(keys), operator: _of_robots_operator(keys)}
+    rights = {robot: _rights_of_robot(keys, robot) for robot in robots}
+    rights |= {tracker: _rights_of_tracker(keys), operator: _rights_of_operator(keys)}
     members = [name for name in rights if name not in revoked]
-    may_send = [_rule(f"of own {place}", "egress", right) for place, right in enumerate(rights[own])]
-    rules, policies = list(may_send), list[dict[str, Any]]()
+    egress = [_rule(f"of own {i}", "egress", right) for i, right in enumerate(rights[own])]
+    rules, policies = list(egress), list[dict[str, Any]]()
     for name in members:
-        may_bring = [_rule(f"{name} {place}", "ingress", right) for place, right in enumerate(rights[name])]
-        rules += may_bring
-        policies.append({"subjects": [name], "rules": [rule["id"] for rule in (*may_bring, *may_send)]})
-    # A subject without names would be everybody; one name each, and there is no list that may be empty.
+        ingress = [_rule(f"{name} {i}", "ingress", right) for i, right in enumerate(rights[name])]
+        rules += ingress
+        policies.append({"subjects": [name], "rules": [rule["id"] for rule in (*ingress, *egress)]})
+    # A subject without names would match every member; so each subject has one name.
     subjects = [{"id": name, "cert_common_names": [name]} for name in members]
     return {
         "enabled": True,
@@ -70,35 +80,35 @@ def access_control(
     }
 
 
-def _of_robot(keys: SwarmKeys, robot: str) -> list[Right]:
+def _rights_of_robot(keys: SwarmKeys, robot: str) -> list[Right]:
     return [
         (["put"], [keys.any_radio_of(robot), keys.bridge_sent(robot)]),
         (["liveliness_token"], [keys.alive(robot)]),
         (["declare_queryable", "reply"], [keys.control(robot)]),
         (["query"], [keys.bridge_join(robot)]),
         (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.bridge_received(robot)]),
-        _sees_who_lives(keys),
+        _liveliness_rights(keys),
     ]
 
 
-def _of_tracker(keys: SwarmKeys) -> list[Right]:
+def _rights_of_tracker(keys: SwarmKeys) -> list[Right]:
     return [
         (["put"], [keys.any_pose, keys.bridge_received("*")]),
         (["declare_queryable", "reply"], [keys.any_bridge_join]),
         (["declare_subscriber"], [keys.any_radio, keys.any_bridge_sent]),
-        _sees_who_lives(keys),
+        _liveliness_rights(keys),
     ]
 
 
-def _of_robots_operator(keys: SwarmKeys) -> list[Right]:
+def _rights_of_operator(keys: SwarmKeys) -> list[Right]:
     return [
         (["query"], [keys.any_control]),
         (["declare_subscriber"], [keys.any_radio, keys.any_pose]),
-        _sees_who_lives(keys),
+        _liveliness_rights(keys),
     ]
 
 
-def _sees_who_lives(keys: SwarmKeys) -> Right:
+def _liveliness_rights(keys: SwarmKeys) -> Right:
     return ["liveliness_query", "declare_liveliness_subscriber"], [keys.alive("*")]
 
 
@@ -110,7 +120,7 @@ def _rule(name: str, flow: str, right: Right) -> dict[str, Any]:
 def _check(names: Sequence[str], own: str, revoked: Collection[str]) -> None:
     for name in names:
         fault = fault_of_name(name)
-        if fault is not None:  # a `*` in it would be everybody's keys
+        if fault is not None:  # a `*` in it would match the keys of all members
             raise BadInput("network", name, fault)
         if names.count(name) > 1:
             raise BadInput("network", name, "expected names that differ: of each robot, of tracker and operator")
@@ -120,39 +130,29 @@ def _check(names: Sequence[str], own: str, revoked: Collection[str]) -> None:
         raise BadInput("network", own, "its certificate is revoked: expected a name that is not")
 
 
-# --- Who may send what at the endpoints of a run, as zenoh's `access_control` for its worlds and routers.
+# The endpoints of a run. A unix socket, which only programs of its owner can open, needs no certificate and has the
+# rights of any runner or operator.
 #
-# The other end of a link is known by the common name of its certificate; a unix socket, which only its owner's programs
-# can open, needs none and stands for any runner or operator.
+#     runner R    queries offer/R and join/R, is alive/R, puts answer/R, subscribes to frame/R and world
+#     observer    sees that the run is published, queries scene and status, subscribes to truth
+#     operator    as the observer, and queries control
+#     router      at the agents' endpoint the rights of all runners, at the observers' endpoint those of operators
 #
-#     runner R    asks offer/R and join/R, is alive/R, puts answer/R, hears frame/R, and sees whether the world is there
-#     observer    sees that the run is published, asks scene and status, hears truth
-#     operator    the same, and asks control
-#     router      on the agents' endpoint: what the runners may; on the observers': what the operators may
-#
-# What is not named is refused, silently: a put arrives nowhere, a query gets no answer. A rule holds only if its keys
-# include the whole key of a message. So a runner must be told of the subscription answer/*, which is the world's own
-# (`any_answer`): a rule for answer/R alone would keep it from R, who would then send nothing at all.
-
-
-WORLD = "world"  # the usual name on the certificate of a machine that runs worlds
-ANY = "*"  # any runner; of any run
-Rights = list[tuple[list[str], list[str]]]  # messages as zenoh names them, and the keys that they may have
-LOCAL = {"link_protocols": ["unixsock-stream"]}
-SEES_WHO_LIVES = ["liveliness_query", "declare_liveliness_subscriber"]
+# A rule matches whole keys only, so the rules of a runner must include the world's subscription answer/*
+# (`any_answer`): with a rule for answer/R alone R would not learn of the subscription, and would send nothing at all.
 
 
 @dataclass(frozen=True)
 class RunAccess:
-    """Names on certificates, by what they are for; a name that is in none of these may do nothing.
+    """Names on certificates by role; a name in none of these has no rights.
 
     Attributes:
-        runners: who may play robots.
-        observers: who may look on.
-        operators: who may look on and control.
-        routers: who passes on what others may. Whoever runs a router could speak for all of those.
-        revoked: names that are in another list, and may do nothing any more.
-        worlds: whom a router takes for the world. A world itself takes nobody for one.
+        runners: members that may run robots.
+        observers: members that may watch the run.
+        operators: members that may watch and control the run.
+        routers: members that pass on the messages of others. A router could impersonate all of those.
+        revoked: names in another list that have no rights any more.
+        worlds: members that a router accepts as the world. A world itself accepts none.
     """
 
     runners: tuple[str, ...] = ()
@@ -163,89 +163,89 @@ class RunAccess:
     worlds: tuple[str, ...] = (WORLD,)
 
     def check(self, where: str = "access") -> None:
-        """BadInput for a name that is none, or that stands for two."""
+        """BadInput for an invalid or repeated name."""
         named = [*self.runners, *self.observers, *self.operators, *self.routers, *self.worlds]
         for name in named:
             fault = fault_of_name(name)
-            if fault is not None:  # a `*` in it would be everybody's keys
+            if fault is not None:  # a `*` in it would match the keys of all members
                 raise BadInput(where, name, fault)
             if named.count(name) > 1:
                 raise BadInput(where, name, "expected each name once, for one purpose")
 
     def without_revoked(self) -> "RunAccess":
-        """The same, where nobody is left who is revoked."""
+        """A copy without the revoked names in the other lists."""
 
-        def left(names: Iterable[str]) -> tuple[str, ...]:
+        def valid(names: Iterable[str]) -> tuple[str, ...]:
             return tuple(name for name in names if name not in self.revoked)
 
         return replace(
             self,
-            runners=left(self.runners),
-            observers=left(self.observers),
-            operators=left(self.operators),
-            routers=left(self.routers),
-            worlds=left(self.worlds),
+            runners=valid(self.runners),
+            observers=valid(self.observers),
+            operators=valid(self.operators),
+            routers=valid(self.routers),
+            worlds=valid(self.worlds),
         )
 
 
 def agents_access(keys: Keys, access: RunAccess) -> dict[str, Any]:
-    """The value of `access_control` for the agents' endpoint of a world. BadInput for names that will not do."""
+    """The value of `access_control` for the agents' endpoint of a world. BadInput for invalid names."""
     access.check()
     access = access.without_revoked()
     rules = _Rules()
     for name in access.runners:
-        rules.add(name, _cn(name), brings=_of_runner(keys, [name]), gets=_to_runner(keys, [name]))
+        rules.add(name, _cn(name), ingress=_from_runner(keys, [name]), egress=_to_runner(keys, [name]))
     for name in access.routers:
-        rules.add(name, _cn(name), brings=_of_runner(keys, access.runners), gets=_to_runner(keys, access.runners))
-    rules.add("local", LOCAL, brings=_of_runner(keys, [ANY]), gets=_to_runner(keys, [ANY]))
+        rules.add(name, _cn(name), ingress=_from_runner(keys, access.runners), egress=_to_runner(keys, access.runners))
+    rules.add("local", LOCAL, ingress=_from_runner(keys, [ANY]), egress=_to_runner(keys, [ANY]))
     return rules.as_mapping()
 
 
 def observers_access(keys: ObserverKeys, access: RunAccess) -> dict[str, Any]:
-    """The value of `access_control` for the observers' endpoint of a world. BadInput for names that will not do."""
+    """The value of `access_control` for the observers' endpoint of a world. BadInput for invalid names."""
     access.check()
     access = access.without_revoked()
     rules = _Rules()
     for name in access.observers:
-        rules.add(name, _cn(name), brings=_of_observer(keys), gets=_to_observer(keys))
+        rules.add(name, _cn(name), ingress=_from_observer(keys), egress=_to_observer(keys))
     for name in (*access.operators, *access.routers):
-        rules.add(name, _cn(name), brings=_of_operator(keys), gets=_to_operator(keys))
-    rules.add("local", LOCAL, brings=_of_operator(keys), gets=_to_operator(keys))
+        rules.add(name, _cn(name), ingress=_from_operator(keys), egress=_to_operator(keys))
+    rules.add("local", LOCAL, ingress=_from_operator(keys), egress=_to_operator(keys))
     return rules.as_mapping()
 
 
 def router_access(access: RunAccess) -> dict[str, Any]:
     """The value of `access_control` for a router between agents' endpoints of any run and their runners.
 
-    Routers are named in `access` whether they are before it or behind it. BadInput for names that will not do.
+    `access` names the routers on both sides of it. BadInput for invalid names.
     """
     access.check()
     access = access.without_revoked()
     keys, rules = Keys(ANY), _Rules()
-    of_runners, to_runners = _of_runner(keys, access.runners), _to_runner(keys, access.runners)
+    from_runners, to_runners = _from_runner(keys, access.runners), _to_runner(keys, access.runners)
     for name in access.runners:
-        rules.add(name, _cn(name), brings=_of_runner(keys, [name]), gets=_to_runner(keys, [name]))
+        rules.add(name, _cn(name), ingress=_from_runner(keys, [name]), egress=_to_runner(keys, [name]))
     for name in access.routers:
-        rules.add(name, _cn(name), brings=of_runners + to_runners, gets=to_runners + of_runners)
+        rules.add(name, _cn(name), ingress=from_runners + to_runners, egress=to_runners + from_runners)
     for name in access.worlds:
-        rules.add(name, _cn(name), brings=to_runners, gets=of_runners)
+        rules.add(name, _cn(name), ingress=to_runners, egress=from_runners)
     return rules.as_mapping()
 
 
-def _of_runner(keys: Keys, names: Iterable[str]) -> Rights:
-    """What runners of these names send."""
+def _from_runner(keys: Keys, names: Iterable[str]) -> Rights:
+    """The messages that runners of these names send."""
     names = list(names)
     return [
         (["put"], [keys.answer(name) for name in names]),
         (["declare_subscriber"], [keys.frame(name) for name in names]),
         (["query"], [key for name in names for key in (keys.offer(name), keys.join(name))]),
         (["liveliness_token"], [keys.alive(name) for name in names]),
-        (SEES_WHO_LIVES, [keys.world, Keys(ANY).world]),
+        (LIVELINESS, [keys.world, Keys(ANY).world]),
     ]
 
 
 def _to_runner(keys: Keys, names: Iterable[str]) -> Rights:
-    """What a world sends to runners of these names."""
+    """The messages that a world sends to runners of these names."""
     names = list(names)
     return [
         (["put"], [keys.frame(name) for name in names]),
@@ -253,15 +253,15 @@ def _to_runner(keys: Keys, names: Iterable[str]) -> Rights:
         (["declare_queryable"], [keys.offer(ANY), keys.join(ANY)]),
         (["reply"], [key for name in names for key in (keys.offer(name), keys.join(name))]),
         (["liveliness_token"], [keys.world]),
-        (SEES_WHO_LIVES, [keys.alive(ANY)]),
+        (LIVELINESS, [keys.alive(ANY)]),
     ]
 
 
-def _of_observer(keys: ObserverKeys) -> Rights:
+def _from_observer(keys: ObserverKeys) -> Rights:
     return [
         (["declare_subscriber"], [keys.truth]),
         (["query"], [keys.scene, keys.status]),
-        (SEES_WHO_LIVES, [keys.published, ObserverKeys(ANY).published]),
+        (LIVELINESS, [keys.published, ObserverKeys(ANY).published]),
     ]
 
 
@@ -273,8 +273,8 @@ def _to_observer(keys: ObserverKeys) -> Rights:
     ]
 
 
-def _of_operator(keys: ObserverKeys) -> Rights:
-    return [*_of_observer(keys), (["query"], [keys.control])]
+def _from_operator(keys: ObserverKeys) -> Rights:
+    return [*_from_observer(keys), (["query"], [keys.control])]
 
 
 def _to_operator(keys: ObserverKeys) -> Rights:
@@ -286,27 +286,27 @@ def _cn(name: str) -> dict[str, Any]:
 
 
 class _Rules:
-    """Rules, subjects and policies as they are gathered; what is not named is denied."""
+    """A builder of zenoh's rules, subjects and policies; the default is to deny."""
 
     def __init__(self) -> None:
         self._rules = list[dict[str, Any]]()
         self._subjects = list[dict[str, Any]]()
         self._policies = list[dict[str, Any]]()
 
-    def add(self, name: str, known_by: Mapping[str, Any], *, brings: Rights, gets: Rights) -> None:
-        """One member: what may come from it, and what may go to it."""
+    def add(self, name: str, identity: Mapping[str, Any], *, ingress: Rights, egress: Rights) -> None:
+        """Add a member: the messages that may come from it, and those that may go to it."""
         ids = list[str]()
-        for flow, rights in (("ingress", brings), ("egress", gets)):
-            for place, (messages, keys) in enumerate(rights):
+        for flow, rights in (("ingress", ingress), ("egress", egress)):
+            for i, (messages, keys) in enumerate(rights):
                 if keys:
-                    ids.append(f"{name} {flow} {place}")
+                    ids.append(f"{name} {flow} {i}")
                     rule = {"id": ids[-1], "permission": "allow", "flows": [flow]}
                     self._rules.append({**rule, "messages": messages, "key_exprs": keys})
-        self._subjects.append({"id": name, **known_by})
+        self._subjects.append({"id": name, **identity})
         self._policies.append({"subjects": [name], "rules": ids})
 
     def as_mapping(self) -> dict[str, Any]:
-        """As zenoh wants it."""
+        """The value of zenoh's `access_control`."""
         return {
             "enabled": True,
             "default_permission": "deny",

@@ -1,4 +1,7 @@
-"""What the agents of robots remember, as it is kept for whoever plays these robots next."""
+"""The memory of agents: states that a world keeps for the next runner of their robots.
+
+In frames it is the arrays `memory/{group}/{column}`, beside `memory/{group}/rows`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,24 +13,27 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array
 
+PREFIX = "memory/"
+ROWS = "rows"
+
 Layout = Mapping[str, tuple[str, tuple[int, ...]]]  # of each column: dtype, as in frames, and shape without the rows
 
 
 @dataclass(frozen=True, slots=True)
 class GroupMemory:
-    """What is remembered of some robots of one group."""
+    """The memory of the agents of some robots of one group."""
 
     rows: IntArray  # (n,) robot row, rising
     columns: Mapping[str, AnyArray]  # (n,) or (n, width)
 
     def of(self, rows: IntArray) -> "GroupMemory":
-        """What is remembered of these robots alone, as far as it is."""
-        mine = np.isin(self.rows, rows)
-        return GroupMemory(self.rows[mine], {name: column[mine] for name, column in self.columns.items()})
+        """The memory for those of these robots that have any."""
+        kept = np.isin(self.rows, rows)
+        return GroupMemory(self.rows[kept], {name: column[kept] for name, column in self.columns.items()})
 
     @classmethod
     def joined(cls, parts: "list[GroupMemory]") -> "GroupMemory":
-        """What is remembered of the robots of all parts, which are of one layout."""
+        """The memory of all parts, which have the same columns."""
         rows = np.concatenate([part.rows for part in parts])
         order = np.argsort(rows)
         names = parts[0].columns
@@ -35,13 +41,6 @@ class GroupMemory:
 
 
 Memory = dict[str, GroupMemory]  # by group
-
-
-# --- How what agents remember goes over the wire: arrays `memory/{group}/{column}`, beside `memory/{group}/rows`.
-
-
-PREFIX = "memory/"
-ROWS = "rows"
 
 
 def memory_arrays(memory: Memory) -> dict[str, AnyArray]:
@@ -55,28 +54,30 @@ def memory_arrays(memory: Memory) -> dict[str, AnyArray]:
 
 
 def encode_memory(memory: Memory) -> bytes:
-    """A `memory` frame: what earlier agents of a runner's robots remembered."""
+    """A `memory` frame: the memory of earlier agents of a runner's robots."""
     return frames.encode("memory", -1, memory_arrays(memory))
 
 
 def decode_memory(frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None) -> Memory:
-    """The memory that a frame carries, of groups of these layouts; BadFrame if it fits none.
+    """The memory in a frame, of groups with these layouts; BadFrame if an array does not fit.
 
-    With `rows`, by group, it must be that of exactly these robots, and there may be none.
+    With `rows`, by group, each group's memory must be for exactly these robots; a group may have none.
     """
     memory: Memory = {}
     for name, layout in layouts.items():
         key = f"{PREFIX}{name}/"
         if key + ROWS not in frame.arrays:
             continue
-        own = checked_array(frame, key + ROWS, "<i8", (None,))
-        if rows is not None and (name not in rows or len(own) != len(rows[name]) or (own != rows[name]).any()):
+        group_rows = checked_array(frame, key + ROWS, "<i8", (None,))
+        if rows is not None and (
+            name not in rows or len(group_rows) != len(rows[name]) or (group_rows != rows[name]).any()
+        ):
             raise BadFrame("malformed", f"{key}{ROWS}: expected the runner's own robots")
-        if (own[1:] <= own[:-1]).any():
+        if (group_rows[1:] <= group_rows[:-1]).any():
             raise BadFrame("malformed", f"{key}{ROWS}: expected rising rows")
         columns = {
-            column: checked_array(frame, key + column, code, (len(own), *shape))
+            column: checked_array(frame, key + column, code, (len(group_rows), *shape))
             for column, (code, shape) in layout.items()
         }
-        memory[name] = GroupMemory(own, columns)
+        memory[name] = GroupMemory(group_rows, columns)
     return memory

@@ -1,8 +1,11 @@
-"""Msgpack from elsewhere: what it becomes takes no more memory than its bytes allow for.
+"""Frames on the wire: msgpack maps of a version, a kind, a tick, named arrays and a few plain values.
 
-A byte of msgpack may be a list or a map, which takes seventy times as much here; so these are counted as they appear.
+Arrays are raw little-endian buffers. Decoding allocates nothing from a number in the frame: every array must fit its
+own bytes. Other items are counted while they are unpacked, since a byte of msgpack may be a list or a map, which takes
+seventy times as much memory.
 """
 
+# Data from the network are of unknown types until they are checked, item by item; a `cast` is a call, too slow here.
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false, reportUnknownMemberType=false
 
 from collections.abc import Mapping, Sized
@@ -16,17 +19,29 @@ from msgpack.exceptions import UnpackException
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
 
-# What arrives is of unknown types until it is checked.
-
-
+VERSION = 1  # of frames between world and runners, and of the messages before a runner joins
+KEYS = {"v", "kind", "tick", "arrays", "values"}
+MAX_BYTES = 64 * 1024 * 1024  # of a frame
+DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
+BOOL = DTYPES["|b1"]
 UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
-MAX_ITEMS = 500_000  # lists, maps and what is in them: some 40 MB; of a frame's arrays each is one
+MAX_ITEMS = 500_000  # lists, maps and their items: some 40 MB; each array of a frame is one item
 
 
-def unpacked(data: bytes, most_bytes: int) -> Any:
-    """What these bytes are; BadFrame ("oversized" or "malformed") if they are too many, hold too much, or are none."""
-    if len(data) > most_bytes:
-        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {most_bytes}")
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame; `kind` gives its arrays and values their meaning."""
+
+    kind: str
+    tick: int
+    arrays: Mapping[str, AnyArray]
+    values: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+def unpacked(data: bytes, max_bytes: int) -> Any:
+    """The msgpack value of bytes; BadFrame "oversized" or "malformed" for too many bytes, too many items or others."""
+    if len(data) > max_bytes:
+        raise BadFrame("oversized", f"{len(data)} bytes, expected at most {max_bytes}")
     try:
         return msgpack.unpackb(data) if len(data) <= UNCOUNTED_BYTES else _counted(data)
     except (ValueError, UnpackException) as error:
@@ -36,41 +51,14 @@ def unpacked(data: bytes, most_bytes: int) -> Any:
 def _counted(data: bytes) -> Any:
     items = 0
 
-    def count(found: Sized) -> Sized:
+    def count(container: Sized) -> Sized:
         nonlocal items
-        items += 1 + len(found)
+        items += 1 + len(container)
         if items > MAX_ITEMS:
             raise ValueError(f"more than {MAX_ITEMS} items")
-        return found
+        return container
 
     return msgpack.unpackb(data, list_hook=count, object_hook=count, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
-
-
-# --- Frames: msgpack maps of a version, a kind, a tick, named arrays as raw little-endian buffers, and a few plain
-# values.
-#
-# Nothing is allocated from a number that the frame claims: the bytes are there, and every array must fit its own bytes.
-# What else is in a frame is counted while it is unpacked.
-
-
-# What arrives is of unknown types until it is checked, item by item; a `cast` is a call, here in the busiest of loops.
-
-
-VERSION = 1  # of frames between world and runners, and of what runners ask before
-KEYS = {"v", "kind", "tick", "arrays", "values"}
-MAX_BYTES = 64 * 1024 * 1024  # of a frame
-DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
-TRUTHS = DTYPES["|b1"]
-
-
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """One frame: `kind` says what its arrays and values mean."""
-
-    kind: str
-    tick: int
-    arrays: Mapping[str, AnyArray]
-    values: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping[str, Any] | None = None) -> bytes:
@@ -79,11 +67,11 @@ def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
-def decode(data: bytes, most_bytes: int = MAX_BYTES) -> Frame:
-    """The frame of these bytes; BadFrame ("oversized" or "malformed") if they are none. Arrays are read-only views."""
-    body = unpacked(data, most_bytes)
-    # Written out by hand, not with `match` or `cast`, here and below: a world decodes some arrays from each of hundreds
-    # of runners in every tick, and a runner that shares two cores with them finds its caches cold for every step.
+def decode(data: bytes, max_bytes: int = MAX_BYTES) -> Frame:
+    """The frame in these bytes; BadFrame ("oversized" or "malformed") for others. Arrays are read-only views."""
+    body = unpacked(data, max_bytes)
+    # Plain `if`s here and below, without `match` or `cast`, for speed: a world decodes some arrays from each of
+    # hundreds of runners in every tick, and a runner that shares two cores with them has cold caches in every step.
     if type(body) is not dict or body.keys() != KEYS:
         raise BadFrame("malformed", f"expected a map of {', '.join(sorted(KEYS))}")
     version, kind, tick, arrays, values = body["v"], body["kind"], body["tick"], body["arrays"], body["values"]
@@ -111,28 +99,25 @@ def _array(name: str, item: Any) -> AnyArray:
 def _shaped(dtype: np.dtype[Any], shape: list[Any], buffer: bytes) -> AnyArray | None:
     items = 1
     for length in shape:
-        # Each length is bounded, too: 0 x 2^63 holds nothing, and yet numpy has no such array.
+        # Each length is bounded, too: an array of 0 x 2^63 has no bytes, and numpy refuses it.
         if type(length) is not int or not 0 <= length <= MAX_BYTES:
             return None
         items *= length
     axes = len(shape)
     if not 0 < axes < 3 or items * dtype.itemsize != len(buffer):
         return None
-    if dtype is TRUTHS and buffer.translate(None, b"\x00\x01"):
-        return None  # numpy masks and counts wrongly with any other byte
+    if dtype is BOOL and buffer.translate(None, b"\x00\x01"):
+        return None  # with any other byte, numpy's masks and counts would be wrong
     array = np.frombuffer(buffer, dtype)
     return array if axes == 1 else array.reshape(shape)
-
-
-# --- Arrays of a frame that came over the wire, checked before they are used.
 
 
 def checked_array(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
     """An array of the frame, of this dtype and shape (None: any length); BadFrame otherwise."""
     array = frame.arrays.get(name)
     if array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape):
-        for want, got in zip(shape, array.shape, strict=True):
-            if want is not None and want != got:
+        for expected, length in zip(shape, array.shape, strict=True):
+            if expected is not None and expected != length:
                 break
         else:
             return array

@@ -1,33 +1,33 @@
-"""Names in the robots' network: parts of keys, common names of certificates, and names of files."""
+"""Names of members, and the zenoh key expressions of a run.
+
+A name is part of keys, the common name of a certificate, and part of file names. `Keys` are the keys at the agents'
+endpoint, `ObserverKeys` those at the observers' endpoint.
+"""
 
 import re
 
-LONGEST = 63  # of a part of a host's name, as which a certificate has it; a common name may have 64
-WANTED = f"expected 1 to {LONGEST} letters (a to z), digits, - and _ that start with a letter and do not end in -"
-_NAME = re.compile(rf"[A-Za-z](?:[A-Za-z0-9_-]{{0,{LONGEST - 2}}}[A-Za-z0-9_])?")
+EVERY_WORLD = "swarmwire/*/world"  # liveliness tokens of all runs at an endpoint
+# A certificate has the name as a label of a host name, which may have 63 characters; a common name may have 64.
+MAX_CHARACTERS = 63
+_RULE = f"expected 1 to {MAX_CHARACTERS} letters (a to z), digits, - and _ that start with a letter and do not end in -"
+_NAME = re.compile(rf"[A-Za-z](?:[A-Za-z0-9_-]{{0,{MAX_CHARACTERS - 2}}}[A-Za-z0-9_])?")
 
 
 def fault_of_name(name: str) -> str | None:
-    """What was expected instead of this name; None if it is one.
+    """The expectation that this name does not meet; None if it is valid.
 
     >>> fault_of_name("flock-3") is None
     True
     >>> fault_of_name("radio/*")
     "expected 1 to 63 letters (a to z), digits, - and _ that start with a letter and do not end in -, got 'radio/*'"
     """
-    return None if _NAME.fullmatch(name) else f"{WANTED}, got {name!r}"
-
-
-# --- Key expressions on the agents' and on the observers' endpoint.
-
-
-EVERY_WORLD = "swarmwire/*/world"  # liveliness tokens of all runs at an endpoint
+    return None if _NAME.fullmatch(name) else f"{_RULE}, got {name!r}"
 
 
 class Keys:
-    """The keys of one run on the agents' endpoint, under `swarmwire/{run}/`.
+    """The keys of one run at the agents' endpoint, under `swarmwire/{run}/`.
 
-    A runner's name is in each key that it asks or speaks at, so that access control can hold it to its own.
+    Each key that a runner queries or puts to contains its name, so that access control can restrict it to these keys.
     """
 
     def __init__(self, run: str) -> None:
@@ -39,11 +39,11 @@ class Keys:
         self.any_alive = f"{self.root}/alive/*"
 
     def offer(self, runner: str) -> str:
-        """Queryable: a runner asks what there is to play."""
+        """Queryable: a runner requests the session info."""
         return f"{self.root}/offer/{runner}"
 
     def join(self, runner: str) -> str:
-        """Queryable: a runner asks for robots and gets them."""
+        """Queryable: a runner requests robots and gets its assignment."""
         return f"{self.root}/join/{runner}"
 
     def frame(self, runner: str) -> str:
@@ -60,22 +60,22 @@ class Keys:
 
 
 def runner_of(key: str) -> str:
-    """The runner that a key names at its end."""
+    """The runner's name at the end of a key."""
     return key.rsplit("/", 1)[-1]
 
 
-def run_of(world: str) -> str:
-    """The run whose world's token this key is."""
-    return world.split("/")[1]
+def run_of(token: str) -> str:
+    """The run of a world's liveliness token."""
+    return token.split("/")[1]
 
 
 class ObserverKeys:
-    """The keys of one run on the observers' endpoint, under `swarmwire/{run}/`."""
+    """The keys of one run at the observers' endpoint, under `swarmwire/{run}/`."""
 
     def __init__(self, run: str) -> None:
         root = f"swarmwire/{run}"
-        self.published = f"{root}/published"  # liveliness token: the run goes on and can be looked at
-        self.scene = f"{root}/scene"  # queryable: what does not change
-        self.truth = f"{root}/truth"  # glimpses, so many a second at most; may be lost
-        self.status = f"{root}/status"  # queryable: how it goes, for whoever may look
-        self.control = f"{root}/control"  # queryable: what to do, for whoever may control
+        self.published = f"{root}/published"  # liveliness token: the run goes on and can be observed
+        self.scene = f"{root}/scene"  # queryable: the constant facts
+        self.truth = f"{root}/truth"  # observed ticks at a limited rate; may be lost
+        self.status = f"{root}/status"  # queryable: the run's status, for observers
+        self.control = f"{root}/control"  # queryable: control requests, for operators

@@ -1,4 +1,8 @@
-"""What a run tells once to whoever looks on, as a frame: names and types are those of `Scene`, checked on arrival."""
+"""Frames for live observers: a `scene` frame once, and a `truth` frame for each observed tick; checked on arrival.
+
+A `scene` frame holds an `ObservedRun` as maps and lists with the names of its fields. A `truth` frame holds the arrays
+and counts of an `ObservedTick`.
+"""
 
 import zlib
 from dataclasses import asdict, fields, is_dataclass
@@ -22,6 +26,11 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 
 OBSERVED_VERSION = 1  # of the frames for observers
 _MAY_BE_INFINITE = ".height_m"  # of an obstacle
+_RECEPTIONS = tuple(
+    field.name for field in fields(ReceptionRecords) if field.name not in ("rssi_dbm", "payload", "payloads")
+)
+_COUNTS = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
+_EVENT_TYPES = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
 
 
 def encode_scene(scene: ObservedRun) -> bytes:
@@ -30,24 +39,24 @@ def encode_scene(scene: ObservedRun) -> bytes:
 
 
 def decode_scene(frame: Frame) -> ObservedRun:
-    """The scene of a `scene` frame; BadFrame if it holds none, or one that contradicts itself."""
+    """The `ObservedRun` of a `scene` frame; BadFrame if it holds none, or one that contradicts itself."""
     check_version(frame, "scene")
     scene: ObservedRun = _build(ObservedRun, frame.values.get("scene"), "scene")
-    _check(scene.static)
+    _check_static(scene.static)
     if scene.selected not in scene.static.robot_names:
         raise BadFrame("malformed", "selected: expected one of the robots")
     return scene
 
 
 def check_version(frame: Frame, kind: str) -> None:
-    """Return if the frame is of this kind and of a version that is understood; BadFrame otherwise."""
+    """Raise BadFrame unless the frame is of this kind and of the known version."""
     version = frame.values.get("version")
     if frame.kind != kind or type(version) is not int or version != OBSERVED_VERSION:
         raise BadFrame("malformed", f"{frame.kind} {version!r}: expected {kind} {OBSERVED_VERSION}")
 
 
-def _check(static: Static) -> None:
-    """Numbers of things that must agree, and values that are divided by."""
+def _check_static(static: Static) -> None:
+    """Raise BadFrame where counts disagree, or a divisor is not above 0."""
     starts = [0, *(group.stop for group in static.groups)]
     image = static.floor.image if static.floor else None
     faults = {
@@ -55,24 +64,24 @@ def _check(static: Static) -> None:
         "rate_hz: expected 1 or more": static.rate_hz < 1,
         "arena_size_m: expected more than 0": min(static.arena_size_m) <= 0,
         "obstacles: expected those of each arena": len(static.obstacles) != static.arenas,
-        "obstacles: expected as many movable ones in each arena": len(set(map(_movable_told, static.obstacles))) > 1,
+        "obstacles: expected as many movable ones in each arena": len(set(map(_movable_count, static.obstacles))) > 1,
         "lights: expected those of each arena": len(static.lights) not in (0, static.arenas),
-        "floor.image: expected a grey for each row and column": image is not None and not _is_whole(image),
+        "floor.image: expected a grey for each row and column": image is not None and not _is_complete(image),
         "groups: expected each robot in one": [group.start for group in static.groups] != starts[:-1]
         or starts != sorted(set(starts))
         or starts[-1] != static.robots,
         "act_every_ticks: expected 1 or more": any(group.act_every_ticks < 1 for group in static.groups),
     }
-    for fault, found in faults.items():
-        if found:
+    for fault, is_present in faults.items():
+        if is_present:
             raise BadFrame("malformed", fault)
 
 
-def _movable_told(obstacles: tuple[Obstacle, ...]) -> int:
+def _movable_count(obstacles: tuple[Obstacle, ...]) -> int:
     return sum(obstacle.movable for obstacle in obstacles)
 
 
-def _is_whole(image: FloorImage) -> bool:
+def _is_complete(image: FloorImage) -> bool:
     try:
         return min(image.grey.shape) > 0
     except (ValueError, zlib.error):
@@ -80,7 +89,7 @@ def _is_whole(image: FloorImage) -> bool:
 
 
 def _build(hint: Any, value: object, key: str) -> Any:
-    """`value`, made of maps, lists and plain values, as the type that `hint` names."""
+    """`value`, made of maps, lists and plain values, as an instance of the type `hint`."""
     if hint is Body:
         return _body(value, key)
     if is_dataclass(hint):
@@ -114,8 +123,8 @@ def _record(kind: type[Any], value: object, key: str) -> Any:
     names = [field.name for field in fields(kind)]
     if type(value) is not dict or cast("dict[object, object]", value).keys() != set(names):
         raise BadFrame("malformed", f"{key}: expected a map of {', '.join(names)}")
-    hints, given = get_type_hints(kind), cast("dict[str, object]", value)
-    return kind(**{name: _build(hints[name], given[name], f"{key}.{name}") for name in names})
+    hints, values = get_type_hints(kind), cast("dict[str, object]", value)
+    return kind(**{name: _build(hints[name], values[name], f"{key}.{name}") for name in names})
 
 
 def _body(value: object, key: str) -> Body:
@@ -127,33 +136,25 @@ def _body(value: object, key: str) -> Body:
         raise BadFrame("malformed", str(error)) from error
 
 
-# --- A glimpse of a run as a frame: the tick's arrays, and what was measured; checked on arrival.
-
-
-_FINISHED = tuple(of.name for of in fields(ReceptionRecords) if of.name not in ("rssi_dbm", "payload", "payloads"))
-_COUNTED = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
-_EVENT = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
-
-
-def encode_truth(glimpse: ObservedTick) -> bytes:
+def encode_truth(observed: ObservedTick) -> bytes:
     """A `truth` frame."""
-    truth = glimpse.truth
+    truth = observed.truth
     values: dict[str, Any] = {
         "version": OBSERVED_VERSION,
         "time_ns": truth.time_ns,
-        "serial": glimpse.serial,
-        "ticks": glimpse.ticks,
+        "serial": observed.serial,
+        "ticks": observed.ticks,
         "states": truth.states,
         "events": [
             (event.serial, float(event.at_s), event.do, event.ended, event.part, event.singly) for event in truth.events
         ],
     }
-    return frames.encode("truth", truth.tick, _arrays(glimpse), values)
+    return frames.encode("truth", truth.tick, _arrays(observed), values)
 
 
-def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
-    """The arrays that a tick has."""
-    truth = glimpse.truth
+def _arrays(observed: ObservedTick) -> dict[str, AnyArray]:
+    """The arrays of a tick; absent ones are None in `Truth`."""
+    truth = observed.truth
     arrays: dict[str, AnyArray] = {
         "alive": truth.alive,
         "pose": truth.pose,
@@ -162,7 +163,7 @@ def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
         "state": truth.state,
         "leds": truth.leds,
         "contact_onsets": truth.contact_onsets,
-        "values": glimpse.values,
+        "values": observed.values,
     }
     for name, group in truth.readings.items():
         arrays[f"readings/{name}/rows"] = group.rows
@@ -173,10 +174,10 @@ def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
     if truth.edges is not None:
         arrays["edges"] = truth.edges
     if truth.tally is not None:
-        arrays["tally"] = np.array([getattr(truth.tally, name) for name in _COUNTED])
+        arrays["tally"] = np.array([getattr(truth.tally, name) for name in _COUNTS])
         arrays["tally/fates"] = truth.tally.fates
     if truth.finished is not None:
-        arrays["finished"] = np.array([getattr(truth.finished, name) for name in _FINISHED])
+        arrays["finished"] = np.array([getattr(truth.finished, name) for name in _RECEPTIONS])
         if truth.finished.rssi_dbm is not None:
             arrays["finished/rssi_dbm"] = truth.finished.rssi_dbm
     if truth.events:
@@ -185,19 +186,19 @@ def _arrays(glimpse: ObservedTick) -> dict[str, AnyArray]:
 
 
 def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
-    """The glimpse of a `truth` frame of this scene's run; BadFrame if it holds none, or one that contradicts itself."""
+    """The `ObservedTick` of a `truth` frame of this run; BadFrame if it holds none, or one that contradicts itself."""
     check_version(frame, "truth")
     static = scene.static
     n = static.arenas * static.robots
     states = _states(frame)
     state = checked_array(frame, "state", "<i8", (n,))
-    _within("state", state, len(states))
+    _check_range("state", state, len(states))
     leds = checked_array(frame, "leds", "<i8", (n, static.max_leds))
-    _within("leds", leds, BRIGHTEST + 1)
+    _check_range("leds", leds, BRIGHTEST + 1)
     truth = Truth(
-        tick=_least(frame.tick, 0, "tick"),
-        time_ns=_least(frame.values.get("time_ns"), 0, "time_ns"),
-        running=np.ones(static.arenas, np.bool_),  # none is published of an arena that left
+        tick=_at_least(frame.tick, 0, "tick"),
+        time_ns=_at_least(frame.values.get("time_ns"), 0, "time_ns"),
+        running=np.ones(static.arenas, np.bool_),  # no tick of an arena that left is published
         alive=checked_array(frame, "alive", "|b1", (n,)),
         pose=checked_array(frame, "pose", "<f8", (n, 3)),
         velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
@@ -208,31 +209,31 @@ def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
         readings=_readings(frame, static),
         contact_onsets=checked_array(frame, "contact_onsets", "<i8", (static.arenas, 2)),
         edges=_edges(frame, n),
-        tally=_tally(frame, static.arenas),
-        finished=_finished(frame, static),
+        tally=_counts(frame, static.arenas),
+        finished=_receptions(frame, static),
         events=_events(frame, n),
-        movable=_movable(frame, static),
+        movable=_movable_poses(frame, static),
     )
     values = checked_array(frame, "values", "<f8", (len(scene.series), static.arenas))
-    serial, ticks = _least(frame.values.get("serial"), 0, "serial"), _least(frame.values.get("ticks"), 1, "ticks")
+    serial, ticks = _at_least(frame.values.get("serial"), 0, "serial"), _at_least(frame.values.get("ticks"), 1, "ticks")
     return ObservedTick(truth, serial, ticks, values)
 
 
-def _least(value: object, least: int, name: str) -> int:
-    if type(value) is not int or value < least:
-        raise BadFrame("malformed", f"{name}: expected a whole number of at least {least}")
+def _at_least(value: object, minimum: int, name: str) -> int:
+    if type(value) is not int or value < minimum:
+        raise BadFrame("malformed", f"{name}: expected a whole number of at least {minimum}")
     return value
 
 
-def _within(name: str, array: AnyArray, end: int, first: int = 0) -> None:
+def _check_range(name: str, array: AnyArray, end: int, first: int = 0) -> None:
     if ((array < first) | (array >= end)).any():
         raise BadFrame("malformed", f"{name}: expected {first} to {end - 1}")
 
 
 def _states(frame: Frame) -> tuple[str, ...]:
-    found: object = frame.values.get("states")
-    if type(found) is list:
-        states = cast("list[object]", found)
+    value: object = frame.values.get("states")
+    if type(value) is list:
+        states = cast("list[object]", value)
         if states and all(type(state) is str and len(state) <= MAX_STATE for state in states):
             return tuple(cast("list[str]", states))
     raise BadFrame("malformed", "states: expected a list of texts")
@@ -242,33 +243,33 @@ def _edges(frame: Frame, n: int) -> AnyArray | None:
     if "edges" not in frame.arrays:
         return None
     edges = checked_array(frame, "edges", "<i8", (None, 2))
-    _within("edges", edges, n)
+    _check_range("edges", edges, n)
     return edges
 
 
-def _movable(frame: Frame, static: Static) -> AnyArray | None:
+def _movable_poses(frame: Frame, static: Static) -> AnyArray | None:
     if not static.movable:
         return None
     poses = checked_array(frame, "movable", "<f8", (static.arenas, 3 * static.movable))
     return poses.reshape(static.arenas, static.movable, 3)
 
 
-def _tally(frame: Frame, arenas: int) -> PacketCounts | None:
+def _counts(frame: Frame, arenas: int) -> PacketCounts | None:
     if "tally" not in frame.arrays:
         return None
-    sent, intended, in_range = checked_array(frame, "tally", "<i8", (len(_COUNTED), arenas))
+    sent, intended, in_range = checked_array(frame, "tally", "<i8", (len(_COUNTS), arenas))
     return PacketCounts(sent, intended, in_range, checked_array(frame, "tally/fates", "<i8", (arenas, len(Fate))))
 
 
-def _finished(frame: Frame, static: Static) -> ReceptionRecords | None:
+def _receptions(frame: Frame, static: Static) -> ReceptionRecords | None:
     if "finished" not in frame.arrays:
         return None
-    columns = dict(zip(_FINISHED, checked_array(frame, "finished", "<i8", (len(_FINISHED), None)), strict=True))
-    _within("finished.arena", columns["arena"], static.arenas)
-    _within("finished.sender", columns["sender"], static.robots)
-    _within("finished.receiver", columns["receiver"], static.robots, first=-1)
-    _within("finished.to", columns["to"], static.robots, first=-1)
-    _within("finished.fate", columns["fate"], len(Fate))
+    columns = dict(zip(_RECEPTIONS, checked_array(frame, "finished", "<i8", (len(_RECEPTIONS), None)), strict=True))
+    _check_range("finished.arena", columns["arena"], static.arenas)
+    _check_range("finished.sender", columns["sender"], static.robots)
+    _check_range("finished.receiver", columns["receiver"], static.robots, first=-1)
+    _check_range("finished.to", columns["to"], static.robots, first=-1)
+    _check_range("finished.fate", columns["fate"], len(Fate))
     rssi_dbm = None
     if "finished/rssi_dbm" in frame.arrays:
         rssi_dbm = checked_array(frame, "finished/rssi_dbm", "<f8", (len(columns["arena"]),))
@@ -276,36 +277,36 @@ def _finished(frame: Frame, static: Static) -> ReceptionRecords | None:
 
 
 def _events(frame: Frame, n: int) -> tuple[EventRecord, ...]:
-    found: object = frame.values.get("events")
-    if type(found) is not list:
+    value: object = frame.values.get("events")
+    if type(value) is not list:
         raise BadFrame("malformed", "events: expected a list")
-    told = cast("list[object]", found)
-    if not told:
+    events = cast("list[object]", value)
+    if not events:
         return ()
-    changed = checked_array(frame, "events", "|b1", (len(told), n))
-    return tuple(_event(item, row) for item, row in zip(told, changed, strict=True))
+    changed = checked_array(frame, "events", "|b1", (len(events), n))
+    return tuple(_event(item, row) for item, row in zip(events, changed, strict=True))
 
 
 def _event(item: object, changed: AnyArray) -> EventRecord:
-    if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT:
-        serial, at_s, do, ended, failed, singly = cast("tuple[int, float, str, bool, str, bool]", item)
-        return EventRecord(serial, at_s, do, ended, changed, failed, singly)
+    if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT_TYPES:
+        serial, at_s, do, ended, failing_part, singly = cast("tuple[int, float, str, bool, str, bool]", item)
+        return EventRecord(serial, at_s, do, ended, changed, failing_part, singly)
     raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
 
 
 def _readings(frame: Frame, static: Static) -> Readings:
-    """The senses of some robots; of which groups and in which shapes must agree, which senses is the bodies' affair."""
-    found: dict[str, dict[str, AnyArray]] = {}
+    """The readings of some robots; groups, rows and lengths are checked, the names of sensors are not."""
+    groups: dict[str, dict[str, AnyArray]] = {}
     for key in frame.arrays:
         if key.startswith("readings/"):
             _, name, sensor = (*key.split("/", 2), "")[:3]
-            found.setdefault(name, {})[sensor] = frame.arrays[key]
-    if not found.keys() <= {group.name for group in static.groups}:
+            groups.setdefault(name, {})[sensor] = frame.arrays[key]
+    if not groups.keys() <= {group.name for group in static.groups}:
         raise BadFrame("malformed", "sense: expected groups of this run")
     readings: Readings = {}
-    for name, columns in found.items():
+    for name, columns in groups.items():
         rows = checked_array(frame, f"readings/{name}/rows", "<i8", (None,))
-        _within(f"readings/{name}/rows", rows, static.arenas * static.robots)
+        _check_range(f"readings/{name}/rows", rows, static.arenas * static.robots)
         del columns["rows"]
         if any(column.dtype != np.float64 or len(column) != len(rows) for column in columns.values()):
             raise BadFrame("malformed", f"readings/{name}: expected a row of numbers for each robot")

@@ -1,4 +1,8 @@
-"""What a tick carries across the wire: senses and received packets to a runner, actions back; checked on arrival."""
+"""Frames of a tick between world and runners, checked on arrival.
+
+A `tick` frame carries readings, received packets and tx statuses to a runner, an `actions` frame carries the actions
+back. In real time with a sub-tick, `packets` and `sent` frames carry packets in the middle of a tick.
+"""
 
 from collections.abc import Mapping, Set
 from types import MappingProxyType
@@ -37,24 +41,24 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, memory_arrays
 from swarmwire.comms.wire.frames import Frame, checked_array
 
-NOTHING_BESIDE: Mapping[str, AnyArray] = MappingProxyType({})
+NO_EXTRA_ARRAYS: Mapping[str, AnyArray] = MappingProxyType({})
 
 
 def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
-    """A `tick` frame: what a runner's robots sense and received, and what became of packets that they sent."""
+    """A `tick` frame: the readings, received packets and tx statuses of a runner's robots."""
     arrays: dict[str, AnyArray] = {}
     for name, group in readings.items():
         arrays[f"readings/{name}/rows"] = group.rows
         for sensor, column in group.fields.items():
             arrays[f"readings/{name}/{sensor}"] = column
-    return frames.encode("tick", tick, arrays | told_arrays(received, tx_status))
+    return frames.encode("tick", tick, arrays | result_arrays(received, tx_status))
 
 
-def told_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, AnyArray]:
-    """What was received, and what became of packets, as the arrays of a frame."""
+def result_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, AnyArray]:
+    """Received packets and tx statuses as the arrays of a frame."""
     arrays: dict[str, AnyArray] = {}
     if len(received):
-        # A row per column, so that each is contiguous again on the other side.
+        # A row per column, so that each column is contiguous after decoding.
         numbers = (received.receiver, received.sender, received.sequence, received.received_at_ns, received.payload)
         arrays["received/numbers"] = np.array(numbers)
         arrays["received/given"] = np.array(list(received.given.values())).reshape(len(received.given), len(received))
@@ -68,9 +72,9 @@ def told_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, A
 def decode_tick(
     frame: Frame, measures: tuple[str, ...], known: Set[str]
 ) -> tuple[Readings, ReceivedPackets, TxStatuses]:
-    """What `encode_tick` was given; BadFrame if there are no senses, or some of groups that are not known.
+    """The contents of a frame by `encode_tick`; BadFrame if it has no readings, or some of unknown groups.
 
-    Whose senses they are, and who received, `check_rows` tells.
+    `check_rows` checks the robots of the readings and the receivers.
     """
     groups: dict[str, dict[str, AnyArray]] = {}
     try:
@@ -81,28 +85,33 @@ def decode_tick(
         readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in groups.items()}
         if not readings or not readings.keys() <= known:
             raise BadFrame("malformed", "sense: expected groups of this runner")
-        return readings, *told_of(frame, measures)
+        return readings, *results_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
 def check_rows(readings: Readings, received: ReceivedPackets, rows: Mapping[str, IntArray]) -> None:
-    """BadFrame unless senses are numbers of robots among the `rows` of their group, and receivers are robots of any."""
+    """BadFrame unless readings are numbers of robots in the `rows` of their group, and receivers are robots of any."""
     for name, group in readings.items():
-        own, n = group.rows, len(group.rows)
-        if own.ndim != 1 or own.dtype != np.int64 or np.count_nonzero(own[1:] <= own[:-1]) or not _own(own, rows[name]):
+        index, n = group.rows, len(group.rows)
+        if (
+            index.ndim != 1
+            or index.dtype != np.int64
+            or np.count_nonzero(index[1:] <= index[:-1])
+            or not _are_among(index, rows[name])
+        ):
             raise BadFrame("malformed", f"readings/{name}/rows: expected robots of this runner, rising")
         for sensor, column in group.fields.items():
             if column.dtype != np.float64 or len(column) != n:
                 raise BadFrame("malformed", f"readings/{name}/{sensor}: expected numbers of {n} robots")
     if len(received):
-        last = max(int(of[-1]) for of in rows.values() if len(of))
+        last = max(int(group_rows[-1]) for group_rows in rows.values() if len(group_rows))
         if received.receiver[0] < 0 or received.receiver[-1] > last:
             raise BadFrame("malformed", "received/numbers: expected packets of robots of this runner")
 
 
-def told_of(frame: Frame, measures: tuple[str, ...]) -> tuple[ReceivedPackets, TxStatuses]:
-    """What `told_arrays` was given; KeyError, ValueError or BadFrame if the frame does not hold it."""
+def results_of(frame: Frame, measures: tuple[str, ...]) -> tuple[ReceivedPackets, TxStatuses]:
+    """The packets and statuses of `result_arrays`; KeyError, ValueError or BadFrame if the frame does not hold them."""
     return _received(frame, measures), _tx_status(frame)
 
 
@@ -143,11 +152,11 @@ def encode_actions(
     actions: Actions,
     dropped: int = 0,
     memory: Memory | None = None,
-    beside: Mapping[str, AnyArray] = NOTHING_BESIDE,
+    beside: Mapping[str, AnyArray] = NO_EXTRA_ARRAYS,
 ) -> bytes:
-    """An `actions` frame: what a runner's robots do and send, and how many frames to it were none that it could use.
+    """An `actions` frame: the actions of a runner's robots, and the number of frames that the runner dropped.
 
-    With `memory`, where the world keeps it, what their agents remember; `beside` are arrays that a record has more.
+    `memory` is the memory of their agents, for a world that keeps it; `beside` are extra arrays of a recording.
     """
     arrays: dict[str, AnyArray] = {
         **beside,
@@ -192,19 +201,19 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
-    own = _actuations(frame, rows) if "own" in frame.arrays else NO_ACTUATOR_COMMANDS
-    told = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, own, told)
+    commands = _actuator_commands(frame, rows) if "own" in frame.arrays else NO_ACTUATOR_COMMANDS
+    values = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, commands, values)
 
 
 def sent_of(frame: Frame, rows: IntArray) -> SentPackets:
-    """What `sent_arrays` was given; BadFrame unless it is of robots `rows` and does not contradict itself."""
+    """The packets of `sent_arrays`; BadFrame unless their senders are among `rows` and the arrays fit each other."""
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
     data = checked_array(frame, "sent/data", "|u1", (None,))
     if not _rises_to(offset, len(data)):
         raise BadFrame("malformed", "sent/offset: expected rising offsets into sent/data")
-    if not _own(sender, rows) or np.count_nonzero(to < BROADCAST):
+    if not _are_among(sender, rows) or np.count_nonzero(to < BROADCAST):
         raise BadFrame("malformed", "sent: expected packets of the runner's own robots")
     return SentPackets(sender, to, Payloads(data, offset), _tx_status_id(frame, to))
 
@@ -227,7 +236,7 @@ def _notes(frame: Frame, rows: IntArray) -> Notes:
         states = tuple(checked_state(name) for name in cast("list[object]", names))
     except ValueError as error:
         raise BadFrame("malformed", str(error)) from error
-    if not _own(noted, rows) or len(np.unique(noted)) < len(noted):
+    if not _are_among(noted, rows) or len(np.unique(noted)) < len(noted):
         raise BadFrame("malformed", "notes: expected the runner's own robots, each once")
     if ((code < 0) | (code >= len(states))).any():
         raise BadFrame("malformed", "notes: expected places in states")
@@ -236,66 +245,63 @@ def _notes(frame: Frame, rows: IntArray) -> Notes:
 
 def _leds(frame: Frame, rows: IntArray) -> LedChanges:
     switched, which, rgb = checked_array(frame, "leds", "<i8", (3, None))
-    if not _own(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
+    if not _are_among(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
         raise BadFrame("malformed", "leds: expected colours up to 0xFFFFFF of LEDs of the runner's own robots")
     return LedChanges(switched, which, rgb)
 
 
-def _actuations(frame: Frame, rows: IntArray) -> ActuatorCommands:
+def _actuator_commands(frame: Frame, rows: IntArray) -> ActuatorCommands:
     actuated, place = checked_array(frame, "own", "<i8", (2, None))
     value = checked_array(frame, "own/value", "<f8", (len(actuated),))
-    if not _own(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
+    if not _are_among(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
         raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
     return ActuatorCommands(actuated, place, value)
 
 
 def _values(frame: Frame, rows: IntArray) -> Values:
-    told = checked_array(frame, "values", "<i8", (None,))
-    value = checked_array(frame, "values/value", "<f8", (len(told),))
-    if not _own(told, rows) or not np.isfinite(value).all():
+    noted = checked_array(frame, "values", "<i8", (None,))
+    value = checked_array(frame, "values/value", "<f8", (len(noted),))
+    if not _are_among(noted, rows) or not np.isfinite(value).all():
         raise BadFrame("malformed", "values: expected finite numbers of the runner's own robots")
-    return Values(told, value)
+    return Values(noted, value)
 
 
-def _own(some: IntArray, rows: IntArray) -> bool:
-    """Whether all of these are among the rows."""
-    if not len(some) or not len(rows):
-        return not len(some)
+def _are_among(index: IntArray, rows: IntArray) -> bool:
+    """Whether all robots in `index` are among the rows."""
+    if not len(index) or not len(rows):
+        return not len(index)
     if len(rows) == 1:
-        return np.count_nonzero(some == rows) == len(some)
-    known = np.sort(rows)
-    return np.count_nonzero(known[np.searchsorted(known[:-1], some)] == some) == len(some)
-
-
-# --- What crosses the wire in the middle of a tick, in real time with a subtick: packets to a runner, packets back.
+        return np.count_nonzero(index == rows) == len(index)
+    sorted_rows = np.sort(rows)
+    return np.count_nonzero(sorted_rows[np.searchsorted(sorted_rows[:-1], index)] == index) == len(index)
 
 
 def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
-    """A `packets` frame: what a runner's robots received since the last, and learned of their own packets.
+    """A `packets` frame: packets received, and tx statuses, of a runner's robots since the last such frame.
 
-    It is handed over at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
+    They are delivered at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
     """
-    return frames.encode("packets", tick, told_arrays(received, tx_status), {"at_ns": at_ns, "number": number})
+    return frames.encode("packets", tick, result_arrays(received, tx_status), {"at_ns": at_ns, "number": number})
 
 
 def decode_packets(frame: Frame, measures: tuple[str, ...]) -> tuple[int, int, ReceivedPackets, TxStatuses]:
-    """Time, number and what else `encode_packets` was given; BadFrame if the frame does not hold it."""
+    """The time, number, packets and statuses of a frame by `encode_packets`; BadFrame if it does not hold them."""
     at_ns, number = frame.values.get("at_ns"), frame.values.get("number")
     if type(at_ns) is not int or type(number) is not int:
         raise BadFrame("malformed", "expected at_ns and number")
     try:
-        return at_ns, number, *told_of(frame, measures)
+        return at_ns, number, *results_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error
 
 
 def encode_sent(tick: int, sent: SentPackets, missed: int = 0) -> bytes:
-    """A `sent` frame: what robots sent between ticks; `missed` counts `packets` frames that never came."""
+    """A `sent` frame: packets that robots sent between ticks; `missed` counts `packets` frames that never came."""
     return frames.encode("sent", tick, sent_arrays(sent), {"missed": missed} if missed else {})
 
 
 def decode_sent(frame: Frame, rows: IntArray) -> SentPackets:
-    """Packets of the robots `rows`; BadFrame if there are none, or some of others."""
+    """The packets of a `sent` frame; BadFrame if it has none, or packets of robots outside `rows`."""
     if "sent" not in frame.arrays:
         raise BadFrame("malformed", "expected packets")
     return sent_of(frame, rows)

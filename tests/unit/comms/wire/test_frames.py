@@ -202,8 +202,8 @@ def test_bytes_that_are_no_message_are_malformed(data: bytes) -> None:
 
 def test_more_bytes_than_the_limit_are_oversized_and_not_read() -> None:
     data = whole()
-    assert fault(data, most_bytes=len(data) - 1) == "oversized"
-    assert fault(b"\xc1" * 10, most_bytes=9) == "oversized"
+    assert fault(data, max_bytes=len(data) - 1) == "oversized"
+    assert fault(b"\xc1" * 10, max_bytes=9) == "oversized"
     assert frames.decode(data, most_bytes=len(data)).tick == 3
 
 
