@@ -1,4 +1,4 @@
-"""The senses that a body may have: what a data sheet says of each."""
+"""The sensors that a body may have, with the keys of each in a data sheet."""
 
 from dataclasses import fields
 from inspect import getdoc
@@ -10,11 +10,11 @@ from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 
 
 def sensor_tables() -> str:
-    """The keys that all senses share; then every sense, what it is, and its own keys in a body's data sheet."""
+    """The keys that all sensors share; then every sensor, its description, and its own keys in a data sheet."""
     shared = [code(of.name) for of in fields(RangedSensorSpec)]
-    parts = ["Keys that every sense has:\n", table(HEAD, parameter_rows(SensorSpec))]
+    parts = ["Keys of every sensor:\n", table(HEAD, parameter_rows(SensorSpec))]
     parts += [
-        "And every sense with a range:\n",
+        "And of every sensor with a range:\n",
         table(HEAD, parameter_rows(RangedSensorSpec)[len(fields(SensorSpec)) :]),
     ]
     for name, kind in SENSOR_SPECS.items():

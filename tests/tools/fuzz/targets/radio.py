@@ -59,7 +59,7 @@ class Terms(DocumentTarget):
 class BridgeReceived(FrameTarget):
     """What a robot receives of a world's radio: taken or counted."""
 
-    name = "air-received"
+    name = "medium-received"
 
     def make_samples(self) -> list[bytes]:
         run, row = small_run(), 1
@@ -82,7 +82,7 @@ class BridgeReceived(FrameTarget):
 class BridgeSent(FrameTarget):
     """What a robot sends through a world's radio: taken or counted, and of that robot alone."""
 
-    name = "air-sent"
+    name = "medium-sent"
 
     def make_samples(self) -> list[bytes]:
         row, zero = np.array([1]), np.zeros(1)
