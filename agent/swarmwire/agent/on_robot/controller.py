@@ -146,4 +146,4 @@ class Controller:
 def group_of(name: str, index: int, spec: str, params: dict[str, Any], body: Body, seed: int) -> GroupAssignment:
     """The assignment of one robot of a swarm; its draws are keyed by the seed and its index."""
     keys = np.array([derive_key("robot", seed, index)], np.uint64)
-    return GroupAssignment("robot", spec, params, body.told, np.array([index]), (name,), keys)
+    return GroupAssignment("robot", spec, params, body.agent_view, np.array([index]), (name,), keys)

@@ -1,27 +1,29 @@
-"""What every radio of an agent on a robot is."""
+"""The interface of radios of an agent on a robot, the radio of a robot without one, and the packets for its log."""
 
 from typing import NamedTuple, Protocol
 
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
+
+SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
 
 
 class RobotRadio(Protocol):
     """The radio of one robot: `received` and `send` are called from one thread, once per tick each.
 
     Attributes:
-        needs: what of an agent's `needs` it meets: "radio.range", "radio.bearing", "radio.tx_status", …
-        gives: the columns of `ReceivedPackets.given`, in their order.
+        needs: the needs of agents that it meets: "radio.range", "radio.bearing", "radio.tx_status", …
+        measures: the columns of `ReceivedPackets.given`, in their order.
     """
 
     needs: frozenset[str]
     measures: tuple[str, ...]
 
     def open(self) -> None:
-        """Take part in the network."""
+        """Join the network."""
         ...
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """What reached the robot since the last call, in the order that `ReceivedPackets` promises.
+        """Packets and tx statuses since the last call, in the order that `ReceivedPackets` promises.
 
         `receiver` and `TxStatuses.row` are the robot's row. `now_ns` and `received_at_ns` are times since the agent's
         start.
@@ -29,7 +31,7 @@ class RobotRadio(Protocol):
         ...
 
     def send(self, sent: SentPackets) -> None:
-        """Hand packets to the network, at once; nothing is raised for one that is lost or too large: it is counted."""
+        """Send packets at once; one that is lost or too large raises nothing and is counted."""
         ...
 
     def counts(self) -> dict[str, int]:
@@ -41,11 +43,8 @@ class RobotRadio(Protocol):
         ...
 
 
-# --- The radio of a robot that has none.
-
-
 class NoRadio:
-    """Nothing is received; what the agent sends is counted, and goes nowhere."""
+    """The radio of a robot without one: nothing is received; packets of the agent are counted and dropped."""
 
     needs: frozenset[str] = frozenset()
     measures: tuple[str, ...] = ()
@@ -54,7 +53,7 @@ class NoRadio:
         self._unsent = 0
 
     def open(self) -> None:
-        """There is nothing to take part in."""
+        """There is nothing to join."""
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Nothing."""
@@ -65,31 +64,25 @@ class NoRadio:
         self._unsent += len(sent)
 
     def counts(self) -> dict[str, int]:
-        """How many packets went nowhere."""
+        """Number of dropped packets."""
         return {"packets_without_radio": self._unsent} if self._unsent else {}
 
     def close(self) -> None:
         """There is nothing to leave."""
 
 
-# --- What a robot's radio tells its log: each packet that arrived, also for others, and each that it was to send.
-
-
-SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
-
-
 class ReceivedPacket(NamedTuple):
-    """A packet that arrived; robots are places in the swarm's list."""
+    """A packet that arrived, also one for another robot; robots are indices in the swarm."""
 
-    utc_ns: int  # when it arrived
+    utc_ns: int  # time of arrival
     sender: int
     sequence: int
-    to: int  # whom it was meant for, or BROADCAST
+    to: int  # index of the addressed robot, or BROADCAST
     size_bytes: int  # of the message, tag included
     tag: int
-    latency_ns: int | None  # from the sender's clock to this robot's; None: not known
-    distance_m: float | None  # None: not known
-    given: bool  # whether the agent gets it
+    latency_ns: int | None  # from the sender's clock to this robot's; None: unknown
+    distance_m: float | None  # None: unknown
+    given: bool  # whether the agent receives it
 
 
 class SentPacket(NamedTuple):
@@ -97,14 +90,14 @@ class SentPacket(NamedTuple):
 
     utc_ns: int
     sequence: int
-    to: int  # a place in the swarm's list, or BROADCAST
+    to: int  # index in the swarm, or BROADCAST
     size_bytes: int  # of the message, tag included
     tag: int
     fate: str  # SENT or TOO_LARGE
 
 
 class RadioLog(Protocol):
-    """Whoever keeps them; told from the thread that calls the radio."""
+    """Logs packets; called from the thread that calls the radio."""
 
     def received(self, packet: ReceivedPacket) -> None:
         """A packet arrived."""
@@ -116,10 +109,10 @@ class RadioLog(Protocol):
 
 
 class NoRadioLog:
-    """Nobody keeps them."""
+    """Logs nothing."""
 
     def received(self, packet: ReceivedPacket) -> None:
-        """Nothing is kept."""
+        """Log nothing."""
 
     def sent(self, packet: SentPacket) -> None:
-        """Nothing is kept."""
+        """Log nothing."""

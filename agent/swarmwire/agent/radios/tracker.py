@@ -13,15 +13,15 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.radio_bridge import POSE_BYTES, Pose, decode_pose
 from swarmwire.comms.wire.robot_network import SwarmKeys
 
-OLDEST_NS = NS_PER_S  # a pose that was seen longer ago, or is dated so far ahead, is not used
+MAX_AGE_NS = NS_PER_S  # a pose with an older stamp, or one that far in the future, is not used
 
 
 class Tracker:
     """The newest pose of each robot; `pose` may be called from any thread.
 
     Attributes:
-        malformed: messages that are no pose, so far.
-        unknown: poses of robots that are not of the swarm.
+        malformed: messages so far that are no pose.
+        unknown: poses so far of robots outside the swarm.
     """
 
     def __init__(self, session: zenoh.Session, keys: SwarmKeys, robots: Sequence[str]) -> None:
@@ -32,30 +32,30 @@ class Tracker:
         self.malformed = self.unknown = 0
 
     def open(self) -> None:
-        """Listen for poses."""
-        # All poses of a swarm cost each robot a call for each: whoever wants one alone asks for that.
-        only = next(iter(self._robot_of)) if len(self._robot_of) == 1 else self._keys.any_pose
+        """Subscribe to poses."""
+        # Each pose costs a call, so a robot that needs key one pose subscribes to that one.
+        key = next(iter(self._robot_of)) if len(self._robot_of) == 1 else self._keys.any_pose
         self._subscriber = self._session.declare_subscriber(
-            only, Callback(self._keep, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+            key, Callback(self._store, indirect=False), allowed_origin=zenoh.Locality.REMOTE
         )
 
     def pose(self, robot: str, now_utc_ns: int) -> Pose | None:
-        """Where the robot was seen last, if that was within a second of now."""
+        """The robot's newest pose, if its stamp is within a second of now."""
         stamp_ns, pose = self._newest.get(robot, (0, None))
-        return pose if abs(now_utc_ns - stamp_ns) <= OLDEST_NS else None
+        return pose if abs(now_utc_ns - stamp_ns) <= MAX_AGE_NS else None
 
     def counts(self) -> dict[str, int]:
-        """What came that was of no use, by name."""
+        """Unusable messages, by name."""
         return {"poses_malformed": self.malformed, "poses_of_unknown": self.unknown}
 
     def close(self) -> None:
-        """Listen no more; safe to call more than once."""
+        """End the subscription; safe to call more than once."""
         subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None and not self._session.is_closed():
             subscriber.undeclare()
 
-    def _keep(self, sample: zenoh.Sample) -> None:
-        """Called by the network's thread: it must take no time."""
+    def _store(self, sample: zenoh.Sample) -> None:
+        """Called by the network's thread, which it must not delay."""
         robot = self._robot_of.get(str(sample.key_expr))
         if robot is None:
             self.unknown += 1

@@ -1,9 +1,10 @@
-"""The medium of a world nearby as a radio: what this robot sends is on air there, and it hears what it would there.
+"""The radio medium of a nearby world as the radio of a real robot: its packets are emulated among the world's robots.
 
-It joins by asking for its terms, which say what the world's radio gives; then `actions` frames go there, of which only
-the packets count, and `tick` frames come back, which hold no senses.
+The radio joins by a query, whose answer describes the world's medium (`BridgeInfo`). Then it sends `actions` frames, of
+which only the packets count, and receives `tick` frames without readings.
 """
 
+# zenoh's stubs leave out the return types of put and undeclare.
 # pyright: reportUnknownMemberType=false
 
 from collections import Counter
@@ -24,12 +25,9 @@ from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbo
 from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 
-# zenoh's stubs leave out the return types of put and undeclare.
-
-
-JOIN_S = 10.0  # how long a world may take to answer
-ONE_TRY_S = 1.0
-AGAIN_NS = to_ns(0.1)
+JOIN_TIMEOUT_S = 10.0  # of all queries
+QUERY_TIMEOUT_S = 1.0
+QUERY_INTERVAL_NS = to_ns(0.1)
 MAX_WAITING = 1024  # frames that may wait for the agent's next step
 NO_COMMAND = np.zeros(1)
 
@@ -44,7 +42,7 @@ class WorldRadio:
     """The radio of the robot `own`, one of `robots`, in the medium of the world that answers in this network.
 
     Attributes:
-        terms: what the world's radio is to this robot; None before `open`. So are `needs` and `measures` empty.
+        terms: the world's medium; None before `open`, when `needs` and `measures` are empty.
     """
 
     def __init__(
@@ -57,7 +55,7 @@ class WorldRadio:
         log: RadioLog | None = None,
         wall: Clock | None = None,
     ) -> None:
-        """`clock` runs at the agent's pace; the network is waited for by the `wall` clock, whatever that pace is."""
+        """`clock` runs at the agent's pace; timeouts of the network use the `wall` clock."""
         self._session, self._keys, self._robots, self._own = session, keys, tuple(robots), own
         self._row, self._clock = self._robots.index(own), clock
         self._wall: Clock = wall or WallClock()
@@ -71,36 +69,38 @@ class WorldRadio:
         self.needs: frozenset[str] = frozenset()
 
     def open(self) -> None:
-        """Join the medium; BadInput if there is no world in the network, or this robot or its swarm is not in it."""
+        """Join the medium; BadInput if no world answers, or its robots differ from those of the swarm."""
         terms = self._join()
         if terms.robots != self._robots:
-            given = ", ".join(terms.robots)
-            raise BadInput("robots", "", f"expected the robots of the world, in its order: {given}")
+            names = ", ".join(terms.robots)
+            raise BadInput("robots", "", f"expected the robots of the world, in its order: {names}")
         self.terms, self.measures, self.needs = terms, terms.measures, frozenset(terms.needs)
         self._subscriber = self._session.declare_subscriber(
             self._keys.bridge_received(self._own), Callback(self._arrive, indirect=False)
         )
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """What the world's air brought since the last call."""
+        """Packets and tx statuses from the medium since the last call."""
         terms, received, tx_status = self._joined(), ReceivedPackets.none(self.measures), NO_TX_STATUSES
         started_ns = self._clock.now_ns() - now_ns
         for arrival in self._inbox.take():
             try:
-                tick, its, told = decode_bridged(arrival.frame, terms)
+                tick, packets, statuses = decode_bridged(arrival.frame, terms)
             except BadFrame as error:
                 self._counted[f"frames_{error.fault}"] += 1
                 continue
             # The frame left the world as its tick began.
             ahead_ns = arrival.at_ns - started_ns - tick_start_ns(tick, terms.rate_hz)
-            mine = self._own_rows(its, ahead_ns)
-            self._note(mine, arrival.utc_ns - arrival.at_ns + started_ns)
+            mine = self._own_rows(packets, ahead_ns)
+            self._log_received(mine, arrival.utc_ns - arrival.at_ns + started_ns)
             received = received.merged(mine)
-            tx_status = TxStatuses.joined([tx_status, TxStatuses(self._rows(told.row), told.id, told.result)])
+            tx_status = TxStatuses.joined(
+                [tx_status, TxStatuses(self._rows(statuses.row), statuses.id, statuses.result)]
+            )
         return received, tx_status
 
     def send(self, sent: SentPackets) -> None:
-        """Hand the packets to the world's air, also those that are too large for it: it counts them."""
+        """Send packets to the medium, also those that are too large for it: the world counts them."""
         if not len(sent):
             return
         terms, utc_ns = self._joined(), self._clock.utc_ns()
@@ -113,35 +113,37 @@ class WorldRadio:
             self._sequence += 1
         row = np.array([terms.row])
         packets = SentPackets(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.tx_status_id)
-        still = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
+        actions = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
         self._frames += 1
         try:
             self._session.put(
                 self._keys.bridge_sent(self._own),
-                encode_actions(self._frames, still),
+                encode_actions(self._frames, actions),
                 congestion_control=zenoh.CongestionControl.DROP,
             )
         except zenoh.ZError:  # the session was closed
             self._counted["packets_refused"] += len(sent)
 
     def counts(self) -> dict[str, int]:
-        """What was sent, received and lost on the way to the world, by name, where there is any."""
+        """Packets and frames sent, received and lost on the way to the world, by name, without zeros."""
         counted = Counter(self._counted)
         counted["frames_oversized"] += self._far_too_large
         counted["frames_dropped"] += self._inbox.dropped
         return {name: count for name, count in sorted(counted.items()) if count}
 
     def close(self) -> None:
-        """Hear no more; the session is its owner's."""
+        """Stop receiving; the session is closed by its owner."""
         subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None and not self._session.is_closed():
             subscriber.undeclare()
 
     def _join(self) -> BridgeInfo:
-        """The world's answer; the network may still be on its way up."""
-        end_ns = self._wall.now_ns() + to_ns(JOIN_S)
+        """The world's answer; repeated queries allow for a network that is still starting."""
+        end_ns = self._wall.now_ns() + to_ns(JOIN_TIMEOUT_S)
         while (left_ns := end_ns - self._wall.now_ns()) > 0:
-            for reply in self._session.get(self._keys.bridge_join(self._own), timeout=min(ONE_TRY_S, to_s(left_ns))):
+            for reply in self._session.get(
+                self._keys.bridge_join(self._own), timeout=min(QUERY_TIMEOUT_S, to_s(left_ns))
+            ):
                 if reply.ok is not None:
                     try:
                         return BridgeInfo.decode(reply.ok.payload.to_bytes())
@@ -149,7 +151,7 @@ class WorldRadio:
                         raise BadInput("radio", "world", f"expected a world of this version: {error}") from error
                 if reply.err is not None and (error := reply.err.payload.to_string()) != "Timeout":
                     raise BadInput("radio", "world", error)
-            self._wall.sleep_until(min(self._wall.now_ns() + AGAIN_NS, end_ns))
+            self._wall.sleep_until(min(self._wall.now_ns() + QUERY_INTERVAL_NS, end_ns))
         expected = f"expected a world that lends its air to {self._own}; none in the network answers"
         raise BadInput("radio", "world", expected)
 
@@ -159,14 +161,14 @@ class WorldRadio:
         return self.terms
 
     def _arrive(self, sample: zenoh.Sample) -> None:
-        """Called by the network's thread: it must take no time, and keep nothing that is large."""
+        """Called by the network's thread, which it must not delay; it keeps nothing large."""
         if len(sample.payload) > MAX_RADIO_FRAME_BYTES:
             self._far_too_large += 1
             return
         self._inbox.put(_Arrival(sample.payload.to_bytes(), self._clock.now_ns(), self._clock.utc_ns()))
 
     def _own_rows(self, received: ReceivedPackets, ahead_ns: int) -> ReceivedPackets:
-        """The same as this robot counts: itself by its place in the swarm, times from its agent's start."""
+        """The packets with this robot's row, and times since its agent's start."""
         at_ns = received.received_at_ns + ahead_ns
         rows = self._rows(received.receiver)
         return ReceivedPackets(
@@ -176,15 +178,15 @@ class WorldRadio:
     def _rows(self, rows: IntArray) -> IntArray:
         return np.full(len(rows), self._row)
 
-    def _note(self, received: ReceivedPackets, dated_ns: int) -> None:
-        """Tell the log; `dated_ns` is the date at the agent's start."""
+    def _log_received(self, received: ReceivedPackets, start_utc_ns: int) -> None:
+        """Log the packets; `start_utc_ns` is the UTC time of the agent's start."""
         sizes, tags = received.payloads.sizes, received.payloads.tags()
         for at, payload in enumerate(received.payload.tolist()):
             packet = ReceivedPacket(
-                utc_ns=int(received.received_at_ns[at]) + dated_ns,
+                utc_ns=int(received.received_at_ns[at]) + start_utc_ns,
                 sender=int(received.sender[at]),
                 sequence=int(received.sequence[at]),
-                to=BROADCAST,  # whom it was addressed to the medium does not tell
+                to=BROADCAST,  # the medium does not report the addressed robot
                 size_bytes=int(sizes[payload]),
                 tag=int(tags[payload]),
                 latency_ns=None,

@@ -1,11 +1,11 @@
-"""The header of a packet on the robots' network: what an emulated packet needs not say, before the message.
+"""The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other.
 
-    >>> PacketHeader(to=-1, sequence=7, sent_utc_ns=1_767_225_600_000_000_000).encode().hex()
-    '01ffff070000000000faed51728618'
-
-The sender stands in the key, where access control can see it; the message is encoded as in emulation.
+The sender is part of the zenoh key, where access control can check it. A header precedes each message, with the fields
+that an emulated packet has no need of; the message itself is encoded as in emulation. With a tracker, range and bearing
+of a sender follow from the poses of both robots.
 """
 
+# zenoh's stubs leave out the return types of put and undeclare.
 # pyright: reportUnknownMemberType=false
 
 import math
@@ -38,14 +38,22 @@ from swarmwire.comms.wire.robot_network import SwarmKeys
 VERSION = 1
 _LAYOUT = struct.Struct("<BhIq")  # version, to, sequence, sent_utc_ns
 HEADER_BYTES = _LAYOUT.size
-SEQUENCES = 2**32  # after so many packets a sender counts from 0 again
+SEQUENCES = 2**32  # number of sequence numbers; then a sender counts from 0 again
+MAX_WAITING = 1024  # packets that may wait for the agent's next step
+MEASURES = ("range_m", "bearing_rad")  # with a tracker
+NEEDS = ("radio.range", "radio.bearing")  # needs that these meet
+UNKNOWN = float("nan")
 
 
 class PacketHeader(NamedTuple):
-    """What stands before each message."""
+    """The header before each message.
+
+    >>> PacketHeader(to=-1, sequence=7, sent_utc_ns=1_767_225_600_000_000_000).encode().hex()
+    '01ffff070000000000faed51728618'
+    """
 
     to: int  # index of the one receiver, or BROADCAST
-    sequence: int  # how many packets the sender had sent before this one
+    sequence: int  # number of packets that the sender sent before this one
     sent_utc_ns: int  # by the sender's clock
 
     def encode(self) -> bytes:
@@ -63,20 +71,17 @@ class PacketHeader(NamedTuple):
         return cls(to, sequence, sent_utc_ns)
 
 
-# --- A packet as it came from the robots' network, checked, with what was stamped on it when it arrived.
-
-
 class Arrival(NamedTuple):
-    """What the network's thread puts in the inbox."""
+    """A packet as the network's thread puts it into the inbox."""
 
     key: str
     packet: bytes  # header and message
-    at_ns: int  # when it arrived, by the robot's monotonic clock
+    at_ns: int  # time of arrival, by the robot's monotonic clock
     utc_ns: int
 
 
 class Arrived(NamedTuple):
-    """One packet."""
+    """A checked packet."""
 
     sender: int  # index in the swarm
     header: PacketHeader
@@ -87,12 +92,12 @@ class Arrived(NamedTuple):
 
 
 def sender_in(key: str) -> str:
-    """The robot that a packet's key names, if it is one; it may still be of another form, with wildcards."""
+    """The sender that a packet's key names; the key itself is not checked, and may contain wildcards."""
     return key.rpartition("/")[0].rpartition("/")[2]
 
 
 def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_payload_bytes: int) -> Arrived:
-    """The packet of a sender among so many robots; BadFrame if it breaks the protocol, or is too large for it."""
+    """The packet of a sender of a swarm of `robots` robots; BadFrame if it is malformed or too large."""
     header = PacketHeader.decode(arrival.packet)
     message = arrival.packet[HEADER_BYTES:]
     if len(message) > max_payload_bytes:
@@ -105,27 +110,24 @@ def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_pay
     return Arrived(sender, header, message, tag, arrival.at_ns, arrival.utc_ns)
 
 
-# --- What a robot's radio knows of its neighbours: how many of each one's packets arrived, and how many did not.
-
-
 @dataclass(slots=True)
 class LinkStatistics:
-    """From one sender to this robot.
+    """Statistics of the packets from one sender to this robot.
 
     Attributes:
         received: packets that arrived.
-        missed: numbers that were left out before one that arrived.
-        received_at_ns: when the last one arrived, by the robot's monotonic clock.
+        missed: sequence numbers skipped before a packet that arrived.
+        received_at_ns: arrival of the last packet, by the robot's monotonic clock.
     """
 
     received: int = 0
     missed: int = 0
     received_at_ns: int = 0
-    newest: int = -1  # highest number that the sender had used
-    newest_utc_ns: int = 0  # when it sent that, by its own clock
+    newest: int = -1  # highest sequence number received
+    newest_utc_ns: int = 0  # its time of sending, by the sender's clock
 
     def add(self, sequence: int, sent_utc_ns: int, received_at_ns: int) -> None:
-        """A packet arrived. One that was overtaken fills its gap; a sender that began anew counts from 0 again."""
+        """Count a packet. One that was overtaken fills its gap; a restarted sender counts from 0 again."""
         first = self.received == 0
         self.received += 1
         self.received_at_ns = received_at_ns
@@ -142,11 +144,8 @@ class LinkStatistics:
         return self.received / (self.received + self.missed) if self.received else float("nan")
 
 
-# --- How far a sender is, and in which direction, from two poses that a tracker saw.
-
-
 def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
-    """Distance in m and direction to the sender in the own frame, in (-pi, pi], positive to the left.
+    """Range in m and bearing of the sender in the own frame, in (-pi, pi], positive to the left.
 
     >>> range_bearing(Pose(1.0, 1.0, math.pi / 2), Pose(-1.0, 1.0, 0.0))
     (2.0, 1.5707963267948966)
@@ -156,23 +155,11 @@ def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
     return math.hypot(dx_m, dy_m), math.pi if turn_rad <= -math.pi else turn_rad
 
 
-# --- The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other.
-
-
-# zenoh's stubs leave out the return types of put and undeclare.
-
-
-MAX_WAITING = 1024  # packets that may wait for the agent's next step
-MEASURES = ("range_m", "bearing_rad")  # with a tracker
-NEEDS = ("radio.range", "radio.bearing")  # what these meet
-NOWHERE = float("nan")
-
-
 class ZenohRadio:
     """The radio of the robot `own` of the swarm `robots`.
 
     Attributes:
-        links: from each sender that was received, by its index; for whoever asks how the network is.
+        links: statistics of each sender received so far, by its index.
     """
 
     def __init__(
@@ -184,16 +171,16 @@ class ZenohRadio:
         max_payload_bytes: int,
         clock: DatedClock,
         tracker: Tracker | None = None,
-        asks_pose: bool = False,
+        needs_pose: bool = False,
         log: RadioLog | None = None,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """`asks_pose`: the agent needs range or bearing, so packets from nowhere are not for it.
+        """With `needs_pose` the agent needs range or bearing, and gets no packet without them.
 
-        The tracker is opened by its owner; `say` is told, once, what the user should know.
+        The tracker is opened and closed by its owner; `say` gets a message for the user, once.
         """
         self._session, self._keys, self._clock, self._tracker = session, keys, clock, tracker
-        self._own, self._asks_pose, self._say = own, asks_pose, say
+        self._own, self._needs_pose, self._say = own, needs_pose, say
         self._robots, self._row = tuple(robots), tuple(robots).index(own)
         self._sender_of = {robot: index for index, robot in enumerate(robots)}
         self._max_payload_bytes = max_payload_bytes
@@ -209,34 +196,34 @@ class ZenohRadio:
         self.needs: frozenset[str] = frozenset(NEEDS if tracker else ())
 
     def open(self) -> None:
-        """Listen to everybody in the swarm."""
+        """Subscribe to all robots of the swarm."""
         self._subscriber = self._session.declare_subscriber(
             self._keys.any_radio, Callback(self._arrive, indirect=False), allowed_origin=zenoh.Locality.REMOTE
         )
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """What arrived for the robot since the last call, each with its time and, with a tracker, range and bearing."""
+        """Packets for the robot since the last call, with their times and, with a tracker, range and bearing."""
         packets = [packet for arrival in self._inbox.take() if (packet := self._checked(arrival)) is not None]
         if not packets:
             return ReceivedPackets.none(self.measures), NO_TX_STATUSES
         packets.sort(key=_promised_order)
-        given = [(packet, where) for packet in packets if (where := self._given(packet)) is not None]
+        delivered = [(packet, where) for packet in packets if (where := self._deliver(packet)) is not None]
         started_ns = self._clock.now_ns() - now_ns
-        index = np.arange(len(given))
-        columns = np.array([where for _, where in given], np.float64).reshape(len(given), 2).T
+        index = np.arange(len(delivered))
+        columns = np.array([where for _, where in delivered], np.float64).reshape(len(delivered), 2).T
         received = ReceivedPackets(
-            receiver=np.full(len(given), self._row),
-            sender=np.array([packet.sender for packet, _ in given], np.int64),
-            sequence=np.array([packet.header.sequence for packet, _ in given], np.int64),
-            received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in given], np.int64),
+            receiver=np.full(len(delivered), self._row),
+            sender=np.array([packet.sender for packet, _ in delivered], np.int64),
+            sequence=np.array([packet.header.sequence for packet, _ in delivered], np.int64),
+            received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in delivered], np.int64),
             given={name: np.ascontiguousarray(column) for name, column in zip(self.measures, columns, strict=False)},
             payload=index,
-            payloads=Payloads.of([packet.message for packet, _ in given]),
+            payloads=Payloads.of([packet.message for packet, _ in delivered]),
         )
         return received, NO_TX_STATUSES
 
     def send(self, sent: SentPackets) -> None:
-        """Put each packet into the network; too large ones and those for nobody are numbered, as in emulation."""
+        """Publish each packet; those that are too large or have no receiver only take a number, as in emulation."""
         for at, (to, tag, size_bytes) in enumerate(
             zip(sent.to.tolist(), sent.payloads.tags().tolist(), sent.payloads.sizes.tolist(), strict=True)
         ):
@@ -252,14 +239,14 @@ class ZenohRadio:
                 self._log.sent(SentPacket(utc_ns, sequence, to, size_bytes, tag, SENT))
 
     def counts(self) -> dict[str, int]:
-        """What was sent, received and lost on the way, by name, where there is any."""
+        """Sent, received and lost packets, by name, without zeros."""
         counted = Counter(self._counted)
         counted["packets_oversized"] += self._far_too_large
         counted["packets_dropped"] += self._inbox.dropped
         return {name: count for name, count in sorted(counted.items()) if count}
 
     def close(self) -> None:
-        """Hear and send no more; the session is its owner's."""
+        """Stop receiving and sending; the session is closed by its owner."""
         declared = (self._subscriber, *self._publishers.values())
         self._subscriber, self._publishers = None, {}
         for one in declared:
@@ -267,7 +254,7 @@ class ZenohRadio:
                 one.undeclare()
 
     def _arrive(self, sample: zenoh.Sample) -> None:
-        """Called by the network's thread: it must take no time, and keep nothing that is large."""
+        """Called by the network's thread, which it must not delay; it keeps nothing large."""
         if len(sample.payload) > self._max_payload_bytes + HEADER_BYTES:
             self._far_too_large += 1
             return
@@ -275,7 +262,7 @@ class ZenohRadio:
         self._inbox.put(Arrival(key, packet, self._clock.now_ns(), self._clock.utc_ns()))
 
     def _checked(self, arrival: Arrival) -> Arrived | None:
-        """The packet that arrived, counted and noted for its link, or None if it is of no use."""
+        """The packet of an arrival, counted for its link; None if it is unusable."""
         sender = self._sender_of.get(sender_in(arrival.key))
         if sender is None or sender == self._row:
             self._counted["packets_of_unknown" if sender is None else "packets_in_own_name"] += 1
@@ -290,13 +277,13 @@ class ZenohRadio:
         )
         return packet
 
-    def _given(self, packet: Arrived) -> tuple[float, float] | None:
-        """Range and bearing of a packet that the agent gets, else None; the log learns of either."""
+    def _deliver(self, packet: Arrived) -> tuple[float, float] | None:
+        """Range and bearing of a packet for the agent, None for any other; logs both."""
         where = self._where(packet.sender)
-        mine = packet.header.to in (BROADCAST, self._row)
-        given = mine and not (self._asks_pose and where is None)
-        if not given:
-            self._counted["packets_without_pose" if mine else "packets_overheard"] += 1
+        addressed = packet.header.to in (BROADCAST, self._row)
+        delivered = addressed and not (self._needs_pose and where is None)
+        if not delivered:
+            self._counted["packets_without_pose" if addressed else "packets_overheard"] += 1
         else:
             self._counted["packets_received"] += 1
         received = ReceivedPacket(
@@ -308,19 +295,19 @@ class ZenohRadio:
             tag=packet.tag,
             latency_ns=packet.utc_ns - packet.header.sent_utc_ns,
             distance_m=where[0] if where else None,
-            given=given,
+            given=delivered,
         )
         self._log.received(received)
-        return (where or (NOWHERE, NOWHERE)) if given else None
+        return (where or (UNKNOWN, UNKNOWN)) if delivered else None
 
     def _where(self, sender: int) -> tuple[float, float] | None:
-        """Range and bearing of a sender, where a tracker saw both robots of late."""
+        """Range and bearing of a sender; None without recent poses of both robots."""
         if self._tracker is None:
             return None
         now_utc_ns = self._clock.utc_ns()
         own = self._tracker.pose(self._own, now_utc_ns)
-        its = self._tracker.pose(self._robots[sender], now_utc_ns)
-        return range_bearing(own, its) if own and its else None
+        other = self._tracker.pose(self._robots[sender], now_utc_ns)
+        return range_bearing(own, other) if own and other else None
 
     def _refuse_large(self, size_bytes: int) -> None:
         self._counted["packets_too_large"] += 1
@@ -340,7 +327,7 @@ class ZenohRadio:
                     allowed_destination=zenoh.Locality.REMOTE,
                 )
             publisher.put(packet)
-        except zenoh.ZError:  # the session was closed, or the network is not there any more
+        except zenoh.ZError:  # the session was closed, or the network is gone
             self._counted["packets_refused"] += 1
         else:
             self._counted["packets_sent"] += 1

@@ -26,7 +26,7 @@ def by_zenoh() -> Generator[RobotRadio]:
 @contextmanager
 def by_zenoh_and_tracker() -> Generator[RobotRadio]:
     with peers(1) as (session,):
-        yield radio(session, "flock-1", tracker=Tracker(session, KEYS, ROBOTS), asks_pose=True)
+        yield radio(session, "flock-1", tracker=Tracker(session, KEYS, ROBOTS), needs_pose=True)
 
 
 @contextmanager

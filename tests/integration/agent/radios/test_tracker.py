@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.radios.tracker import OLDEST_NS, Tracker
+from swarmwire.agent.radios.tracker import MAX_AGE_NS, Tracker
 from swarmwire.agent.radios.zenoh_radio import range_bearing
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.wire.radio_bridge import Pose
@@ -81,7 +81,7 @@ def test_the_newest_pose_counts_until_it_is_a_second_old():
 
         until(lambda: there((1.0, 2.0, 3.0)))
         until(lambda: there((4.0, 5.0, 6.0), NOW_NS + 7))
-        for shift_ns in (-OLDEST_NS, OLDEST_NS):
+        for shift_ns in (-MAX_AGE_NS, MAX_AGE_NS):
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns) == (4.0, 5.0, 6.0)
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns + (1 if shift_ns > 0 else -1)) is None
         assert tracker.pose("flock-2", NOW_NS) is None
@@ -131,7 +131,7 @@ def test_packets_come_with_range_and_bearing_of_the_tracker():
     with peers(2) as (session, other):
         log, clock = KeptLog(), DatedClock()
         tracker = tracked(session, other, clock)
-        a = radio(session, "flock-0", clock, tracker=tracker, asks_pose=True, log=log)
+        a = radio(session, "flock-0", clock, tracker=tracker, needs_pose=True, log=log)
         assert a.measures == ("range_m", "bearing_rad")
         assert a.needs == {"radio.range", "radio.bearing"}
         b = radio(other, "flock-1")
@@ -153,10 +153,10 @@ def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
     with peers(2) as (session, other):
         log, clock = KeptLog(), DatedClock()
         tracker = tracked(session, other, clock)
-        asks = radio(session, "flock-0", clock, tracker=tracker, asks_pose=True, log=log)
+        asks = radio(session, "flock-0", clock, tracker=tracker, needs_pose=True, log=log)
         b = radio(other, "flock-1")
         meet(other, [asks])
-        clock.date_ns += OLDEST_NS + 1
+        clock.date_ns += MAX_AGE_NS + 1
         b.send(words(1.0))
         until(lambda: not len(asks.received(0)[0]) and asks.counts().get("packets_without_pose") == 1)
         assert [(packet.distance_m, packet.given) for packet in log.received_packets] == [(None, False)]

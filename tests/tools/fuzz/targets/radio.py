@@ -175,7 +175,7 @@ class Poses(ByteTarget):
 
     def feed(self, case: bytes) -> str | None:
         tracker = Tracker(None, KEYS, ROBOTS)
-        tracker._keep(Sample(KEYS.pose("flock-1"), Payload(case)))
+        tracker._store(Sample(KEYS.pose("flock-1"), Payload(case)))
         tracker.pose("flock-1", CLOCK.utc_ns())
         if tracker.malformed + len(tracker._newest) != 1:
             raise AssertionError("neither kept nor counted")

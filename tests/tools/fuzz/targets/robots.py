@@ -75,12 +75,12 @@ class Epuck2Commands(ByteTarget):
         robot, transport = gateway._robot(0), Transport()
         connection: Any = Connection(robot)
         connection.transport = transport
-        robot.knock(connection)
+        robot.on_connect(connection)
         for chunk in chunks(case):
             if transport.closed:
                 break
             robot.on_receive(connection, chunk)
-        robot.miss(connection)
+        robot.on_disconnect(connection)
         commands = gateway.take()
         if not (np.isfinite(commands.linear_mps).all() and np.isfinite(commands.angular_radps).all()):
             raise AssertionError("a speed that is not finite")
@@ -108,7 +108,7 @@ class Epuck2Answers(ByteTarget):
         except DriverLost:
             refused = "lost"
         driver._take(link)
-        for name, value in driver._readings.of(driver._told_sensors, driver.measures).items():
+        for name, value in driver._readings.of(driver._newest_sensors, driver.measures).items():
             if value.dtype != np.float64:
                 raise AssertionError(f"{name} of {value.dtype}")
         return refused

@@ -1,4 +1,9 @@
-"""What a user may tell the driver of an e-puck2."""
+"""The driver of an e-puck2 over Wi-Fi: one exchange per reading, and one packet per command.
+
+`sense` requests a reading and waits for it; `act` sends at once and requests nothing. So readings are as new as the
+network allows, whatever the rate of the agent. The robot has no watchdog: when the connection is lost, it keeps
+executing its last command.
+"""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -27,10 +32,12 @@ from swarmwire.comms.robots.epuck2.readings import (
     Odometer,
 )
 
+CALIBRATION_S = 5.0  # the robot is silent for a second or two while it calibrates
+
 
 @dataclass(frozen=True)
 class Epuck2Options:
-    """Time-outs, and what is to be known of one robot."""
+    """Timeouts, and the calibration of one robot."""
 
     calibrate: bool = parameter(
         False, help="have the robot calibrate its proximity sensors at the start: nothing may be near it then"
@@ -57,30 +64,20 @@ class Epuck2Options:
     silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
 
     def check(self) -> None:
-        """BadInput if two of these do not go together."""
+        """BadInput if two options contradict each other."""
         if self.ground_white <= self.ground_black:
             expected = f"expected more than ground_black, {self.ground_black:g}; got {self.ground_white:g}"
             raise BadInput("driver epuck2", "ground_white", expected)
 
     @property
     def calibration(self) -> Calibration:
-        """What of these its readings depend on."""
+        """The options that the readings depend on."""
         compass = Compass(self.magnetometer, radians(self.north_deg or 0.0), self.offset_x_ut, self.offset_y_ut)
         return Calibration(compass, self.turn_offset_radps, self.ground_black, self.ground_white)
 
 
-# --- The driver of an e-puck2: an exchange for each reading, and a command for each decision.
-
-
-CALIBRATION_S = 5.0  # the robot is silent for a second or two while it calibrates
-
-
 class Epuck2Driver(Driver):
-    """One e-puck2. The robot has no watchdog: it goes on as it was told when the connection is lost.
-
-    A reading is asked for when it is wanted, and waited for; a decision goes out at once, and asks for nothing. So
-    readings are as new as the network allows, whatever the rate of the agent.
-    """
+    """One e-puck2. The robot has no watchdog: it keeps executing its last command when the connection is lost."""
 
     options: ClassVar[type] = Epuck2Options
     body_name: ClassVar[str] = "epuck2"
@@ -94,34 +91,34 @@ class Epuck2Driver(Driver):
         self._counts: Counter[str] = Counter()
         self._odometer = Odometer()
         self._readings = Epuck2Readings(body, options.calibration, self._odometer)
-        self._gives = _given(body, self._options)
-        self._received_ns: int | None = None  # when the newest reading came
-        self._told_sensors: AnyArray = np.zeros(1, SENSORS)
-        self._anew = True  # the next reading is the first one of a connection
+        self._measures = _measured_sensors(body, self._options)
+        self._received_ns: int | None = None  # time of the newest reading
+        self._newest_sensors: AnyArray = np.zeros(1, SENSORS)
+        self._is_reconnected = True  # the next reading is the first of a connection
         self._calibrate = self._options.calibrate
-        self._lock = Lock()  # of the next two: held to send 21 bytes, which never waits
+        self._lock = Lock()  # of the next two; held while 21 bytes are sent, which never blocks
         self._link: RobotLink | None = None
-        self._told = RobotCommand()
+        self._last_command = RobotCommand()
 
     @property
     def target(self) -> str:
-        """As `Driver.target`: the port, too, where none is said."""
+        """As `Driver.target`, with the port, also the default one."""
         return f"{self._host}:{self._port}"
 
     @property
     def measures(self) -> frozenset[str]:
-        """As `Driver.measures`: all that the sheet and the robot have; the compass only if north is known."""
-        return self._gives
+        """As `Driver.measures`: all sensors of both body and robot; the compass only with `north_deg`."""
+        return self._measures
 
     def open(self) -> None:
-        """As `Driver.open`; LEDs are as they were told last, dark at first."""
-        self._hang_up()
+        """As `Driver.open`; LEDs keep their last colours, dark at first."""
+        self._disconnect()
         options = self._options
         link = RobotLink(self._host, self._port, options.connect_s, self._counts)
         with self._lock:
-            self._link, self._told = link, replace(self._told, left=0, right=0)
+            self._link, self._last_command = link, replace(self._last_command, left=0, right=0)
         self._counts["connections"] += 1
-        self._anew = True
+        self._is_reconnected = True
         if self._calibrate:
             self._exchange(link, options.connect_s + CALIBRATION_S, RobotSettingsBits.CALIBRATE)
             self._calibrate = False
@@ -137,10 +134,10 @@ class Epuck2Driver(Driver):
             if silent_s > self._options.silent_s:
                 self._counts["silences"] += 1
                 raise self._lose(DriverLost(f"the e-puck2 at {self.address} has been silent for {silent_s:.1f} s"))
-        return self._readings.of(self._told_sensors, sensors)
+        return self._readings.of(self._newest_sensors, sensors)
 
     def act(self, command: Command) -> None:
-        """As `Driver.act`; what no wheel can follow is slowed down as a whole, so that its curve stays."""
+        """As `Driver.act`; a command above the wheels' limit is scaled down as a whole, so that its curve stays."""
         link = self._connected()
         speeds = command.linear_mps, command.angular_radps
         if not all(map(isfinite, speeds)):
@@ -148,7 +145,7 @@ class Epuck2Driver(Driver):
             speeds = 0.0, 0.0
         left, right = wheel_steps(*speeds, self.body.wheels.wheel_base_m)
         try:
-            self._tell(link, left, right, command)
+            self._send_command(link, left, right, command)
         except DriverLost as lost:
             raise self._lose(lost) from lost
 
@@ -156,7 +153,7 @@ class Epuck2Driver(Driver):
         """As `Driver.stop`."""
         link = self._link
         if link is not None:
-            self._tell(link, 0, 0, STOP)
+            self._send_command(link, 0, 0, STOP)
 
     def counts(self) -> dict[str, int]:
         """As `Driver.counts`."""
@@ -168,39 +165,39 @@ class Epuck2Driver(Driver):
         if link is None:
             return
         try:
-            self._tell(link, 0, 0, STOP)
-            # To hang up on answers that nobody read resets the connection, and may take the command back.
-            self._await(link, self._options.answer_s, reading=False)
+            self._send_command(link, 0, 0, STOP)
+            # Closing with unread answers resets the connection, which may discard the command.
+            self._receive_owed(link, self._options.answer_s, reading=False)
         except DriverLost:
             self._counts["not_stopped"] += 1
-        self._hang_up()
+        self._disconnect()
 
-    def _tell(self, link: RobotLink, left: int, right: int, command: Command) -> None:
-        """Send speeds and LEDs, which the robot keeps to; any thread may."""
+    def _send_command(self, link: RobotLink, left: int, right: int, command: Command) -> None:
+        """Send speeds and LED colours, which hold; may be called from any thread."""
         with self._lock:
-            lights = self._told.lights
+            lights = self._last_command.lights
             if command.leds:
                 lights = lights.with_changed(command.leds)
-            self._told = RobotCommand(left, right, lights)
-            link.send(self._told.encoded())
+            self._last_command = RobotCommand(left, right, lights)
+            link.send(self._last_command.encoded())
 
     def _exchange(
         self, link: RobotLink, timeout_s: float, settings: RobotSettingsBits = RobotSettingsBits.NONE
     ) -> bool:
-        """Ask for a reading and wait for it; false if it did not come in time, though earlier ones may have."""
+        """Request a reading and wait for it; false if it did not arrive in time, although earlier ones may have."""
         try:
             link.drain()
-            self._take(link)
+            self._read_newest(link)
             with self._lock:
-                link.send(replace(self._told, request=PacketRequest.SENSORS, settings=settings).encoded())
-            in_time = self._await(link, timeout_s, reading=True)
+                link.send(replace(self._last_command, request=PacketRequest.SENSORS, settings=settings).encoded())
+            in_time = self._receive_owed(link, timeout_s, reading=True)
         except DriverLost as lost:
             raise self._lose(lost) from lost
-        self._take(link)
+        self._read_newest(link)
         return in_time
 
-    def _await(self, link: RobotLink, timeout_s: float, *, reading: bool) -> bool:
-        """Whether all that is owed comes in that time, a reading among it if one is; else it is not owed any more."""
+    def _receive_owed(self, link: RobotLink, timeout_s: float, *, reading: bool) -> bool:
+        """Whether all outstanding answers, with `reading` also a reading, arrive in time; else they are given up."""
         owed, until_ns = link.sent, self.clock.now_ns() + to_ns(timeout_s)
         while link.answered < owed or (reading and link.newest is None):
             left_s = to_s(until_ns - self.clock.now_ns())
@@ -209,19 +206,19 @@ class Epuck2Driver(Driver):
                 return False
         return True
 
-    def _take(self, link: RobotLink) -> None:
-        """The newest reading that came, if one did."""
+    def _read_newest(self, link: RobotLink) -> None:
+        """Take over the newest reading, if one has arrived."""
         payload, link.newest = link.newest, None
         if payload is None:
             return
-        told = np.frombuffer(payload, SENSORS)
-        now_ns, steps = self.clock.now_ns(), (int(told["steps"][0, 0]), int(told["steps"][0, 1]))
-        if self._anew and self._received_ns is not None:
+        sensors = np.frombuffer(payload, SENSORS)
+        now_ns, steps = self.clock.now_ns(), (int(sensors["steps"][0, 0]), int(sensors["steps"][0, 1]))
+        if self._is_reconnected and self._received_ns is not None:
             if not self._odometer.resume(*steps, to_s(now_ns - self._received_ns)):
                 self._counts["odometry_began_anew"] += 1
         else:
             self._odometer.read(*steps)
-        self._told_sensors, self._received_ns, self._anew = told, now_ns, False
+        self._newest_sensors, self._received_ns, self._is_reconnected = sensors, now_ns, False
 
     def _connected(self) -> RobotLink:
         if self._link is None:
@@ -229,16 +226,16 @@ class Epuck2Driver(Driver):
         return self._link
 
     def _lose(self, lost: DriverLost) -> DriverLost:
-        self._hang_up()
+        self._disconnect()
         return lost
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         with self._lock:
             link, self._link = self._link, None
         if link is not None:
             link.close()
 
 
-def _given(body: Body, options: Epuck2Options) -> frozenset[str]:
+def _measured_sensors(body: Body, options: Epuck2Options) -> frozenset[str]:
     unknown = frozenset[str]() if options.north_deg is not None else frozenset({"compass"})
     return (READABLE_SENSORS & body.sensors.keys()) - unknown

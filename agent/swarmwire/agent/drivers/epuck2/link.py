@@ -1,4 +1,7 @@
-"""Addresses of e-puck2s: "host" or "host:port"."""
+"""The TCP connection to an e-puck2: packets out, answers in; sensors and speeds are the driver's concern.
+
+An address is "host" or "host:port".
+"""
 
 import select
 import socket
@@ -9,9 +12,12 @@ from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.commands import Answers
 from swarmwire.comms.robots.epuck2.packets import PORT, Header
 
+_READ_BYTES = 65536  # bytes per read
+_MAX_READS = 100  # a peer that sends more at once is no robot
+
 
 def host_and_port(address: str) -> tuple[str, int]:
-    """Where the robot is; BadInput if the address cannot be one.
+    """Host and port of an address; BadInput for a malformed one.
 
     >>> host_and_port("192.168.1.23"), host_and_port("127.0.0.1:11000")
     (('192.168.1.23', 1000), ('127.0.0.1', 11000))
@@ -24,33 +30,26 @@ def host_and_port(address: str) -> tuple[str, int]:
 
 
 def _is_host(text: str) -> bool:
-    """Whether the text can be a name or number of a computer."""
+    """Whether the text can be a host name or an IP address."""
     try:
-        text.encode("idna")  # as it is when it is looked up
+        text.encode("idna")  # as the resolver does
     except UnicodeError:
         return False
     return text.isprintable() and not any(c in " /*" for c in text) and text != ""
-
-
-# --- A TCP connection to an e-puck2: packets out, answers in. It knows no senses and no speeds.
-
-
-_AT_ONCE = 65536  # bytes read in one call
-_MAX_DRAINED = 100  # calls: whoever sends more than that at once is no robot
 
 
 class RobotLink:
     """One connection. `send` is called under the driver's lock, everything else by the driver's thread.
 
     Attributes:
-        sent: how many commands went out.
-        answered: how many answers came; the robot owes one for each command. (The firmware repeats the last one
-            unasked, as fast as it can: what comes beyond is as good as what was asked for.)
-        newest: the payload of the newest sensors' packet, until somebody takes it away.
+        sent: commands sent so far.
+        answered: answers received so far; the robot owes one per command. (The firmware also repeats the last one
+            unrequested, as fast as it can: these answers are as good as requested ones.)
+        newest: the payload of the newest sensors packet, until the driver takes it.
     """
 
     def __init__(self, host: str, port: int, timeout_s: float, counts: Counter[str]) -> None:
-        """DriverLost if nobody takes the connection in time."""
+        """DriverLost if the robot does not accept the connection in time."""
         self._counts, self._answers = counts, Answers()
         self.sent, self.answered = 0, 0
         self.newest: bytes | None = None
@@ -59,29 +58,29 @@ class RobotLink:
         except OSError as error:
             raise DriverLost(f"no e-puck2 at {host}:{port}: {error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.setblocking(False)  # nobody may wait with the lock in hand
+        self._socket.setblocking(False)  # no call may block while it holds the driver's lock
         self._arriving = select.poll()
         self._arriving.register(self._socket, select.POLLIN)
 
     def send(self, packet: bytes) -> None:
-        """Hand over a command; DriverLost if the connection takes it no more, or not whole."""
+        """Send a command; DriverLost if the connection does not take it, or not as a whole."""
         try:
-            taken = self._socket.send(packet)
+            sent_bytes = self._socket.send(packet)
         except OSError as error:
             raise self._lost("hung_up", f"the connection is gone: {error}") from error
-        if taken < len(packet):
+        if sent_bytes < len(packet):
             raise self._lost("hung_up", "the robot reads nothing any more")
         self.sent += 1
 
     def receive(self, timeout_s: float) -> bool:
-        """Take in what has come, or comes first within that time; false if nothing did.
+        """Read the data that has arrived, or the first that arrives in time; false if there is none.
 
-        DriverLost if the connection cannot go on.
+        DriverLost if the connection is broken.
         """
         if not self._arriving.poll(1000.0 * max(timeout_s, 0.0)):
             return False
         try:
-            data = self._socket.recv(_AT_ONCE)
+            data = self._socket.recv(_READ_BYTES)
         except OSError as error:
             raise self._lost("hung_up", f"the connection is gone: {error}") from error
         if not data:
@@ -94,14 +93,14 @@ class RobotLink:
         return True
 
     def drain(self) -> None:
-        """Take in what has come so far."""
-        for _ in range(_MAX_DRAINED):
+        """Read all data that has arrived so far."""
+        for _ in range(_MAX_READS):
             if not self.receive(0.0):
                 break
         self.answered = min(self.answered, self.sent)
 
     def _answered(self, header: Header, payload: bytes) -> None:
-        if header is Header.IMAGE:  # it comes before the sensors that belong to the same command
+        if header is Header.IMAGE:  # precedes the sensors packet of the same command
             self._counts["images_skipped"] += 1
             return
         self.answered += 1
@@ -109,7 +108,7 @@ class RobotLink:
             self.newest = payload
 
     def close(self) -> None:
-        """Hang up; safe to call more than once."""
+        """Close the connection; safe to call more than once."""
         self._socket.close()
 
     def _lost(self, fault: str, why: str) -> DriverLost:

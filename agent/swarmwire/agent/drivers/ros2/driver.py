@@ -1,4 +1,8 @@
-"""The command that a base is to keep to: sent when it changes, and again and again, since bases time out."""
+"""The driver of a ROS 2 base: it takes Twist and publishes LaserScan, Odometry, Imu, BatteryState, Illuminance.
+
+`Commander` sends the current command when it changes and again 20 times per second, because bases time out.
+`Ros2Driver` reads the newest message of each topic without waiting.
+"""
 
 import threading
 from collections import Counter
@@ -20,30 +24,32 @@ from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, is_
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped
 
 RESEND_HZ = 20  # bases stop by themselves after 0.2 s to 1 s without a command
-STOPS = 3  # how often a stop is sent again: then others may drive the base
+STOP_REPEATS = 3  # repetitions of a stop; after them, other nodes may drive the base
+FRAME = "base_link"
+POLL_NS = NS_PER_S // 100  # until a base takes commands
 
 
 class Commander:
-    """Sends commands from a thread of its own. A stop goes out at once, and no command before it is sent after it."""
+    """Repeats commands from a thread of its own. A stop is sent at once, and no earlier command after it."""
 
     def __init__(self, send: Callable[[Command], None], clock: Clock) -> None:
         self._send, self._clock = send, clock
         self._lock = threading.Lock()
-        self._command, self._left = STOP, STOPS  # what to send, and how often yet if it is a stop
+        self._command, self._stops_left = STOP, STOP_REPEATS  # the current command, and the remaining repeats of a stop
         self._ended = False
         self._thread = threading.Thread(target=self._resend, name="ros2 commands", daemon=True)
         self.tell(STOP)
         self._thread.start()
 
     def tell(self, command: Command) -> None:
-        """From now on this command; nothing happens after the end."""
+        """Send this command from now on; after `end` nothing happens."""
         with self._lock:
             if not self._ended:
-                self._command, self._left = command, STOPS
+                self._command, self._stops_left = command, STOP_REPEATS
                 self._send(command)
 
     def end(self) -> None:
-        """Stop the base, and send nothing any more."""
+        """Stop the base, and end the thread."""
         with self._lock:
             ended, self._ended = self._ended, True
             if not ended:
@@ -60,23 +66,16 @@ class Commander:
                     return
                 if self._command != STOP:
                     self._send(self._command)
-                elif self._left:
-                    self._left -= 1
+                elif self._stops_left:
+                    self._stops_left -= 1
                     self._send(STOP)
-
-
-# --- The driver of a base that takes Twist and tells LaserScan, Odometry, Imu, BatteryState and Illuminance.
-
-
-FRAME = "base_link"
-LOOK_NS = NS_PER_S // 100  # how often it is looked whether a base is there
 
 
 class Ros2Driver(Driver):
     """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is that one's endpoint.
 
-    Until scanner, odometry and IMU, as far as the agent asks for them, were received once, the base stays at rest,
-    whatever it is told.
+    The base stays at rest, whatever the command, until each of scanner, odometry and IMU that the agent needs has
+    been received once.
     """
 
     options: ClassVar[type] = Ros2Options
@@ -92,9 +91,9 @@ class Ros2Driver(Driver):
         readers = readers_of(body, options)
         self._readers = tuple(readers.values())
         self._feeds = {topic: Feed(reader, self._messages, clock) for topic, reader in readers.items()}
-        self._asked: tuple[Feed, ...] = ()
+        self._sensed_feeds: tuple[Feed, ...] = ()
         self._counts: Counter[str] = Counter()
-        self._since_ns: int | None = None  # when the connection was made
+        self._since_ns: int | None = None  # time of the connection
         self._session: zenoh.Session | None = None
         self._wiring: Wiring | None = None
         self._commander: Commander | None = None
@@ -102,13 +101,13 @@ class Ros2Driver(Driver):
 
     @property
     def target(self) -> str:
-        """As `Driver.target`: several bases may be behind one router."""
+        """As `Driver.target`, with namespace and topic: several bases may be behind one router."""
         options = self._options
         return f"{self.address} {options.domain} {options.namespace or self.robot} {options.command_topic}"
 
     @property
     def measures(self) -> frozenset[str]:
-        """As `Driver.measures`: those of the body that a topic tells of."""
+        """As `Driver.measures`: the sensors of the body that have a topic."""
         sensors = (feed.sensors for feed in self._feeds.values())
         return frozenset[str]().union(*sensors) & self.body.sensors.keys()
 
@@ -125,29 +124,29 @@ class Ros2Driver(Driver):
             feed.begin()
             wiring.feed(topic, reader.kind, feed)
         outlet = wiring.outlet(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
-        self._session, self._outlet, self._asked = session, outlet, ()
-        self._find(outlet)
+        self._session, self._outlet, self._sensed_feeds = session, outlet, ()
+        self._wait_for_base(outlet)
         self._counts["reconnections"] += self._since_ns is not None
         self._since_ns = self.clock.now_ns()
         self._commander = Commander(lambda command: self._send(outlet, command), self.clock)
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        """As `Driver.sense`: what came until now; nothing is waited for."""
+        """As `Driver.sense`: the messages until now, without waiting."""
         self._check_link()
         if self._outlet is None or not self._outlet.wanted:
             self.stop()
-            raise DriverLost(self._nobody())
-        self._asked = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
+            raise DriverLost(self._no_base_text())
+        self._sensed_feeds = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
         fields: dict[str, FloatArray] = {}
-        for feed in self._asked:
+        for feed in self._sensed_feeds:
             fields.update(feed.look())
         self._check_silence()
         return {field: value.copy() for field, value in fields.items() if field.split(".")[0] in sensors}
 
     def act(self, command: Command) -> None:
-        """As `Driver.act`; it is sent again until the next one, or `stop`."""
+        """As `Driver.act`; the command is repeated until the next one, or `stop`."""
         commander = self._check_link()
-        blind = any(feed.is_blind for feed in self._asked)
+        blind = any(feed.is_blind for feed in self._sensed_feeds)
         self._counts["held_back"] += blind
         commander.tell(STOP if blind else command)
 
@@ -176,31 +175,31 @@ class Ros2Driver(Driver):
         close(self._session)
         self._session = self._wiring = self._commander = self._outlet = None
 
-    def _find(self, outlet: Outlet) -> None:
-        """Return once a base takes commands; else hang up, and DriverLost."""
+    def _wait_for_base(self, outlet: Outlet) -> None:
+        """Wait until a base takes commands; otherwise close, and raise DriverLost."""
         end_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
         while not outlet.wanted:
             if self.clock.now_ns() >= end_ns:
                 self.close()
-                raise DriverLost(self._nobody())
-            self.clock.sleep_until(self.clock.now_ns() + LOOK_NS)
+                raise DriverLost(self._no_base_text())
+            self.clock.sleep_until(self.clock.now_ns() + POLL_NS)
 
     def _check_silence(self) -> None:
-        """DriverLost if a topic that was asked for is silent for too long; the first message may take its time."""
+        """DriverLost if a topic in use is silent for too long; the first message may take `connect_s`."""
         now_ns, since_ns = self.clock.now_ns(), self._since_ns or 0
         for topic, feed in self._feeds.items():
             limit_s = max(self._options.stale_s, self._options.connect_s if feed.is_blind else 0.0)
-            if feed in self._asked and feed.silent_ns(now_ns, since_ns) > to_ns(limit_s):
+            if feed in self._sensed_feeds and feed.silent_ns(now_ns, since_ns) > to_ns(limit_s):
                 self.stop()
                 raise DriverLost(f"nothing on the topic {topic} for {limit_s:g} s")
 
-    def _nobody(self) -> str:
+    def _no_base_text(self) -> str:
         options = self._options
         topic = absolute(options.namespace or ros_name(self.robot), options.command_topic)
         return f"nobody takes {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
 
     def _check_link(self) -> Commander:
-        """The commander, of a connection that holds; else DriverLost."""
+        """The commander of a working connection; otherwise DriverLost."""
         if self._session is None or self._commander is None:
             raise DriverLost(f"not connected to {self.address}")
         if not is_linked(self._session):
@@ -208,23 +207,23 @@ class Ros2Driver(Driver):
         return self._commander
 
     def _send(self, outlet: Outlet, command: Command) -> None:
-        told = self._within_limits(command)
-        if not all(map(isfinite, told)):
+        velocities = self._within_limits(command)
+        if not all(map(isfinite, velocities)):
             self._counts["not_finite"] += 1
-            told = Velocities(0.0, 0.0)
+            velocities = Velocities(0.0, 0.0)
         utc_ns = self.clock.utc_ns()
         stamped = self._options.stamped
-        outlet.put(encode_twist_stamped(told, utc_ns, FRAME) if stamped else encode_twist(told), utc_ns)
+        outlet.put(encode_twist_stamped(velocities, utc_ns, FRAME) if stamped else encode_twist(velocities), utc_ns)
 
     def _within_limits(self, command: Command) -> Velocities:
-        """The command, each speed of which is cut to the greatest of the body; nan stays nan."""
+        """The command with each speed clipped to the body's limit; nan stays nan."""
         linear_mps, angular_radps = self.body.max_linear_mps, self.body.max_angular_radps
         return Velocities(
-            _cut(command.linear_mps, linear_mps),
-            _cut(command.angular_radps, angular_radps),
-            _cut(command.lateral_mps, linear_mps) if isinstance(self.body.drive, Holonomic) else 0.0,
+            _clipped(command.linear_mps, linear_mps),
+            _clipped(command.angular_radps, angular_radps),
+            _clipped(command.lateral_mps, linear_mps) if isinstance(self.body.drive, Holonomic) else 0.0,
         )
 
 
-def _cut(value: float, most: float) -> float:
-    return value if abs(value) <= most or not isfinite(value) else copysign(most, value)
+def _clipped(value: float, limit: float) -> float:
+    return value if abs(value) <= limit or not isfinite(value) else copysign(limit, value)

@@ -1,4 +1,7 @@
-"""One topic of the base as it comes in: messages wait here until the agent looks."""
+"""Topics of a ROS 2 base in a zenoh session: `Feed` buffers the messages of one, `Wiring` declares them all.
+
+Keys are those of zenoh-bridge-ros2dds or of rmw_zenoh; with the latter, the driver also takes part in the ROS graph.
+"""
 
 from collections import deque
 from typing import Any
@@ -12,13 +15,15 @@ from swarmwire.comms.robots.ros2.keys import READ, WRITE, RmwNode, absolute, bri
 from swarmwire.comms.robots.ros2.links import Inlet, Outlet
 from swarmwire.comms.robots.ros2.messages import Messages
 
+NODE = "swarmwire_driver"
+
 
 class Feed:
-    """Keeps the newest payloads, from whatever thread they come, and reads them where `look` is called.
+    """Keeps the newest payloads of one topic, from any thread, and decodes them in the thread that calls `look`.
 
     Attributes:
-        senses: what the topic tells of.
-        garbage: how many payloads were no messages.
+        sensors: the sensors that read this topic.
+        garbage: payloads so far that were no messages.
     """
 
     def __init__(self, reader: Reader, messages: Messages, clock: Clock) -> None:
@@ -26,65 +31,59 @@ class Feed:
         self.garbage = 0
         self._reader, self._messages, self._clock = reader, messages, clock
         self._waiting: deque[tuple[int, bytes]] = deque(maxlen=reader.keeps)
-        self._received_ns: int | None = None  # when the newest message that could be read came
+        self._received_ns: int | None = None  # time of the newest valid message
 
     def take(self, payload: bytes) -> None:
-        """A payload came."""
+        """Keep a payload that has arrived."""
         self._waiting.append((self._clock.now_ns(), payload))
 
     @property
     def is_blind(self) -> bool:
-        """Whether nothing could be read since the connection was made, on a topic that a base tells all the time."""
+        """Whether a topic that bases publish all the time has had no valid message since the connection."""
         return self._reader.is_steady and self._received_ns is None
 
     def begin(self) -> None:
-        """A new connection: what came before does not count as received."""
+        """Start a new connection: drop earlier messages."""
         self._waiting.clear()
         self._received_ns = None
 
     def look(self) -> Fields:
         """The newest readings."""
         while self._waiting:
-            came_ns, payload = self._waiting.popleft()
+            arrived_ns, payload = self._waiting.popleft()
             try:
                 self._reader.read(self._messages.decode(self._reader.kind, payload))
-                self._received_ns = came_ns
+                self._received_ns = arrived_ns
             except BadFrame:
                 self.garbage += 1
         return self._reader.fields
 
     def silent_ns(self, now_ns: int, since_ns: int) -> int:
-        """For how long nothing came that could be read, since `since_ns` at most; 0 if that is no fault."""
+        """Time since the last valid message, or since `since_ns` without one; 0 for a topic that may be silent."""
         if not self._reader.is_steady:
             return 0
         return now_ns - (since_ns if self._received_ns is None else self._received_ns)
-
-
-# --- Keys of a base's topics, as bridges or rmw_zenoh have them, and a driver's part in the ROS graph.
-
-
-NODE = "swarmwire_driver"
 
 
 class Wiring:
     """Declares topics in one session, each under its full name.
 
     Attributes:
-        refused: messages that came without rmw_zenoh's attachment.
+        refused: messages without rmw_zenoh's attachment so far.
     """
 
     def __init__(self, session: zenoh.Session, namespace: str, options: Ros2Options, messages: Messages) -> None:
         self.refused = 0
         self._session, self._namespace, self._messages = session, namespace, messages
         self._node: RmwNode | None = None
-        self._tokens: list[Any] = []  # undeclared when they are forgotten
+        self._tokens: list[Any] = []  # zenoh undeclares them with their last reference
         if options.transport == "rmw":
             full = absolute("/", namespace.strip("/"))
             self._node = RmwNode(options.domain, str(session.zid()), 0, full, NODE)
             self._tokens.append(session.liveliness().declare_token(self._node.token))
 
     def outlet(self, topic: str, kind: str) -> Outlet:
-        """Where messages of this kind go out."""
+        """Declare a topic for messages of this kind to send."""
         full = absolute(self._namespace, topic)
         if self._node is None:
             return Outlet(self._session, bridge_key(full), None)
@@ -92,7 +91,7 @@ class Wiring:
         return Outlet(self._session, rmw_key(self._node.domain, full, kind, self._messages.hash_of(kind)), token)
 
     def feed(self, topic: str, kind: str, feed: Feed) -> None:
-        """Let messages of this kind come in, of whatever hash."""
+        """Subscribe to a topic with messages of this kind, of any hash."""
         full = absolute(self._namespace, topic)
         if self._node is not None:
             self._declare(self._node, READ, full, kind)

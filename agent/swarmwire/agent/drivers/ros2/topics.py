@@ -1,4 +1,4 @@
-"""Options of the ROS 2 driver."""
+"""Topics of the ROS 2 driver: its options, and a reader per topic that turns messages into fields of sensors."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -20,11 +20,12 @@ from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, brightness_of, c
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"
+Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width)
 
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """How the base is reached, what its topics are called, and what its readings mean."""
+    """Connection to the base, names of its topics, and the meaning of its readings."""
 
     transport: str = parameter(
         "bridge",
@@ -54,27 +55,21 @@ class Ros2Options:
     )
 
     def check(self) -> None:
-        """Raise BadInput with the key of a name that ROS 2 does not have."""
+        """BadInput with the key of a name that ROS 2 does not allow."""
         if self.namespace not in ("", NO_NAMESPACE):
             check_name(self.namespace, "driver", "namespace")
         for key in ("command", "scan", "odometry", "imu", "battery", "light"):
             check_name(getattr(self, f"{key}_topic"), "driver", f"{key}_topic")
 
 
-# --- What a message of each topic means to an agent: the fields of the senses that it gives.
-
-
-Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width)
-
-
 class Reader(ABC):
-    """One topic.
+    """The reader of one topic.
 
     Attributes:
-        kind: of its messages.
-        keeps: how many messages count that came since the last look.
-        is_steady: whether silence on it means that the base is lost.
-        fields: the newest readings; what a lost one reads, until a message came.
+        kind: type of its messages.
+        keeps: number of messages since the last look that are read.
+        is_steady: whether silence means that the base is lost.
+        fields: the newest readings; those of a lost reading until the first message.
     """
 
     kind: ClassVar[str]
@@ -84,15 +79,15 @@ class Reader(ABC):
 
     @abstractmethod
     def read(self, message: Any) -> None:
-        """Take over what a message says; BadFrame, and nothing is changed, if it cannot be."""
+        """Take over the readings of a message; BadFrame, without a change, if it is invalid."""
 
     def counts(self) -> dict[str, int]:
-        """Oddities so far, by name."""
+        """Faults so far, by name."""
         return {}
 
 
 class LaserReader(Reader):
-    """LaserScan: `scan` and `proximity`, whichever the body has."""
+    """LaserScan: `scan` and `proximity`, as far as the body has them."""
 
     kind = LASER_SCAN
 
@@ -191,11 +186,8 @@ def _numbers(sensor: str, **values: float) -> Fields:
     return {f"{sensor}.{name}": np.array([value], np.float64) for name, value in values.items()}
 
 
-# --- The topics that the senses of a body come from.
-
-
 def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
-    """A reader for each topic that tells of a sense of the body, by the topic's name within the namespace."""
+    """A reader for each topic of a sensor of the body, by the topic's name within the namespace."""
     readers: dict[str, Reader] = {}
     if body.scan or body.proximity:
         readers[options.scan_topic] = LaserReader(body, radians(options.scanner_deg))

@@ -3,7 +3,7 @@
 import threading
 
 from swarmwire.agent.drivers.driver import STOP, Command
-from swarmwire.agent.drivers.ros2.driver import STOPS, Commander
+from swarmwire.agent.drivers.ros2.driver import STOP_REPEATS, Commander
 
 DRIVE = Command(0.1, 0.5)
 
@@ -56,7 +56,7 @@ class SentPackets:
 def test_it_begins_with_a_stop_which_goes_out_some_times_and_no_more():
     sent = SentPackets()
     assert sent.commands == [STOP]
-    assert sent.steps(10) == [STOP] * STOPS
+    assert sent.steps(10) == [STOP] * STOP_REPEATS
     sent.end()
 
 
@@ -78,7 +78,7 @@ def test_after_a_stop_from_any_thread_no_command_goes_out_again():
     thread.start()
     thread.join()
     assert sent.commands[-1] == STOP
-    assert sent.steps(10) == [STOP] * STOPS
+    assert sent.steps(10) == [STOP] * STOP_REPEATS
     sent.commander.tell(DRIVE)  # until the agent commands anew
     assert sent.steps(2) == [DRIVE] * 2
     sent.end()
