@@ -1,4 +1,4 @@
-"""What drives the robots of an arena, as arrays for the engines."""
+"""The interface of physics engines, and their configuration: motors, arenas and robots as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
 
 
 class Motors(NamedTuple):
-    """What drives each robot index of an arena, (robots,) each."""
+    """The motors of each robot index of an arena, (robots,) each."""
 
     wheel_base_m: FloatArray  # 0: it has no wheels
     max_force_n: FloatArray
@@ -32,9 +32,6 @@ def motors_of(groups: Sequence[Group]) -> Motors:
     return Motors(*(np.ascontiguousarray(column) for column in columns))
 
 
-# --- What every engine is, and what it is told about the arenas and the robots that it is to move.
-
-
 @dataclass(frozen=True, slots=True)
 class EngineConfig:
     """The arenas and the n robots of each that one engine moves, in the order of its rows."""
@@ -42,7 +39,7 @@ class EngineConfig:
     size_m: tuple[float, float]  # full extents of an arena; the origin is its centre
     boundary: Boundary
     standing: tuple[tuple[Obstacle, ...], ...]  # the obstacles of each arena, as they stand at the start
-    obstacles: Obstacles  # the same as arrays; what moves is kept up to date in them
+    obstacles: Obstacles  # the same as arrays; the engine updates movable ones in place
     radius_m: FloatArray  # (n,)
     bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
     top_m: FloatArray  # (n,) how high its upper side is
@@ -52,7 +49,7 @@ class EngineConfig:
 
 
 def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> EngineConfig:
-    """What an engine is told that is to move these of an arena's groups, in this order."""
+    """The configuration of an engine that moves these groups of an arena, in this order."""
     count = [group.stop - group.start for group in groups]
     radius_m, bottom_m, height_m = (
         np.repeat(column, count)
@@ -75,8 +72,8 @@ def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Grou
 class Engine(Protocol):
     """Moves robots in all arenas. An arena moves bit for bit alike alone and beside others.
 
-    It is made by `Engine(setting, pose)`, at rest at `pose` (arenas, n, 3). The arrays are its own, written in place in
-    `tick`, and always show the present.
+    `Engine(config, pose)` makes one with all robots at rest at `pose` (arenas, n, 3). The arrays are its own, written
+    in place in `tick`, and always show the present.
     """
 
     name: ClassVar[str]
@@ -95,7 +92,7 @@ class Engine(Protocol):
         ...
 
     def apply_impulse(self, by_mps: FloatArray) -> None:
-        """Add to the velocities of robots at once, (arenas, n, 2) in m/s; TypeError if the engine knows no forces."""
+        """Add to the velocities of robots at once, (arenas, n, 2) in m/s; TypeError if the engine has no forces."""
         ...
 
     def leave(self, over: BoolArray) -> None:

@@ -1,6 +1,8 @@
-"""All bodies of all arenas: each group is moved by one engine, and several engines may stand side by side.
+"""All bodies of all arenas, and the choice of an engine for each group.
 
-Robots of different engines do not touch one another: those on the floor and those that fly pass.
+One engine moves each group; a world may have several engines. Robots of different engines do not touch one another:
+robots on the floor and flying robots pass. The engine of the floor moves bodies with contacts; the kinematic engine
+moves bodies without contacts and those that fly.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +20,7 @@ from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 from swarmwire.world.scenario.scenario import EngineName, Scenario
 
-# By the name that a scenario has for it.
+# By their names in scenarios.
 ENGINES: dict[EngineName, Callable[[EngineConfig, FloatArray], Engine]] = {
     "discs": DiscsEngine,
     "pymunk": PymunkEngine,
@@ -27,9 +29,9 @@ ENGINES: dict[EngineName, Callable[[EngineConfig, FloatArray], Engine]] = {
 
 
 class Physics:
-    """The engines of a world, and the state of all robots in arrays as every engine has them.
+    """The engines of a world, and the state of all robots in the arrays of `Engine`.
 
-    With one engine they are that engine's own.
+    With one engine the arrays are that engine's own.
 
     Attributes:
         names: of the engines, floor first.
@@ -51,16 +53,21 @@ class Physics:
         self._engines: list[Engine] = []
         self._robots: list[IntArray] = []  # the robot index of each row of each engine
         for name in self.names:
-            moved = [group for group in static.groups if engines[group.name] == name]
-            index = np.concatenate([np.arange(group.start, group.stop) for group in moved])
-            setting = engine_config_of(static, obstacles, moved, steps)
-            self._engines.append(ENGINES[name](setting, np.ascontiguousarray(pose[:, index])))
+            engine_groups = [group for group in static.groups if engines[group.name] == name]
+            index = np.concatenate([np.arange(group.start, group.stop) for group in engine_groups])
+            config = engine_config_of(static, obstacles, engine_groups, steps)
+            self._engines.append(ENGINES[name](config, np.ascontiguousarray(pose[:, index])))
             self._robots.append(index)
-        pushing = [engine for engine in self._engines if isinstance(engine, PymunkEngine)]
-        self.movable = pushing[0].movable if pushing else np.zeros((len(pose), 0, 3))
+        pymunk_engines = [engine for engine in self._engines if isinstance(engine, PymunkEngine)]
+        self.movable = pymunk_engines[0].movable if pymunk_engines else np.zeros((len(pose), 0, 3))
         if len(self._engines) == 1:
-            only = self._engines[0]
-            self.state, self.travel_m, self.touched, self.braked = only.state, only.travel_m, only.touched, only.braked
+            first = self._engines[0]
+            self.state, self.travel_m, self.touched, self.braked = (
+                first.state,
+                first.travel_m,
+                first.touched,
+                first.braked,
+            )
             return
         arenas, robots = pose.shape[:2]
         self.state, self.travel_m = np.zeros((arenas, robots, 6)), np.zeros((arenas, robots, 2))
@@ -82,8 +89,8 @@ class Physics:
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError where there are no forces."""
         for engine, index in zip(self._engines, self._robots, strict=True):
-            if (part := by_mps[:, index]).any():
-                engine.apply_impulse(part)
+            if (group_mps := by_mps[:, index]).any():
+                engine.apply_impulse(group_mps)
         if len(self._engines) > 1:
             self._gather()
 
@@ -99,13 +106,10 @@ class Physics:
             self.touched[:, index] = engine.touched
 
 
-# --- Which engine moves which group: bodies with contacts are the floor engine's, those without and those that fly not.
-
-
 def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:
     """The engine of each group, by the group's name."""
-    asked = scenario.physics.engine
-    floor: EngineName = asked if asked != "auto" else "pymunk" if movable_in(scenario) else "discs"
+    requested = scenario.physics.engine
+    floor: EngineName = requested if requested != "auto" else "pymunk" if movable_in(scenario) else "discs"
     return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
 
 
@@ -115,7 +119,7 @@ def movable_in(scenario: Scenario) -> list[int]:
 
 
 def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) -> None:
-    """Raise BadInput if an engine cannot do what the arena asks of it."""
+    """Raise BadInput if the arena needs a feature that its engine lacks."""
     engines = engines_of(scenario, bodies)
     movable = movable_in(scenario)
     if movable and scenario.physics.engine == "discs":
@@ -124,21 +128,21 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
     if movable and "pymunk" not in engines.values():
         expected = "expected a robot with contacts that could push it: all robots are moved without contacts"
         raise BadInput(where, f"arena.obstacles.{movable[0]}.movable", expected)
-    asked = scenario.physics.engine
-    if asked != "auto" and asked not in engines.values():
-        why = ", ".join(f"{name} {_why_not(bodies[name])}" for name in engines)
+    requested = scenario.physics.engine
+    if requested != "auto" and requested not in engines.values():
+        reasons = ", ".join(f"{name} {_kinematic_reason(bodies[name])}" for name in engines)
         raise BadInput(
-            where, "physics.engine", f"expected auto or kinematic: no robot could be moved by {asked}: {why}"
+            where, "physics.engine", f"expected auto or kinematic: no robot could be moved by {requested}: {reasons}"
         )
-    stuck = [group for group, engine in engines.items() if engine != "kinematic"]
-    if scenario.arena.boundary == "torus" and stuck:
-        body = bodies[stuck[0]].name
-        expected = f"expected walls or open: on a torus no robot has contacts, and {body} (robots.{stuck[0]}) does"
+    grounded = [group for group, engine in engines.items() if engine != "kinematic"]
+    if scenario.arena.boundary == "torus" and grounded:
+        body = bodies[grounded[0]].name
+        expected = f"expected walls or open: on a torus no robot has contacts, and {body} (robots.{grounded[0]}) does"
         raise BadInput(
             where, "arena.boundary", f'{expected}; physics.engine = "kinematic" takes them all off the floor'
         )
 
 
-def _why_not(body: Body) -> str:
-    """Why the kinematic engine alone can move a body."""
+def _kinematic_reason(body: Body) -> str:
+    """The reason why only the kinematic engine can move a body."""
     return "flies" if body.altitude_m > 0.0 else "has no contacts"

@@ -1,9 +1,11 @@
-"""Drives by bounded force in pymunk's bodies: what motors and the grip of wheels can do in one physics step. Compiled.
+"""The pymunk engine, the reference: rigid bodies of any shape, one space per arena, all of them stepped together.
 
-Velocities are never written: a motor pushes until its robot has the speed asked for or its force is spent, so contacts
-keep the last word. Along and across the body the wheels share one grip (a friction circle of `max_force_n`, as ARGoS
-bounds the length of its pivot's impulse), and turning has a bound of its own, `max_torque_nm`. A holonomic drive
-differs only in that it may be asked for a speed across the body.
+`apply_impulse` (compiled) sets the force of the motors on each robot. `ArenaSpace` wraps the pymunk space of one arena.
+
+Drives act by bounded force. Velocities are never written: a motor pushes until its robot has the target speed or its
+force is spent, so contacts have the last word. Along and across the body the wheels share one grip (a friction circle
+of `max_force_n`, as ARGoS bounds the length of its pivot's impulse), and turning has its own bound, `max_torque_nm`. A
+holonomic drive differs only in that its target may have a speed across the body.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -23,6 +25,22 @@ from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, Motors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables
 
+# Parameters of a space:
+#
+# - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is
+#   more than an e-puck's radius.
+# - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library.
+# - `FRICTION` 0.7 on everything (the coefficient of a contact is the product of both sides'), no bounce.
+# - Walls are as thick as two of the widest robots, so that no crowd is pushed through them.
+# - The spatial hash has cells of the widest robot's size: half the time of the default tree for 10,000 robots.
+SLOP_M = 1e-4
+ITERATIONS = 10
+FRICTION = 0.7
+
+READ = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+WRITE = BodyFields.FORCE | BodyFields.TORQUE
+CONTACT = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID
+
 
 @njit(cache=True)
 def apply_impulse(
@@ -41,9 +59,9 @@ def apply_impulse(
     in the motion of the step after. There the body turns while it moves straight: the velocity to reach lies along the
     heading in the middle of that step, which makes the path a chord of the arc.
 
-    What contacts took from the turn rate in the last step is made up for in this one: a robot that is pushed off its
-    centre keeps its heading as long as its torque lasts, where the motors alone would answer each push a step too late.
-    Nothing of the kind is done for the force: at the end of a contact it would throw the robot forward for a step.
+    This step compensates the turn rate that contacts took in the last one: a robot that is pushed off its centre keeps
+    its heading as long as its torque lasts, where the motors alone would answer each push a step too late. The force
+    has no such compensation: at the end of a contact it would throw the robot forward for a step.
 
     Args:
         motors: of each robot index.
@@ -69,37 +87,19 @@ def apply_impulse(
 
             bound = motors.max_torque_nm[i]
             inertia = motors.inertia_kgm2[i]
-            taken = unhindered[arena, i] - turn
-            torque = min(max((target[arena, i, 1] - turn + taken) * inertia / dt_s, -bound), bound)
+            lost_turn = unhindered[arena, i] - turn
+            torque = min(max((target[arena, i, 1] - turn + lost_turn) * inertia / dt_s, -bound), bound)
             unhindered[arena, i] = turn + torque * dt_s / inertia
-            ahead = heading + dt_s * (turn + 0.5 * unhindered[arena, i])
-            cos, sin, per_step = np.cos(ahead), np.sin(ahead), motors.mass_kg[i] / dt_s
+            next_heading = heading + dt_s * (turn + 0.5 * unhindered[arena, i])
+            cos, sin, mass_per_step = np.cos(next_heading), np.sin(next_heading), motors.mass_kg[i] / dt_s
             forward, left = target[arena, i, 0], target[arena, i, 2]
-            fx, fy = (forward * cos - left * sin - vx) * per_step, (forward * sin + left * cos - vy) * per_step
+            fx, fy = (
+                (forward * cos - left * sin - vx) * mass_per_step,
+                (forward * sin + left * cos - vy) * mass_per_step,
+            )
             size = np.sqrt(fx * fx + fy * fy)
-            share = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
-            force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * share, fy * share, torque
-
-
-# --- The pymunk space of one arena.
-#
-# A space has its own coordinates, so an arena moves bit for bit alike alone and beside others. What is chosen here:
-#
-# - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is
-#   more than an e-puck's radius.
-# - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library.
-# - `FRICTION` 0.7 on everything (the coefficient of a contact is the product of both sides'), no bounce.
-# - Walls are as thick as two of the widest robots, so that no crowd is pushed through them.
-# - The spatial hash has cells of the widest robot's size: half the time of the default tree for 10,000 robots.
-
-
-SLOP_M = 1e-4
-ITERATIONS = 10
-FRICTION = 0.7
-
-READ = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
-WRITE = BodyFields.FORCE | BodyFields.TORQUE
-CONTACT = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID
+            fraction = motors.max_force_n[i] / size if size > motors.max_force_n[i] else 1.0
+            force[arena, i, 0], force[arena, i, 1], force[arena, i, 2] = fx * fraction, fy * fraction, torque
 
 
 def _walls(size_m: tuple[float, float], widest_m: float) -> tuple[Obstacle, ...]:
@@ -111,7 +111,9 @@ def _walls(size_m: tuple[float, float], widest_m: float) -> tuple[Obstacle, ...]
 
 
 class ArenaSpace:
-    """The pymunk space of one arena and the buffers through which all its bodies are read and written at once.
+    """The pymunk space of one arena, and the buffers through which all its bodies are read and written at once.
+
+    A space has its own coordinates, so an arena moves bit for bit alike alone and beside others.
 
     Robots start at `pose` (n, 3). `force`, in N, N, N m, is read in every step from where it lies: a row per robot,
     then per load, and one for all that stands still.
@@ -119,7 +121,7 @@ class ArenaSpace:
 
     def __init__(
         self,
-        setting: EngineConfig,
+        config: EngineConfig,
         obstacles: tuple[Obstacle, ...],
         loads: Sequence[Load],
         pose: FloatArray,
@@ -128,11 +130,11 @@ class ArenaSpace:
         self._space = pymunk.Space()
         self._space.collision_slop = SLOP_M
         self._space.iterations = ITERATIONS
-        self._space.collision_persistence = setting.steps  # pymunk lists a pair that long: all that touched in the tick
-        widest_m = float(setting.radius_m.max())
+        self._space.collision_persistence = config.steps  # pymunk lists a pair that long: all that touched in the tick
+        widest_m = float(config.radius_m.max())
         self._space.use_spatial_hash(2.0 * widest_m, 2 * len(pose))
-        robots = [self._add_robot(*of) for of in zip(setting.motors.mass_kg, setting.radius_m, pose, strict=True)]
-        walls = _walls(setting.size_m, widest_m) if setting.boundary == "walls" else ()
+        robots = [self._add_robot(*robot) for robot in zip(config.motors.mass_kg, config.radius_m, pose, strict=True)]
+        walls = _walls(config.size_m, widest_m) if config.boundary == "walls" else ()
         for obstacle in (*walls, *obstacles):
             if not obstacle.movable:
                 self._add_obstacle(obstacle)
@@ -141,7 +143,7 @@ class ArenaSpace:
         # Only a buffer that is written from may lie in numpy's memory: pymunk reallocates one that it fills.
         self._forces.set_float_buf(force)
         self._check_order(ids)
-        self._robots, self._pushed = len(robots), robots
+        self._robots, self._robot_bodies = len(robots), robots
         order = np.argsort(np.array(ids, np.uintp))
         self._ids = np.array(ids, np.uintp)[order]
         self._index = np.minimum(order, self._robots)  # all obstacles and walls count as one body
@@ -167,9 +169,10 @@ class ArenaSpace:
         self._space.add(shape)
 
     def _add_load(self, load: Load) -> pymunk.Body:
-        """A movable obstacle on four feet, which joints of bounded strength hold on the floor: friction in the solver.
+        """Add a movable obstacle on four feet, held on the floor by joints of bounded force: friction in the solver.
 
-        With all of them at the mean distance of its area, sliding, turning and both together cost what they should.
+        All feet are at the mean distance of the area from its centre, so that sliding and turning meet the right
+        friction, alone and together.
         """
         corners = [(x, y) for x, y in load.corners_m.tolist()]
         if load.radius_m:
@@ -183,10 +186,10 @@ class ArenaSpace:
         self._space.add(body, shape)
         reach_m = load.reach_m
         for foot in ((reach_m, 0.0), (0.0, reach_m), (-reach_m, 0.0), (0.0, -reach_m)):
-            grip = PivotJoint(self._space.static_body, body, (0.0, 0.0), foot)
-            grip.max_bias = 0.0  # it holds on to no place
-            grip.max_force = 0.25 * FLOOR_FRICTION * load.mass_kg * GRAVITY_MPS2
-            self._space.add(grip)
+            joint = PivotJoint(self._space.static_body, body, (0.0, 0.0), foot)
+            joint.max_bias = 0.0  # it does not pull back to a place
+            joint.max_force = 0.25 * FLOOR_FRICTION * load.mass_kg * GRAVITY_MPS2
+            self._space.add(joint)
         return body
 
     def _check_order(self, ids: list[int]) -> None:
@@ -195,7 +198,7 @@ class ArenaSpace:
         assert _ids_in(self._bodies).tolist() == ids, "pymunk lists bodies in another order"
 
     def read(self, state: FloatArray, loads: FloatArray) -> None:
-        """Copy what READ names of all robots and movable obstacles into (robots, 6) and (obstacles, 6)."""
+        """Copy the READ fields of all robots and movable obstacles into (robots, 6) and (obstacles, 6)."""
         self._bodies.clear()
         get_space_bodies(self._space, READ, self._bodies)
         rows = _numbers_in(self._bodies).reshape(-1, 6)
@@ -206,11 +209,11 @@ class ArenaSpace:
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots, (robots, 2) in m/s."""
         for row in np.flatnonzero(by_mps.any(axis=1)).tolist():
-            body, (x_mps, y_mps) = self._pushed[row], by_mps[row].tolist()
+            body, (x_mps, y_mps) = self._robot_bodies[row], by_mps[row].tolist()
             body.velocity = body.velocity.x + x_mps, body.velocity.y + y_mps
 
     def step(self, step_s: float) -> None:
-        """Hand over the forces and move by one physics step."""
+        """Write the forces and move by one physics step."""
         set_space_bodies(self._space, WRITE, self._forces)
         self._space.step(step_s)
 
@@ -237,30 +240,27 @@ def _ids_in(buffer: Any) -> AnyArray:
     return np.frombuffer(buffer.int_buf(), np.uintp)
 
 
-# --- Rigid bodies of any shape, by pymunk: a space per arena, all of them stepped together. The reference.
-
-
 class PymunkEngine:
-    """The bodies of all arenas as pymunk's; see `Engine`."""
+    """The bodies of all arenas in pymunk; see `Engine`."""
 
     name: ClassVar[str] = "pymunk"
 
-    def __init__(self, setting: EngineConfig, pose: FloatArray) -> None:
+    def __init__(self, config: EngineConfig, pose: FloatArray) -> None:
         """Bodies at rest at `pose` (arenas, n, 3)."""
         arenas, robots = pose.shape[:2]
-        self._motors, self._steps, self._step_s = setting.motors, setting.steps, setting.tick_s / setting.steps
+        self._motors, self._steps, self._step_s = config.motors, config.steps, config.tick_s / config.steps
         self.state = np.zeros((arenas, robots, 6))
         self.travel_m = np.zeros((arenas, robots, 2))
         self.touched = np.zeros((arenas, robots))
         self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._unhindered = np.zeros((arenas, robots))
-        self._movables = Movables(setting.standing, setting.obstacles)
+        self._movables = Movables(config.standing, config.obstacles)
         self.movable = self._movables.pose  # (arenas, movable obstacles, 3) in place, as `Truth` has it
         loads = self.movable.shape[1]
         self._load_state = np.zeros((arenas, loads, 6))
         self._force = np.zeros((arenas, robots + loads + 1, 3))
         self._spaces = [
-            ArenaSpace(setting, setting.standing[arena], self._movables.loads[arena], pose[arena], self._force[arena])
+            ArenaSpace(config, config.standing[arena], self._movables.loads[arena], pose[arena], self._force[arena])
             for arena in range(arenas)
         ]
         self._running: BoolArray = np.ones(arenas, np.bool_)
@@ -272,8 +272,8 @@ class PymunkEngine:
         for _ in range(self._steps):
             # A turn that contacts gave to a robot that is braked is slowed down, but not made up for.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
-            moved = self._force, self.travel_m, self._unhindered
-            apply_impulse(self._motors, target, self.state, self._step_s, self._running, *moved)
+            buffers = self._force, self.travel_m, self._unhindered
+            apply_impulse(self._motors, target, self.state, self._step_s, self._running, *buffers)
             for arena in self._moving:
                 self._spaces[arena].step(self._step_s)
             self._read()

@@ -1,1 +1,1 @@
-"""The array engine: robots as discs, all arenas and steps of a tick in one compiled call."""
+"""The discs engine: robots as discs, all arenas and steps of a tick in one compiled call."""

@@ -1,4 +1,9 @@
-"""Contacts: a record for each two things that are listed as near, kept as long as they are. Compiled."""
+"""Contacts of the discs engine: records of listed pairs, gaps, and the count of contacts that begin. Compiled.
+
+A contact is a record for a pair of things that are listed as near; it lasts as long as the pair is listed. All fixed
+things count as one thing in the count of contacts: a contact begins if a pair touches in this tick and did not in the
+one before.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -8,22 +13,24 @@ from numba import njit
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.kernels import kernel
 
-# Robots look ahead for what their speed may reach in a step and this share of their radius, since others may push them.
+# Contacts are sought within the distance that a robot's speed covers in a step, plus this share of its radius, since
+# others may push it.
 LOOK_AHEAD = 0.05
-TOUCH_M = 1e-4  # a gap up to this counts as touch, so that contacts that last do not flicker
+TOUCH_M = 1e-4  # a gap up to this counts as touch, so that lasting contacts do not flicker
 BEFORE, NOW = 1, 2  # bits of touch: in the tick before, in this one
+ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
 CONTACT = np.dtype(
     [
         ("row", np.int64),
-        ("kind", np.int64),  # of the other thing: ROBOT, or as `fixed` has it
+        ("kind", np.int64),  # of the other thing: ROBOT, a wall, CIRCLE or POLYGON
         ("which", np.int64),  # its row, or its number among its kind
         ("touch", np.int64),  # bits; robots alone
         ("nx", np.float64),  # unit vector towards the other thing
         ("ny", np.float64),
         ("gap_m", np.float64),  # negative: they overlap
-        ("closing_mps", np.float64),  # the most that leaves no overlap after the step
-        ("mass_kg", np.float64),  # what resists a change of the speed along the normal
+        ("closing_mps", np.float64),  # the greatest speed that leaves no overlap after the step
+        ("mass_kg", np.float64),  # effective mass along the normal
         ("rubbing_kg", np.float64),  # and along the tangent
         ("push_ns", np.float64),  # impulses of the last step: along the normal
         ("rub_ns", np.float64),  # and along the tangent
@@ -33,7 +40,7 @@ CONTACT = np.dtype(
 
 @kernel(from_python=True)
 def contacts_of(contacts, robots, pairs, things, old):
-    """Fill records (pairs + things,) for what is listed; touch and impulses are carried over from the `old` ones."""
+    """Fill records (pairs + things,) for all listed pairs; touch and impulses are carried over from the `old` ones."""
     at = 0
     for k in range(len(contacts)):
         contact = contacts[k]
@@ -48,20 +55,20 @@ def contacts_of(contacts, robots, pairs, things, old):
         contact.mass_kg, contact.rubbing_kg = 1.0 / per_kg, 1.0 / (per_kg + turning_per_kg)
         while at < len(old) and _is_before(old[at], contact):
             at += 1
-        same = at < len(old) and not _is_before(contact, old[at])
-        contact.touch = old[at].touch if same else 0
-        contact.push_ns, contact.rub_ns = (old[at].push_ns, old[at].rub_ns) if same else (0.0, 0.0)
+        is_old = at < len(old) and not _is_before(contact, old[at])
+        contact.touch = old[at].touch if is_old else 0
+        contact.push_ns, contact.rub_ns = (old[at].push_ns, old[at].rub_ns) if is_old else (0.0, 0.0)
 
 
 @kernel()
 def _turning_per_kg(robot):
-    """What a robot's turning adds to how easily its rim gives way along the tangent."""
+    """The share of a robot's turning in the inverse effective mass of its rim along the tangent."""
     return robot.radius_m * robot.radius_m * robot.per_kgm2
 
 
 @kernel()
 def _is_before(one, other):
-    """Whether a contact stands before another one: robots before fixed things, then by row, kind and number."""
+    """Whether a contact is before another one in order: robots before fixed things, then by row, kind and number."""
     if (one.kind == ROBOT) != (other.kind == ROBOT):
         return one.kind == ROBOT
     if one.row != other.row:
@@ -73,21 +80,21 @@ def _is_before(one, other):
 
 @njit(cache=True)
 def contact_islands(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
-    """The rows near which something is listed in `contacts` (k,) of dtype CONTACT, and the others; both rising.
+    """The rows with a listed contact in `contacts` (k,) of dtype CONTACT, and the rows without; both rising.
 
-    Only rows that are `moving` (rows,), as are all that are listed.
+    Only rows that are `moving` (rows,), as all listed rows are.
     """
-    crowded = np.zeros(len(moving), np.bool_)
+    has_contact = np.zeros(len(moving), np.bool_)
     for k in range(len(contacts)):
-        crowded[contacts[k].row] = True
+        has_contact[contacts[k].row] = True
         if contacts[k].kind == ROBOT:
-            crowded[contacts[k].which] = True
-    return np.flatnonzero(crowded), np.flatnonzero(moving & ~crowded)
+            has_contact[contacts[k].which] = True
+    return np.flatnonzero(has_contact), np.flatnonzero(moving & ~has_contact)
 
 
 @kernel()
 def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side):
-    """Put the places of the contacts that may meet in this step into `met`, in order; returns how many.
+    """Put the indices of the contacts that may meet in this step into `met`, in order; returns their number.
 
     Impulses of the step before are kept where one of the two robots is driven. `fastest_mps` is the greatest speed of
     any robot.
@@ -97,26 +104,26 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
         contact = contacts[k]
         one, here = robots[contact.row], state[contact.row]
         ahead_m = LOOK_AHEAD * one.radius_m
-        near, driven = False, one.driven
+        in_reach, driven = False, one.driven
         if contact.kind == ROBOT:
             other, there = robots[contact.which], state[contact.which]
             driven |= other.driven
             ahead_m += LOOK_AHEAD * other.radius_m
             dx, dy = there[0] - here[0], there[1] - here[1]
-            most_m = one.radius_m + other.radius_m + ahead_m + 2.0 * dt_s * fastest_mps
-            if dx * dx + dy * dy <= most_m * most_m:
+            max_m = one.radius_m + other.radius_m + ahead_m + 2.0 * dt_s * fastest_mps
+            if dx * dx + dy * dy <= max_m * max_m:
                 gap_m, nx, ny = gap_to_circle(here[0], here[1], one.radius_m, there[0], there[1], other.radius_m)
-                near = gap_m <= ahead_m + dt_s * (_speed_mps(here) + _speed_mps(there))
+                in_reach = gap_m <= ahead_m + dt_s * (_speed_mps(here) + _speed_mps(there))
         else:
             gap_m, nx, ny = gap_to_fixed(
                 contact.kind, contact.which, here[0], here[1], one.radius_m, half_size_m, circle, side_start, side
             )
-            near = gap_m <= ahead_m + dt_s * _speed_mps(here)
-        if near:
+            in_reach = gap_m <= ahead_m + dt_s * _speed_mps(here)
+        if in_reach:
             contact.nx, contact.ny, contact.gap_m, contact.closing_mps = nx, ny, gap_m, max(gap_m, 0.0) / dt_s
             met[count] = k
             count += 1
-        if not (near and driven):
+        if not (in_reach and driven):
             contact.push_ns = contact.rub_ns = 0.0
     return count
 
@@ -124,12 +131,6 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
 @kernel()
 def _speed_mps(now):
     return np.sqrt(now[3] * now[3] + now[4] * now[4])
-
-
-# --- Gaps between a disc and what is fixed: walls, circles, sides and corners of convex polygons. Compiled.
-
-
-ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
 
 @kernel()
@@ -146,12 +147,12 @@ def gap_to_wall(wall, x, y, radius_m, half_size_m):
 
 @kernel()
 def gap_to_circle(x, y, radius_m, circle_x, circle_y, circle_radius_m):
-    """As `gap_to_wall`, to a circle. Two with one centre part along x."""
+    """As `gap_to_wall`, to a circle. With equal centres the normal is along x."""
     dx, dy = circle_x - x, circle_y - y
-    apart = np.sqrt(dx * dx + dy * dy)
-    if apart == 0.0:
+    distance_m = np.sqrt(dx * dx + dy * dy)
+    if distance_m == 0.0:
         return -radius_m - circle_radius_m, 1.0, 0.0
-    return apart - radius_m - circle_radius_m, dx / apart, dy / apart
+    return distance_m - radius_m - circle_radius_m, dx / distance_m, dy / distance_m
 
 
 @kernel(from_python=True)
@@ -180,7 +181,7 @@ def gap_to_polygon(x, y, radius_m, polygon, side_start, side):
 
 @kernel()
 def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, side):
-    """As `gap_to_wall`, to any thing: circle or polygon number `which`, or a wall."""
+    """As `gap_to_wall`, to any fixed thing: circle or polygon number `which`, or a wall."""
     if kind == CIRCLE:
         return gap_to_circle(x, y, radius_m, circle[which, 0], circle[which, 1], circle[which, 2])
     if kind == POLYGON:
@@ -188,15 +189,9 @@ def gap_to_fixed(kind, which, x, y, radius_m, half_size_m, circle, side_start, s
     return gap_to_wall(kind, x, y, radius_m, half_size_m)
 
 
-# --- Who touches what, and which contacts began: a pair that touches in this tick and did not in the one before.
-# Compiled.
-#
-# All that is fixed counts as one thing.
-
-
 @kernel()
 def begin_tick(contacts, robots, touched):
-    """What touched in the tick that ends did so before, and nothing has touched yet."""
+    """Shift the bits of touch from this tick to the tick before, and clear `touched`."""
     for k in range(len(contacts)):
         contacts[k].touch = BEFORE if contacts[k].touch & NOW else 0
     for row in range(len(robots)):
@@ -206,15 +201,15 @@ def begin_tick(contacts, robots, touched):
 
 @kernel()
 def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets):
-    """Note what touches at the end of a step: it was pushed, or its gap is next to nothing.
+    """Mark the contacts that touch at the end of a step: those with an impulse, or with a gap of at most TOUCH_M.
 
     Args:
         contacts: listed, whose bits of touch are set.
-        met: places of those that may have met in the step, after their impulses.
+        met: indices of the contacts that may have met in the step, after their impulses.
         robots: (rows,) whose bits of touching anything fixed are set.
         state: (rows, 6) after the impulses, before the move.
         dt_s: length of the step.
-        touched: (rows,) set to 1 for who touched.
+        touched: (rows,) set to 1 for robots that touch.
         per_arena: robots of an arena.
         onsets: (arenas, 2) added to: robot with robot, robot with something fixed.
     """
@@ -235,7 +230,7 @@ def note_touches(contacts, met, robots, state, dt_s, touched, per_arena, onsets)
 
 @kernel()
 def _parting_mps(contact, state):
-    """How fast the gap grows."""
+    """The speed at which the gap grows."""
     parting = -(state[contact.row, 3] * contact.nx + state[contact.row, 4] * contact.ny)
     if contact.kind == ROBOT:
         parting += state[contact.which, 3] * contact.nx + state[contact.which, 4] * contact.ny

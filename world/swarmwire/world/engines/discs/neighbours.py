@@ -1,4 +1,12 @@
-"""Obstacles by cell of a grid over each arena, made once, so that robots look at near obstacles only. Compiled."""
+"""Neighbour lists (Verlet lists) of the discs engine: the things that a robot may touch soon. Compiled.
+
+Things are listed with a margin, and anew once a robot has moved by that margin. The motion does not depend on the
+margin: contacts are found among the listed things by their present distance, in an order that the lists keep: pairs by
+the lower and then by the higher row, fixed things by row. `ObstacleCells` is a grid over each arena, made once, so that
+robots test near obstacles only.
+
+L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -18,7 +26,7 @@ MAX_CELLS_PER_SIDE = 256
 
 
 class ObstacleCells(NamedTuple):
-    """Obstacles near each cell: what is within `reach_m` of a place is listed in the cell of that place.
+    """Obstacles by cell: the cell of a place lists all obstacles within `reach_m` of that place.
 
     Cell (i, j) of arena a is c = (a * per_side + j) * per_side + i, its obstacles are which[start[c]:start[c + 1]],
     rising: circles by number, then polygons by number after all circles.
@@ -33,8 +41,8 @@ class ObstacleCells(NamedTuple):
 def obstacle_cells(obstacles: Obstacles, size_m: tuple[float, float], reach_m: float) -> ObstacleCells:
     """The cells of every arena."""
     arenas = len(obstacles.circle_start) - 1
-    most = int((np.diff(obstacles.circle_start) + np.diff(obstacles.polygon_start)).max(initial=0))
-    per_side = min(max(int(np.ceil(np.sqrt(CELLS_PER_OBSTACLE * most))), 1), MAX_CELLS_PER_SIDE)
+    max_obstacles = int((np.diff(obstacles.circle_start) + np.diff(obstacles.polygon_start)).max(initial=0))
+    per_side = min(max(int(np.ceil(np.sqrt(CELLS_PER_OBSTACLE * max_obstacles))), 1), MAX_CELLS_PER_SIDE)
     start = np.zeros(arenas * per_side * per_side + 1, np.int64)
     _fill(obstacles, size_m, per_side, reach_m, start, np.empty(0, np.int64))
     np.cumsum(start, out=start)
@@ -73,21 +81,12 @@ def _put(obstacle, arena, left, right, bottom, top, size_m, per_side, at, which)
                 at[c + 1] += 1
 
 
-# --- Which things a robot may touch soon (Verlet lists): listed with a margin, and anew once a robot has moved that
-# far.
-#
-# What moves does not depend on the margin: contacts are found among the listed things by what is near at the time, in
-# an order that the lists keep: pairs by the lower and then by the higher row, fixed things by row.
-#
-# L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98.
-
-
 def pairs_near(
     robots: AnyArray,
     state: FloatArray,
     running: BoolArray,
     size_m: tuple[float, float],
-    widest_m: float,
+    max_radius_m: float,
     margin_m: float,
 ) -> IntArray:
     """Pairs of robots with a gap of up to twice the margin, (pairs, 2): lower row, higher row.
@@ -95,21 +94,21 @@ def pairs_near(
     Args:
         robots: (rows,) ROBOT records.
         state: (rows, 6) x, y in m first.
-        running: (arenas,) whose robots move; of others none is listed.
+        running: (arenas,) whose robots move; those of others are not listed.
         size_m: of an arena.
-        widest_m: the greatest radius.
+        max_radius_m: the greatest radius.
         margin_m: the margin of each robot.
     """
     rows, arenas = len(state), len(running)
     per_arena = rows // arenas
     # About a robot in each cell, if they are spread evenly.
     spacing_m = float(np.sqrt(size_m[0] * size_m[1] / max(per_arena, 1)))
-    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (widest_m + margin_m), spacing_m), running)
+    grid = build(state[:, 0], state[:, 1], arenas, size_m, max(2.0 * (max_radius_m + margin_m), spacing_m), running)
     pairs = np.empty((2 * rows + 16, 2), np.int64)
-    count = _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+    count = _list_pairs(robots, state, per_arena, grid, max_radius_m, margin_m, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), np.int64)
-        _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs)
+        _list_pairs(robots, state, per_arena, grid, max_radius_m, margin_m, pairs)
     return pairs[:count]
 
 
@@ -125,8 +124,8 @@ def fixed_near(
 ) -> IntArray:
     """Fixed things with a gap of up to the margin, (things, 3): row, kind, number of the circle or polygon.
 
-    An obstacle that ends where a robot begins, or lower, is none to it. Of arenas that are not `running` (arenas,)
-    nothing is listed.
+    Obstacles that are no higher than the lower side of a robot are left out, and so are arenas that are not `running`
+    (arenas,).
     """
     per_arena = len(state) // (len(obstacles.circle_start) - 1)
     things = np.empty((len(state) + 16, 3), np.int64)
@@ -138,10 +137,10 @@ def fixed_near(
 
 
 @kernel(from_python=True)
-def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
+def _list_pairs(robots, state, per_arena, grid, max_radius_m, margin_m, pairs):
     """Fill `pairs`, and return how many there are, whether there is room for them or not."""
     count = 0
-    farthest_m = 2.0 * (widest_m + margin_m)
+    farthest_m = 2.0 * (max_radius_m + margin_m)
     for row in range(len(state)):
         x, y = state[row, 0], state[row, 1]
         i = cell_of(x, grid.left_m, grid.cell_m, grid.nx)
@@ -164,7 +163,7 @@ def _list_pairs(robots, state, per_arena, grid, widest_m, margin_m, pairs):
 
 @kernel()
 def _insert(pairs, begin, count, row, other):
-    """Put a pair among those of the same row, pairs[begin:count], so that they rise."""
+    """Insert a pair among those of the same row, pairs[begin:count], in rising order."""
     place = count
     while place > begin and pairs[place - 1, 1] > other:
         pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
@@ -192,7 +191,7 @@ def _list_fixed(robots, state, running, per_arena, size_m, walled, obstacles, ce
         j = cell_of(y, -half_size_m[1], height_m, cells.per_side)
         c = ((row // per_arena) * cells.per_side + j) * cells.per_side + i
         for k in range(cells.start[c], cells.start[c + 1]):
-            kind, which, top_m = _told(obstacles, cells.which[k])
+            kind, which, top_m = _obstacle(obstacles, cells.which[k])
             if top_m > robot.bottom_m and _gap_m(kind, which, x, y, robot, half_size_m, obstacles) <= margin_m:
                 _put_near(things, count, row, kind, which)
                 count += 1
@@ -206,8 +205,8 @@ def _put_near(things, place, row, kind, which):
 
 
 @kernel()
-def _told(obstacles, obstacle):
-    """The kind of an obstacle that the cells list, its number among its kind, and its height in m."""
+def _obstacle(obstacles, obstacle):
+    """The kind of a listed obstacle, its number among its kind, and its height in m."""
     polygon = obstacle - len(obstacles.circle)
     if polygon < 0:
         return CIRCLE, obstacle, obstacles.circle_top_m[obstacle]

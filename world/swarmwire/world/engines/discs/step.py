@@ -1,7 +1,7 @@
-"""Sine and cosine at once, by + - * alone: equal bit for bit on every machine, and quicker than the library. Compiled.
+"""The physics steps of the discs engine: motors, contact impulses, motion. Compiled.
 
-The angle is brought to within an eighth of a turn by taking off quarters (Cody and Waite), where polynomials are right
-to the last bit or two: S. Moshier, Cephes mathematical library (1984-2000), sin.c and cos.c.
+`advance` runs the steps of a tick for the robots of all arenas. Each step is velocity first, then place (semi-implicit
+Euler): motors (`drive`), impulses at contacts (`solve`), overlaps (`separate`), motion (`move`).
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,10 +14,21 @@ from swarmwire.world.engines.discs.contacts import LOOK_AHEAD, ROBOT, begin_tick
 QUARTERS_PER_RAD = 2.0 / np.pi
 QUARTER_HIGH, QUARTER_LOW = 1.5707963267341256, 6.077100506506192e-11  # pi / 2; the first has 33 bits
 
+SWEEPS = 10
+FRICTION = 0.7 * 0.7  # as in the pymunk engine: the product of both sides' coefficients
+TOLERANCE_MPS = 1e-9  # a smaller error of a speed is not corrected, so that sweeps end
+SEPARATION_SWEEPS = 20
+TOLERANCE_M = 1e-7  # a smaller overlap is not corrected
+
 
 @kernel(from_python=True)
 def sine_cosine(angle_rad):
-    """The sine and the cosine of an angle up to some 1e6 rad, within 2e-16."""
+    """The sine and the cosine of an angle up to some 1e6 rad, within 2e-16.
+
+    It uses + - * alone, so it is equal bit for bit on every machine, and faster than the library. The angle is reduced
+    to an eighth of a turn by subtracting quarters (Cody and Waite), where the polynomials are exact to the last bit or
+    two: S. Moshier, Cephes mathematical library (1984-2000), sin.c and cos.c.
+    """
     quarters = np.floor(angle_rad * QUARTERS_PER_RAD + 0.5)
     r = (angle_rad - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW
     z = r * r
@@ -56,19 +67,14 @@ def _polynomial(z, a, b, c, d, e, f):
     return a + z * (b + z * (c + z * (d + z * (e + z * f))))
 
 
-# --- How motors change a robot's velocity in a step, and how it then moves. Compiled.
-#
-# Velocity first, then place (semi-implicit Euler). What motors can do: see `engines.pymunk_drive`, a bounded change of
-# velocity towards the target. The target lies along the heading in the middle of the step to come, so that the path of
-# a turning robot is made of chords of its arc.
-
-
 @kernel()
 def drive(robot, now, target, braked, dt_s):
-    """Let the motors of a robot push its velocity towards its target for a step.
+    """Change the velocity of a robot towards its target by the motors' bounded force, for one step.
 
-    What contacts took from the turn rate in the last step is made up for in this one, so that a robot pushed off its
-    centre keeps its heading as long as its torque lasts; one that is braked slows a turn down but does not undo it.
+    The bounds are those of `engines.pymunk_engine.apply_impulse`. The target lies along the heading in the middle of
+    the step to come, so that the path of a turning robot is made of chords of its arc. The motors compensate the turn
+    rate that contacts took in the last step, so that a robot pushed off its centre keeps its heading as long as its
+    torque lasts; a braked robot slows a turn down but does not undo it.
 
     Args:
         robot: its ROBOT.
@@ -79,15 +85,15 @@ def drive(robot, now, target, braked, dt_s):
     """
     robot.driven = target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
     turn = now[5]
-    taken = 0.0 if braked else robot.unhindered_radps - turn
-    turn += min(max(target[1] - turn + taken, -robot.most_radps), robot.most_radps)
+    lost_turn = 0.0 if braked else robot.unhindered_radps - turn
+    turn += min(max(target[1] - turn + lost_turn, -robot.max_step_radps), robot.max_step_radps)
     now[5] = robot.unhindered_radps = turn
     look_along(robot, now, dt_s)
     cos, sin = robot.cos, robot.sin
     dx, dy = target[0] * cos - target[2] * sin - now[3], target[0] * sin + target[2] * cos - now[4]
     size2 = dx * dx + dy * dy
-    if size2 > robot.most_mps * robot.most_mps:
-        share = robot.most_mps / np.sqrt(size2)
+    if size2 > robot.max_step_mps * robot.max_step_mps:
+        share = robot.max_step_mps / np.sqrt(size2)
         dx, dy = dx * share, dy * share
     now[3] += dx
     now[4] += dy
@@ -97,20 +103,20 @@ def drive(robot, now, target, braked, dt_s):
 def look_along(robot, now, dt_s):
     """Set `cos` and `sin` of a robot to those of its heading in the middle of the step to come."""
     middle = now[2] + 0.5 * dt_s * now[5]
-    if middle != robot.middle_rad:  # one that drives straight on is spared half of the cost of a step
+    if middle != robot.middle_rad:  # saves half of the cost of a step for a robot that drives straight on
         robot.middle_rad = middle
         robot.sin, robot.cos = sine_cosine(middle)
 
 
 @kernel()
 def move(robot, now, travel_m, dt_s):
-    """Move state (6,) by one step of its velocity and add to travel (2,) what its wheels roll."""
+    """Move state (6,) by one step of its velocity, and add the travel of its wheels to travel (2,)."""
     if now[5] != robot.unhindered_radps:
         look_along(robot, now, dt_s)
     rolled = dt_s * (now[3] * robot.cos + now[4] * robot.sin)
-    apart = dt_s * now[5] * robot.half_base_m
-    travel_m[0] += rolled - apart
-    travel_m[1] += rolled + apart
+    wheel_way = dt_s * now[5] * robot.half_base_m
+    travel_m[0] += rolled - wheel_way
+    travel_m[1] += rolled + wheel_way
     now[0] += dt_s * now[3]
     now[1] += dt_s * now[4]
     now[2] += dt_s * now[5]
@@ -118,46 +124,37 @@ def move(robot, now, travel_m, dt_s):
 
 @kernel()
 def follow_targets(rows, steps, dt_s, robots, state, target, braked, travel_m):
-    """Move robots that nothing is near by some steps, one robot after the other."""
+    """Move robots without contacts by some steps, one robot after the other."""
     for row in rows:
         for _ in range(steps):
             drive(robots[row], state[row], target[row], braked[row], dt_s)
             move(robots[row], state[row], travel_m[row], dt_s)
 
 
-# --- Impulses at contacts, one contact after the other, several times over (sequential impulses). Compiled.
-#
-# Contacts may be speculative: two things with a gap may approach by that gap within the step, no more, so that they
-# meet and do not overlap.
-#
-# Where robots are driven, impulses start from those of the step before (warm start): a jam takes more sweeps than there
-# are in a step, so its impulses come about over several steps. Elsewhere they start from nothing. Then every one of
-# them lowers kinetic energy + sum of impulse x allowed closing speed, of which the second is never negative: what
-# nobody drives can only lose energy, however far the sweeps get.
-#
-# E. Catto (2005), Iterative dynamics with temporal coherence, and (2006), Fast and simple physics using sequential
-# impulses, Game Developers Conference.
-
-
-SWEEPS = 10
-FRICTION = 0.7 * 0.7  # as in the pymunk engine: the product of both sides' coefficients
-STILL_MPS = 1e-9  # a speed that is wrong by less is left, so that sweeps end
-SEPARATIONS = 20
-STILL_M = 1e-7  # an overlap below is left
-
-
 @kernel()
 def solve(contacts, met, robots, state):
     """Change the velocities in `state` (rows, 6) so that contacts neither close faster than allowed nor slide.
 
-    `met` are the places of the contacts that count in this step.
+    Impulses act on one contact after the other, in several sweeps (sequential impulses). `met` (k,) holds the indices
+    of the contacts that count in this step.
+
+    Contacts may be speculative: two things with a gap may approach by that gap within the step, no more, so that they
+    meet and do not overlap.
+
+    Where robots are driven, impulses start from those of the step before (warm start): a jam takes more sweeps than a
+    step has, so its impulses build up over several steps. Elsewhere they start from zero. Then each impulse lowers
+    kinetic energy + sum of impulse x allowed closing speed, of which the second is never negative: robots that are not
+    driven can only lose energy, whether or not the sweeps converge.
+
+    E. Catto (2005), Iterative dynamics with temporal coherence, and (2006), Fast and simple physics using sequential
+    impulses, Game Developers Conference.
     """
     for k in met:
         contact = contacts[k]
         if contact.push_ns > 0.0:
-            _kick(contact, robots, state, contact.push_ns, contact.rub_ns)
+            _apply_impulses(contact, robots, state, contact.push_ns, contact.rub_ns)
     for _ in range(SWEEPS):
-        still = True
+        converged = True
         for k in met:
             contact = contacts[k]
             i, j = contact.row, contact.which
@@ -165,34 +162,34 @@ def solve(contacts, met, robots, state):
             if contact.kind == ROBOT:
                 vx, vy, spin = vx + state[j, 3], vy + state[j, 4], spin + state[j, 5] * robots[j].radius_m
             excess = -(vx * contact.nx + vy * contact.ny) - contact.closing_mps
-            if contact.push_ns == 0.0 and excess <= STILL_MPS:
+            if contact.push_ns == 0.0 and excess <= TOLERANCE_MPS:
                 continue
-            # Of discs, what is pushed along the normal changes nothing along the tangent: both are worked out at once.
+            # For discs, an impulse along the normal changes nothing along the tangent: both are computed at once.
             push, rub = _impulses(contact, excess, vy * contact.nx - vx * contact.ny - spin)
             if push != 0.0 or rub != 0.0:
                 contact.push_ns += push
                 contact.rub_ns += rub
-                _kick(contact, robots, state, push, rub)
-                still = False
-        if still:
+                _apply_impulses(contact, robots, state, push, rub)
+                converged = False
+        if converged:
             break
 
 
 @kernel()
 def _impulses(contact, excess_mps, sliding_mps):
-    """What to add to a contact's impulses along the normal and along the tangent."""
+    """The changes of a contact's impulses along the normal and along the tangent."""
     push, rub = contact.push_ns, contact.rub_ns
-    if abs(excess_mps) > STILL_MPS:
+    if abs(excess_mps) > TOLERANCE_MPS:
         push = max(push + excess_mps * contact.mass_kg, 0.0)
-    if abs(sliding_mps) > STILL_MPS:
+    if abs(sliding_mps) > TOLERANCE_MPS:
         rub -= sliding_mps * contact.rubbing_kg
-    most = FRICTION * push
-    return push - contact.push_ns, min(max(rub, -most), most) - contact.rub_ns
+    max_rub = FRICTION * push
+    return push - contact.push_ns, min(max(rub, -max_rub), max_rub) - contact.rub_ns
 
 
 @kernel()
-def _kick(contact, robots, state, push, rub):
-    """Give impulses to both sides of a contact; the tangent is the normal turned left."""
+def _apply_impulses(contact, robots, state, push, rub):
+    """Apply impulses to both sides of a contact; the tangent is the normal turned left."""
     px, py = push * contact.nx - rub * contact.ny, push * contact.ny + rub * contact.nx
     _change(robots[contact.row], state[contact.row], -px, -py, -rub)
     if contact.kind == ROBOT:
@@ -210,11 +207,11 @@ def _change(robot, now, px, py, rub):
 def separate(contacts, met, robots, state, dt_s):
     """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows; velocities stay.
 
-    That undoes overlap, and what the impulses left of approach.
+    This removes overlap, and the approach that the impulses left.
     """
     shifted = False
-    for _ in range(SEPARATIONS):
-        apart = True
+    for _ in range(SEPARATION_SWEEPS):
+        separated = True
         for k in met:
             contact = contacts[k]
             i, j = contact.row, contact.which
@@ -222,77 +219,74 @@ def separate(contacts, met, robots, state, dt_s):
             if contact.kind == ROBOT:
                 x, y = x + dt_s * state[j, 3] + robots[j].shift_x_m, y + dt_s * state[j, 4] + robots[j].shift_y_m
             overlap_m = -(contact.gap_m + x * contact.nx + y * contact.ny)
-            if overlap_m > STILL_M:
-                apart = False
-                _part(robots[i], contact, -overlap_m)
+            if overlap_m > TOLERANCE_M:
+                separated = False
+                _add_shift(robots[i], contact, -overlap_m)
                 if contact.kind == ROBOT:
-                    _part(robots[j], contact, overlap_m)
-        if apart:
+                    _add_shift(robots[j], contact, overlap_m)
+        if separated:
             break
         shifted = True
     if shifted:
         for k in met:
-            _shift(robots, state, contacts[k].row)
+            _apply_shift(robots, state, contacts[k].row)
             if contacts[k].kind == ROBOT:
-                _shift(robots, state, contacts[k].which)
+                _apply_shift(robots, state, contacts[k].which)
 
 
 @kernel()
-def _part(robot, contact, overlap_m):
+def _add_shift(robot, contact, overlap_m):
     share_m = overlap_m * contact.mass_kg * robot.per_kg
     robot.shift_x_m += share_m * contact.nx
     robot.shift_y_m += share_m * contact.ny
 
 
 @kernel()
-def _shift(robots, state, row):
+def _apply_shift(robots, state, row):
     state[row, 0] += robots[row].shift_x_m
     state[row, 1] += robots[row].shift_y_m
     robots[row].shift_x_m = robots[row].shift_y_m = 0.0
 
 
-# --- All steps of a tick, for the robots of all arenas. Compiled.
-
-
 @kernel(from_python=True)
-def needed_margin_m(fastest_mps, widest_m, dt_s, steps):
-    """How far robots may get in so many steps, and look ahead after them."""
-    return (steps + 1) * dt_s * fastest_mps + LOOK_AHEAD * widest_m
+def needed_margin_m(fastest_mps, max_radius_m, dt_s, steps):
+    """The greatest displacement of robots in this number of steps, plus the look-ahead after them."""
+    return (steps + 1) * dt_s * fastest_mps + LOOK_AHEAD * max_radius_m
 
 
 @kernel(from_python=True)
 def advance(
-    step, steps, dt_s, margin_m, widest_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
-    contacts, met, crowd, loners, circle, side_start, side, onsets,
+    step, steps, dt_s, margin_m, max_radius_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
+    contacts, met, contacting, isolated, circle, side_start, side, onsets,
 ):  # fmt: skip
     """Move all robots from this step of the tick on, to its end or until near things have to be listed anew.
 
     Returns:
-        The step that was reached, and the greatest speed that any robot had or was asked for.
+        The step that was reached, and the greatest speed of any robot or target.
     """
-    asked_mps = _fastest_mps(target)
-    far_m, fastest_mps = _spread(crowd, robots, state, 0.0, asked_mps)
-    far_m, fastest_mps = _spread(loners, robots, state, far_m, fastest_mps)
-    if far_m + needed_margin_m(fastest_mps, widest_m, dt_s, steps - step) > margin_m:
+    target_mps = _fastest_mps(target)
+    displacement_m, fastest_mps = _max_displacement(contacting, robots, state, 0.0, target_mps)
+    displacement_m, fastest_mps = _max_displacement(isolated, robots, state, displacement_m, fastest_mps)
+    if displacement_m + needed_margin_m(fastest_mps, max_radius_m, dt_s, steps - step) > margin_m:
         return step, fastest_mps
     if step == 0:
         begin_tick(contacts, robots, touched)
     first = step
-    # With `not` and `>` a speed that is no number ends the tick instead of asking for new lists for ever.
-    while step < steps and not far_m + needed_margin_m(fastest_mps, widest_m, dt_s, 0) > margin_m:
-        for row in crowd:
+    # With `not` and `>` a speed that is not a number ends the tick instead of listing again for ever.
+    while step < steps and not displacement_m + needed_margin_m(fastest_mps, max_radius_m, dt_s, 0) > margin_m:
+        for row in contacting:
             drive(robots[row], state[row], target[row], braked[row], dt_s)
         count = find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side)
         now = met[:count]
         solve(contacts, now, robots, state)
         separate(contacts, now, robots, state, dt_s)
         note_touches(contacts, now, robots, state, dt_s, touched, per_arena, onsets)
-        for row in crowd:
+        for row in contacting:
             move(robots[row], state[row], travel_m[row], dt_s)
-        far_m, fastest_mps = _spread(crowd, robots, state, 0.0, fastest_mps)
+        displacement_m, fastest_mps = _max_displacement(contacting, robots, state, 0.0, fastest_mps)
         step += 1
-    # Only contacts make a robot faster than it was and was asked to be, so no loner has left its margin.
-    follow_targets(loners, step - first, dt_s, robots, state, target, braked, travel_m)
+    # Only contacts make a robot faster than both its speed and its target, so no isolated robot has left its margin.
+    follow_targets(isolated, step - first, dt_s, robots, state, target, braked, travel_m)
     return step, fastest_mps
 
 
@@ -305,11 +299,11 @@ def _fastest_mps(target):
 
 
 @kernel()
-def _spread(rows, robots, state, far_m, fastest_mps):
-    """The greatest distance of these rows from where they were listed, and their greatest speed; no less than given."""
-    far2, fastest2 = far_m * far_m, fastest_mps * fastest_mps
+def _max_displacement(rows, robots, state, displacement_m, fastest_mps):
+    """The greatest displacement of these rows since they were listed, and their greatest speed; at least the inputs."""
+    displacement2, fastest2 = displacement_m * displacement_m, fastest_mps * fastest_mps
     for row in rows:
         dx, dy = state[row, 0] - robots[row].listed_x_m, state[row, 1] - robots[row].listed_y_m
-        far2 = max(far2, dx * dx + dy * dy)
+        displacement2 = max(displacement2, dx * dx + dy * dy)
         fastest2 = max(fastest2, state[row, 3] * state[row, 3] + state[row, 4] * state[row, 4])
-    return np.sqrt(far2), np.sqrt(fastest2)
+    return np.sqrt(displacement2), np.sqrt(fastest2)
