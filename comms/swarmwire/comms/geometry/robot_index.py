@@ -1,4 +1,9 @@
-"""A uniform grid over the robots of every arena, so that kernels look at near robots only. Compiled."""
+"""Spatial indexes of robots: uniform grids over the arenas, so that kernels read near robots only. Compiled.
+
+`Grid` clamps positions outside the arena to the border cells. `Cells` wraps them: cell (i, j) stands for all places
+(i + k nx, j + l ny). So robots that leave an open arena spread over all cells too, and a torus needs no other index.
+Positions in a cell must still be compared.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,7 +15,9 @@ from numba import njit
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import kernel
 
-MAX_CELLS_PER_SIDE = 512  # in each arena
+MAX_CELLS_PER_SIDE = 512  # of a `Grid`, in each arena
+MAX_PER_SIDE = 512  # of `Cells`, in each arena
+SLACK = 1.0 + 1e-9  # rounding may separate two objects at just the reach
 
 
 class Grid(NamedTuple):
@@ -30,7 +37,7 @@ class Grid(NamedTuple):
 
 
 def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, running: BoolArray | None = None) -> Grid:
-    """The grid of robots at x, y (rows,), in which all within `reach_m` of a robot lie in the 3 x 3 cells around it.
+    """The grid of robots at x, y (rows,); all robots within `reach_m` of a robot lie in the 3 x 3 cells around it.
 
     Where `running` (arenas,) is False, the cells of the arena are empty; None: no arena is left out.
     """
@@ -77,18 +84,8 @@ def _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m):
     return start, order
 
 
-# --- Square cells over the arenas, so that kernels look at what is near only. Compiled.
-#
-# The plane is rolled up: cell (i, j) stands for all places (i + k nx, j + l ny). So robots that leave an open arena
-# spread over all cells as well, and a torus needs no cells of its own. Whoever finds something compares its position.
-
-
-MAX_PER_SIDE = 512
-SLACK = 1.0 + 1e-9  # two things at just the reach may be rounded apart
-
-
 class Cells(NamedTuple):
-    """What lies in each cell. Cell (i, j) of arena a is c = (a ny + j) nx + i and holds item[start[c]:start[c + 1]]."""
+    """Items by cell. Cell (i, j) of arena a is c = (a ny + j) nx + i; its items are item[start[c]:start[c + 1]]."""
 
     nx: int
     ny: int
@@ -99,7 +96,7 @@ class Cells(NamedTuple):
 
 
 def cells_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: int) -> Cells:
-    """Cells for so many items, each of at least `cell_m` a side: what is nearer lies in the 3 x 3 around."""
+    """Empty cells for `items` items, each at least `cell_m` wide: nearer items lie in the 3 x 3 cells around."""
     nx, ny = (min(max(int(extent / (cell_m * SLACK)), 1), MAX_PER_SIDE) for extent in size_m)
     start = np.zeros(arenas * ny * nx + 1, np.int64)
     return Cells(nx, ny, nx / size_m[0], ny / size_m[1], start, np.zeros(items, np.int64))
@@ -107,14 +104,14 @@ def cells_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: i
 
 @kernel(from_python=True)
 def column_of(cells, x):
-    """The column of a place, 0 to nx - 1."""
+    """The column of the coordinate x, 0 to nx - 1."""
     column = int(np.floor(x * cells.per_x + 0.5 * cells.nx))
     return column if 0 <= column < cells.nx else column % cells.nx
 
 
 @kernel(from_python=True)
 def row_of(cells, y):
-    """The row of a place, 0 to ny - 1."""
+    """The row of the coordinate y, 0 to ny - 1."""
     row = int(np.floor(y * cells.per_y + 0.5 * cells.ny))
     return row if 0 <= row < cells.ny else row % cells.ny
 

@@ -1,1 +1,1 @@
-"""What the drivers and the gateways of a kind of robot share: packets, keys, and conversions of units."""
+"""The protocols of real robots, shared by drivers and gateways: packets, keys and conversions of units."""

@@ -1,4 +1,9 @@
-"""How fast the e-puck2 goes: steps of its wheels, and the speeds of its body."""
+"""Commands to the e-puck2: wheel steps, lights, the 21-byte command, and the packets in a byte stream.
+
+Clockwise from ahead the lights are LED1 (red), LED2 (any colour), LED3 (red), and so on to LED8; the body's spec has
+them in that order. The red LEDs are on or off. The firmware of the radio module shows the state of the WiFi with LED2,
+whatever a command sets.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -22,50 +27,42 @@ from swarmwire.comms.robots.epuck2.packets import (
 
 STEPS_PER_TURN = 1000
 M_PER_STEP = pi * 0.04 / STEPS_PER_TURN  # wheels of 40 mm
-FASTEST = 1100  # steps/s; the firmware goes no faster, whatever it is told
+MAX_STEPS_PER_S = 1100  # the firmware's limit of a wheel
+COUNT = 8  # LEDs
+RED = 0xFF0000
+BRIGHTEST = 100  # of red, green and blue on the wire; above it a component keeps its value
+# Sensors of a body that an e-puck2 can read.
+READABLE_SENSORS = frozenset({"proximity", "scan", "ground", "light", "odometry", "imu", "compass", "battery"})
+_LAYOUT = Struct("<BBBhhB12sB")  # header, request, settings, left and right, red LEDs, RGB LEDs, sound
 
 
 def wheel_steps(linear_mps: float, angular_radps: float, wheel_base_m: float) -> tuple[int, int]:
-    """Steps/s of the left and the right wheel, slowed down together where one would be too fast, so the curve stays.
+    """Steps/s of the left and the right wheel; where one is too fast both slow down, so that the curve stays.
 
     >>> wheel_steps(0.1, 0.0, 0.053), wheel_steps(0.0, 1.0, 0.053), wheel_steps(0.1, 50.0, 0.053)
     ((796, 796), (-211, 211), (-946, 1100))
     """
-    apart_mps = 0.5 * wheel_base_m * angular_radps
-    left, right = (linear_mps - apart_mps) / M_PER_STEP, (linear_mps + apart_mps) / M_PER_STEP
-    slower = min(1.0, FASTEST / max(abs(left), abs(right), 1.0))
-    return round(left * slower), round(right * slower)
+    difference_mps = 0.5 * wheel_base_m * angular_radps
+    left, right = (linear_mps - difference_mps) / M_PER_STEP, (linear_mps + difference_mps) / M_PER_STEP
+    scale = min(1.0, MAX_STEPS_PER_S / max(abs(left), abs(right), 1.0))
+    return round(left * scale), round(right * scale)
 
 
 def body_speeds(left: int, right: int, wheel_base_m: float) -> tuple[float, float]:
-    """How fast in m/s, and turning how fast to the left in rad/s, the robot goes at these steps/s.
-
-    Each wheel goes no faster than the firmware lets it.
-    """
-    left, right = (max(-FASTEST, min(FASTEST, steps)) for steps in (left, right))
+    """Speed in m/s and turn rate to the left in rad/s at these steps/s, within the firmware's limit."""
+    left, right = (max(-MAX_STEPS_PER_S, min(MAX_STEPS_PER_S, steps)) for steps in (left, right))
     return 0.5 * (left + right) * M_PER_STEP, (right - left) * M_PER_STEP / wheel_base_m
-
-
-# --- The lights of the e-puck2: four red LEDs that are on or off, and four of any colour between them.
-#
-# Clockwise from ahead they are LED1 (red), LED2 (any colour), LED3 (red), and so on to LED8, and the body's sheet has
-# them in that order. The firmware of the radio module shows with LED2 what the WiFi does, whatever a command says.
-
-
-COUNT = 8
-RED = 0xFF0000
-BRIGHTEST = 100  # of red, green and blue; above it a colour stays as it is
 
 
 @dataclass(frozen=True, slots=True)
 class Lights:
-    """What a command says of the lights."""
+    """The lights in a command."""
 
     switched: int = 0  # a bit each: LED1, LED3, LED5, LED7, the body's LED, the one ahead
     colours: bytes = bytes(12)  # red, green and blue, 0 to 100, of LED2, LED4, LED6 and LED8; more: as it is
 
     def with_changed(self, leds: Mapping[int, int]) -> "Lights":
-        """These, with some LEDs (place in the body's sheet) in another colour 0xRRGGBB.
+        """A copy with some LEDs (index in the body's spec) in another colour 0xRRGGBB.
 
         A red LED is on if the colour has at least half of all red. ValueError if there is no such LED.
         """
@@ -82,7 +79,7 @@ class Lights:
         return Lights(switched, bytes(colours))
 
     def shown(self, before: Mapping[int, int]) -> dict[int, int]:
-        """What each LED shows, place in the body's sheet -> 0xRRGGBB, if before it showed that."""
+        """The colour 0xRRGGBB of each LED, by index in the body's spec, from the colours before."""
         shown = dict(before)
         for place in range(COUNT // 2):
             shown[2 * place] = RED if self.switched >> place & 1 else 0
@@ -106,17 +103,11 @@ def _from_wire(colour: bytes, before: int) -> int:
     return rgb
 
 
-# --- The command of the e-puck2: speeds, lights and sound in 21 bytes.
-
-
-_LAYOUT = Struct("<BBBhhB12sB")  # header, request, settings, left and right, red LEDs, RGB LEDs, sound
-
-
 @dataclass(frozen=True, slots=True)
 class RobotCommand:
-    """One command, as it goes over the wire."""
+    """A command: speeds, lights and sound in 21 bytes."""
 
-    left: int = 0  # steps/s, or what the counter is to show; -32768 to 32767
+    left: int = 0  # steps/s, or the new value of the step counter; -32768 to 32767
     right: int = 0
     lights: Lights = ALL_DARK
     request: PacketRequest = PacketRequest.NOTHING
@@ -133,7 +124,7 @@ class RobotCommand:
 
     @classmethod
     def decoded(cls, packet: bytes) -> "RobotCommand":
-        """The command in these bytes; BadFrame if they are none."""
+        """The command in these bytes; BadFrame if they hold none."""
         if len(packet) != COMMAND_BYTES or packet[0] != COMMAND_HEADER:
             expected = f"expected {COMMAND_BYTES} bytes from {COMMAND_HEADER:#x} on"
             raise BadFrame("malformed_commands", f"{expected}, got {packet[:COMMAND_BYTES].hex()}")
@@ -143,15 +134,8 @@ class RobotCommand:
         )
 
 
-# --- Which bodies an e-puck2 can be.
-
-
-# Senses of a body that an e-puck2 can tell.
-READABLE_SENSORS = frozenset({"proximity", "scan", "ground", "light", "odometry", "imu", "compass", "battery"})
-
-
 def check_fits(body: Body) -> None:
-    """BadInput if the sheet is not one of an e-puck2: two wheels, and as many sensors and LEDs of a kind as it has."""
+    """BadInput unless the body has two wheels, and as many sensors and LEDs of each kind as an e-puck2."""
     sensors = body.sensors
     proximity, light, scan, ground = (sensors.get(name) for name in ("proximity", "light", "scan", "ground"))
     _check(body, "drive.kind", isinstance(body.drive, Wheels), "wheels")
@@ -171,9 +155,6 @@ def _check(body: Body, key: str, fits: bool, expected: str) -> None:
         raise BadInput(f"body {body.name}", key, f"expected {expected}, as an e-puck2 has")
 
 
-# --- Packets out of the bytes of a connection, however they are cut; no I/O.
-
-
 class Answer(NamedTuple):
     """One answer of a robot."""
 
@@ -182,13 +163,13 @@ class Answer(NamedTuple):
 
 
 class Answers:
-    """What a robot answers, out of its bytes."""
+    """A parser of the answers in a robot's byte stream, however the stream is cut; no I/O."""
 
     def __init__(self) -> None:
         self._rest = bytearray()
 
     def fed(self, data: bytes) -> Iterator[Answer]:
-        """Answers that are whole with these bytes; BadFrame where none can begin: the rest cannot be told apart."""
+        """The answers that are complete with these bytes; BadFrame where none can begin, the rest is lost."""
         rest = self._rest
         rest += data
         while rest:
@@ -202,7 +183,7 @@ class Answers:
 
 
 class Commands:
-    """What a program tells a robot, out of its bytes."""
+    """A parser of the commands in a program's byte stream, however the stream is cut; no I/O."""
 
     def __init__(self) -> None:
         self._rest = bytearray()
@@ -213,7 +194,7 @@ class Commands:
         return bool(self._rest)
 
     def fed(self, data: bytes) -> Iterator[RobotCommand]:
-        """Commands that are whole with these bytes; BadFrame at one that is none: the rest cannot be told apart."""
+        """The commands that are complete with these bytes; BadFrame at an invalid one, and the rest is lost."""
         rest = self._rest
         rest += data
         while len(rest) >= COMMAND_BYTES:

@@ -1,6 +1,7 @@
-"""What the numbers of the e-puck2's sensors mean, and which numbers stand for what it senses.
+"""Conversions between the numbers in the e-puck2's sensor packet and the readings of a body's sensors.
 
-Each function pair works on arrays of any shape; what goes to the robot's numbers is rounded to whole ones and clipped.
+Each pair of functions works on arrays of any shape; `to_…` rounds to whole numbers and clips. The magnetometer becomes
+a compass, the step counters lose their wrap, and `Epuck2Readings` reads a whole packet.
 """
 
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.ranging_specs import ScanSpec, within_a_turn
 from swarmwire.comms.bodies.sensor_specs import BatterySpec
-from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP
+from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S
 
 PROXIMITY_FULL = 4095  # 12 bits
 AMBIENT_DARK = 4000  # what the proximity sensors tell of ambient light in the dark
@@ -24,6 +25,11 @@ PER_MPS2 = PER_G / 9.80665
 MAX_ACCELERATION = 1536  # 2 g, in the same numbers
 PER_RADPS = 32768 / np.deg2rad(250.0)  # of the gyro
 PER_V = 4096 * 0.6 / 3.0  # of the battery: 12 bits of 3 V, behind a divider
+CHIPS = ("mpu9250", "icm20948")  # of the magnetometer; the second in robots from about 2025 on
+_WRAP = 1 << 16  # of the step counters
+_SLACK = 200  # steps: for errors of the measured time, and for wheels that are pushed
+
+Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width)
 
 
 def proximity(raw: AnyArray) -> FloatArray:
@@ -92,20 +98,15 @@ def _whole(value: FloatArray, low: float, high: float) -> AnyArray:
     return np.clip(np.rint(value), low, high)
 
 
-# --- The magnetometer of the e-puck2 as a compass.
-#
-# Its axes depend on the chip, of which there have been two. The x of the chip's accelerometer is to the left, its y to
-# the back (e_lsm330.c); the firmware turns y round on its way into the packet (mpu9250.c, e_acc.c). The older
-# magnetometer has x and y swapped, which agrees with the firmware's own compass (main.c, selector 14: the LED to the
-# north is lit); the newer has x as the accelerometer, and y against it (data sheets).
-
-
-CHIPS = ("mpu9250", "icm20948")  # the second in robots from about 2025 on
-
-
 @dataclass(frozen=True, slots=True)
 class Compass:
-    """One robot's magnetometer, and where magnetic north lies in its arena."""
+    """One robot's magnetometer, and the direction of magnetic north in its arena.
+
+    The axes depend on the chip. The x of the chip's accelerometer is to the left, its y to the back (e_lsm330.c); the
+    firmware reverses y in the packet (mpu9250.c, e_acc.c). The older magnetometer has x and y swapped, which agrees
+    with the firmware's own compass (main.c, selector 14: the LED to the north is lit). The newer one has x as the
+    accelerometer, and y against it (data sheets).
+    """
 
     chip: str
     north_rad: float  # heading of magnetic north in the arena, counter-clockwise from its +x
@@ -128,15 +129,8 @@ class Compass:
         return np.stack([x + self.offset_x_ut, y + self.offset_y_ut, np.full_like(x, down_ut)], axis=-1)
 
 
-# --- The step counters of the e-puck2 without their wrap.
-
-
-_WRAP = 1 << 16
-_SLACK = 200  # steps: what a time that is measured here may be off by, and wheels that are pushed
-
-
 class Odometer:
-    """Steps of both wheels since the first reading.
+    """Steps of both wheels since the first reading, without the counters' wrap.
 
     Readings must come before a counter has gone half its range, which takes half a minute at full speed.
     """
@@ -146,22 +140,23 @@ class Odometer:
         self._before: tuple[int, int] | None = None
 
     def read(self, left: int, right: int) -> None:
-        """Count on to what the counters show now."""
+        """Add the steps up to the present values of the counters."""
         more_left, more_right = self._since(left, right)
         self.left, self.right = self.left + more_left, self.right + more_right
         self._before = left, right
 
     def resume(self, left: int, right: int, elapsed_s: float) -> bool:
-        """Count on after a connection was lost for so long; false if the counters began anew, and nothing is added.
+        """Continue after a lost connection; False if the counters were reset, and nothing is added.
 
-        A robot that was switched off and on counts from 0 again: what it cannot have gone in that time it has not.
+        A robot that was switched off and on counts from 0 again: more steps than are possible in `elapsed_s` mean a
+        reset.
         """
-        longest = FASTEST * elapsed_s + _SLACK
-        known = longest < _WRAP // 2 and max(map(abs, self._since(left, right))) <= longest
-        if not known:
+        max_steps = MAX_STEPS_PER_S * elapsed_s + _SLACK
+        continues = max_steps < _WRAP // 2 and max(map(abs, self._since(left, right))) <= max_steps
+        if not continues:
             self._before = left, right
         self.read(left, right)
-        return known
+        return continues
 
     def _since(self, left: int, right: int) -> tuple[int, int]:
         before = self._before or (left, right)
@@ -173,15 +168,9 @@ def _signed(steps: int) -> int:
     return (steps + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
-# --- The sensors' packet as readings of the senses in a body's sheet.
-
-
-Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width)
-
-
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What differs from robot to robot."""
+    """The calibration of one robot's sensors."""
 
     compass: Compass
     turn_offset_radps: float = 0.0
@@ -190,53 +179,55 @@ class Calibration:
 
 
 class Epuck2Readings:
-    """The senses of one robot, from its packets and the steps that it has gone."""
+    """The readings of one robot's sensors, from its packets and its odometer."""
 
     def __init__(self, body: Body, calibration: Calibration, odometer: Odometer) -> None:
         self._body, self._calibration, self._odometer = body, calibration, odometer
-        self._of: dict[str, Callable[[AnyArray], Fields]] = {
-            "proximity": lambda told: {"proximity.value": proximity(told["proximity"])},
-            "light": lambda told: {"light.value": light(told["ambient"])},
+        self._readers: dict[str, Callable[[AnyArray], Fields]] = {
+            "proximity": lambda packet: {"proximity.value": proximity(packet["proximity"])},
+            "light": lambda packet: {"light.value": light(packet["ambient"])},
             "ground": self._ground,
             "scan": self._scan,
             "odometry": self._odometry,
             "imu": self._imu,
-            "compass": lambda told: {"compass.heading_rad": calibration.compass.heading_rad(told["magnetic_field"])},
+            "compass": lambda packet: {
+                "compass.heading_rad": calibration.compass.heading_rad(packet["magnetic_field"])
+            },
             "battery": self._battery,
         }
 
-    def of(self, told: AnyArray, sensors: frozenset[str]) -> Fields:
-        """The readings of these senses in a packet, `SENSORS` (1,)."""
+    def of(self, packet: AnyArray, sensors: frozenset[str]) -> Fields:
+        """The readings of these sensors in a packet, `SENSORS` (1,)."""
         fields: Fields = {}
         for name in sensors:
-            fields |= self._of[name](told)
+            fields |= self._readers[name](packet)
         return fields
 
-    def _ground(self, told: AnyArray) -> Fields:
-        of = self._calibration
-        return {"ground.shade": shade(told["ground"], of.ground_black, of.ground_white)}
+    def _ground(self, packet: AnyArray) -> Fields:
+        calibration = self._calibration
+        return {"ground.shade": shade(packet["ground"], calibration.ground_black, calibration.ground_white)}
 
-    def _scan(self, told: AnyArray) -> Fields:
+    def _scan(self, packet: AnyArray) -> Fields:
         spec = self._body.scan
         assert spec is not None
-        return {"scan.range_m": distance_m(told["distance_mm"], spec)[:, None]}
+        return {"scan.range_m": distance_m(packet["distance_mm"], spec)[:, None]}
 
-    def _odometry(self, told: AnyArray) -> Fields:
+    def _odometry(self, packet: AnyArray) -> Fields:
         steps = self._odometer.left, self._odometer.right
         left_m, right_m = (np.array([M_PER_STEP * wheel]) for wheel in steps)
         return {"odometry.left_m": left_m, "odometry.right_m": right_m}
 
-    def _imu(self, told: AnyArray) -> Fields:
+    def _imu(self, packet: AnyArray) -> Fields:
         # The accelerometer's first axis is to the left and its second ahead: GCtronic's driver swaps them, too.
-        acceleration, turn = told["acceleration"] / PER_MPS2, told["gyro"][:, 2] / PER_RADPS
+        acceleration, turn = packet["acceleration"] / PER_MPS2, packet["gyro"][:, 2] / PER_RADPS
         return {
             "imu.forward_mps2": acceleration[:, 1].copy(),
             "imu.left_mps2": acceleration[:, 0].copy(),
             "imu.turn_radps": turn - self._calibration.turn_offset_radps,
         }
 
-    def _battery(self, told: AnyArray) -> Fields:
+    def _battery(self, packet: AnyArray) -> Fields:
         spec = self._body.sensors["battery"]
         assert isinstance(spec, BatterySpec)
-        voltage_v = told["battery"] / PER_V
+        voltage_v = packet["battery"] / PER_V
         return {"battery.charge": charge(voltage_v, spec), "battery.voltage_v": voltage_v}

@@ -1,4 +1,10 @@
-"""Kinds of ROS 2 messages that drivers and gateways exchange."""
+"""ROS 2 over zenoh: message types, names, keys, liveliness tokens and attachments of its two zenoh transports.
+
+Both transports carry raw CDR. zenoh-bridge-ros2dds: a message travels under the full name of its topic without the
+first slash; tokens announce topics to other bridges (zenoh-plugin-ros2dds: ros2_utils.rs, liveliness_mgt.rs).
+rmw_zenoh: a message travels under domain, full name of the topic, type and its hash; tokens form the ROS graph for
+`ros2 topic list`, and messages arrive without them (rmw_zenoh: docs/design.md, liveliness_utils.cpp).
+"""
 
 import re
 import struct
@@ -16,6 +22,16 @@ BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
 ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # of a photocell, in lux
 CLOCK = "rosgraph_msgs/msg/Clock"  # the time in an emulation
 
+TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
+NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
+BRIDGE_QOS = ":1:0:0,10"  # without a key, reliable, volatile, the last ten kept: the default of publishers
+READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
+QOS = "::,10:,:,:,,"  # of rmw_zenoh: all defaults
+ANY = "*"
+MAX_TOPICS = 10_000  # of a node: ids of nodes and topics are whole numbers, unique in a session
+LAYOUT = struct.Struct("<qqB16s")  # of an attachment
+ID_BYTES = 16
+
 
 def dds_kind(kind: str) -> str:
     """The name of a kind of message in DDS, which rmw_zenoh writes into its keys.
@@ -25,13 +41,6 @@ def dds_kind(kind: str) -> str:
     """
     package, folder, name = kind.split("/")
     return f"{package}::{folder}::dds_::{name}_"
-
-
-# --- Names as ROS 2 takes them: robots as namespaces, topics within them.
-
-
-TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
-NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
 
 
 def ros_name(robot: str) -> str:
@@ -59,16 +68,6 @@ def check_name(name: str, where: str, key: str) -> None:
         raise BadInput(where, key, f"expected a ROS name such as scan or robot_1/scan, got {name!r}")
 
 
-# --- Keys and liveliness tokens of zenoh-bridge-ros2dds (zenoh-plugin-ros2dds: ros2_utils.rs, liveliness_mgt.rs).
-#
-# A message travels under the full name of its topic without the first slash, as raw CDR. Tokens tell other bridges what
-# to announce in their own ROS graph.
-
-
-BRIDGE_QOS = ":1:0:0,10"  # without a key, reliable, volatile, the last ten kept: what publishers have by default
-READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
-
-
 def bridge_key(topic: str) -> str:
     """The key of a topic of this full name.
 
@@ -87,17 +86,6 @@ def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str
 def bridge_itself(zid: str) -> str:
     """The token of the bridge of this zenoh id."""
     return f"@/{zid}/@ros2_lv"
-
-
-# --- Keys and liveliness tokens of rmw_zenoh (rmw_zenoh: docs/design.md, liveliness_utils.cpp).
-#
-# A message travels under domain, full name of the topic, kind and its hash. Tokens make up the ROS graph: they let
-# `ros2 topic list` show what there is, and are not needed for messages to arrive.
-
-
-QOS = "::,10:,:,:,,"  # what differs from the defaults: nothing
-ANY = "*"
-MAX_TOPICS = 10_000  # of a node: ids of nodes and of their topics are whole numbers that no two in a session share
 
 
 def rmw_key(domain: int, topic: str, kind: str, type_hash: str = ANY) -> str:
@@ -138,18 +126,13 @@ def _mangled(name: str) -> str:
     return name.replace("/", "%")
 
 
-# --- What rmw_zenoh attaches to each message; a subscriber drops those that come without.
-#
-# Sequence number and time of the source as little-endian int64, then the publisher's id of 16 bytes, as zenoh's
-# serializer writes them: 33 bytes. (rmw_zenoh: attachment_helpers.cpp.)
-
-
-LAYOUT = struct.Struct("<qqB16s")
-ID_BYTES = 16
+# rmw_zenoh attaches to each message the sequence number and the source time as little-endian int64, then the
+# publisher's id of 16 bytes, as zenoh's serializer writes them: 33 bytes. A subscriber drops messages without it.
+# (rmw_zenoh: attachment_helpers.cpp.)
 
 
 def publisher_id(token: str) -> bytes:
-    """An id of 16 bytes that follows from the publisher's liveliness token, so none has that of another."""
+    """An id of 16 bytes, derived from the publisher's liveliness token, so that ids differ."""
     return blake2b(token.encode(), digest_size=ID_BYTES).digest()
 
 

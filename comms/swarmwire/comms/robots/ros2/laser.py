@@ -1,4 +1,8 @@
-"""Which of some directions lies nearest to each of others, around the circle."""
+"""LaserScan messages: decoding for any scanner, encoding for an emulated one, and readings of a body's sensors.
+
+`LaserAsProximity` turns a scan into readings of proximity sensors at the body's rim, `LaserAsScan` into readings of the
+scanner in the body's spec.
+"""
 
 from typing import Any, NamedTuple
 
@@ -11,10 +15,14 @@ from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
 
 TURN_RAD = 2.0 * np.pi
+MAX_RAYS = 100_000
+FRAME = "base_scan"
+WIDEST_RAD = np.pi / 4.0  # to either side: an object further off is beside a sensor, not before it
+SLACK = 1.001  # of half the angle between two rays: angles are float32 in messages
 
 
 def nearest_angle(of_rad: FloatArray, among_rad: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For each angle `of_rad` (n,) the place of the nearest `among_rad` (m,), and how far apart they are, in rad."""
+    """For each angle `of_rad` (n,) the index of the nearest `among_rad` (m,) around the circle, and their distance."""
     among = np.mod(among_rad, TURN_RAD)
     order = np.argsort(among, kind="stable")
     around = np.concatenate([among[order[-1:]] - TURN_RAD, among[order], among[order[:1]] + TURN_RAD])
@@ -23,13 +31,6 @@ def nearest_angle(of_rad: FloatArray, among_rad: FloatArray) -> tuple[IntArray, 
     before_rad, after_rad = at - around[after - 1], around[after] - at
     place = np.where(before_rad <= after_rad, after - 2, after - 1) % len(order)
     return order[place].astype(np.int64), np.minimum(before_rad, after_rad)
-
-
-# --- LaserScan messages: what they say, whatever the scanner, and those that an emulated one sends.
-
-
-MAX_RAYS = 100_000
-FRAME = "base_scan"
 
 
 class Geometry(NamedTuple):
@@ -87,23 +88,18 @@ def laser_scan(messages: Messages, spec: ScanSpec, range_m: FloatArray, stamp_ns
     )
 
 
-# --- LaserScan messages as the readings of proximity sensors at the body's rim.
-#
-# A return at range r on a ray at angle b, from a scanner that stands `at_m` ahead of the centre of a body of radius R,
-# is
-#
-#     d = max(r - s(b), 0),    s(b) = sqrt(R^2 - at_m^2 sin(b)^2) - at_m cos(b)
-#
-# away from the rim, where s(b) is the way from the scanner to the rim along that ray. It belongs to the sensor whose
-# angle is nearest to b, which is thus within half the angle between two sensors, and must be within 45 degrees. Each
-# sensor answers to its nearest d as its sheet's response says, or 0 beyond the sheet's range.
-
-
-WIDEST_RAD = np.pi / 4.0  # to either side: further off, a thing is beside a sensor and not before it
-
-
 class LaserAsProximity:
-    """Measures each sensor of the sheet the nearest return before it, measured from the rim."""
+    """Readings of proximity sensors from a scan: each sensor answers to the nearest return before it.
+
+    A return at range r on a ray at angle b, from a scanner that stands `at_m` ahead of the centre of a body of radius
+    R, has from the rim the distance
+
+        d = max(r - s(b), 0),    s(b) = sqrt(R^2 - at_m^2 sin(b)^2) - at_m cos(b)
+
+    where s(b) is the distance from the scanner to the rim along that ray. It belongs to the sensor whose angle is
+    nearest to b, which is thus within half the angle between two sensors, and must be within 45 degrees. Each sensor
+    answers to its nearest d by the response curve of its spec, with 0 beyond the spec's range.
+    """
 
     def __init__(self, spec: ProximitySpec, radius_m: float, at_m: float, scanner_rad: float) -> None:
         """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
@@ -134,14 +130,8 @@ class LaserAsProximity:
         self._geometry = geometry
 
 
-# --- LaserScan messages of any scanner as the readings of the sheet's scanner.
-
-
-SLACK = 1.001  # of half the angle between two rays: angles come as float32
-
-
 class LaserAsScan:
-    """Measures each ray of the sheet the return on the message's ray of the nearest angle.
+    """Readings of the spec's scanner from a scan of any scanner: each ray gets the return on the nearest ray.
 
     Where that one is further away than half the angle between two rays (of the coarser of both), the scanner does not
     look there, and the ray meets nothing.

@@ -13,7 +13,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
 from swarmwire.comms.robots.epuck2.commands import (
     ALL_DARK,
-    FASTEST,
+    MAX_STEPS_PER_S,
     Answers,
     Commands,
     Lights,
@@ -89,9 +89,9 @@ def test_an_answer_that_can_be_none_is_named(first: int) -> None:
 @given(linear_mps=st.floats(-1.0, 1.0), angular_radps=st.floats(-50.0, 50.0))
 def test_wheels_are_never_told_more_than_they_can_and_the_curve_stays(linear_mps: float, angular_radps: float) -> None:
     left, right = wheel_steps(linear_mps, angular_radps, WHEEL_BASE_M)
-    assert max(abs(left), abs(right)) <= FASTEST
+    assert max(abs(left), abs(right)) <= MAX_STEPS_PER_S
     linear, angular = body_speeds(left, right, WHEEL_BASE_M)
-    share = max(abs(linear_mps) + abs(angular_radps) * WHEEL_BASE_M / 2, 1e-9) / (FASTEST * np.pi * 0.04 / 1000)
+    share = max(abs(linear_mps) + abs(angular_radps) * WHEEL_BASE_M / 2, 1e-9) / (MAX_STEPS_PER_S * np.pi * 0.04 / 1000)
     slower = 1.0 / max(share, 1.0)
     assert linear == pytest.approx(linear_mps * slower, abs=1e-4)
     assert angular == pytest.approx(angular_radps * slower, abs=5e-3)

@@ -1,4 +1,8 @@
-"""What programs told a group of emulated e-puck2s, kept until the loop asks."""
+"""Commands and sensor packets of a group of emulated e-puck2s.
+
+`ReceivedCommands` keeps the commands of programs until the loop takes them. `SensorPackets` encodes the readings of a
+group as the packets that its robots answer with.
+"""
 
 from collections import Counter
 from collections.abc import Callable
@@ -9,11 +13,19 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
-from swarmwire.comms.robots.epuck2.commands import FASTEST, M_PER_STEP, RobotCommand, body_speeds
+from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S, RobotCommand, body_speeds
 from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
 from swarmwire.comms.tick_io import LedChanges
 from swarmwire.world.gateways.gateway import Commands
+
+Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
+
+WIFI_SELECTOR = 15  # selector position of a robot that answers over WiFi
+ROOM_C = 25
+LEVEL_UT, DOWN_UT = 22.0, 42.0  # the earth's field in central Europe
+UPRIGHT_DEG, OVER_DEG = 5.0, 160.0  # the firmware reports no orientation for a smaller or greater tilt
+_ANSWER = np.dtype([("header", "u1"), ("sensors", SENSORS)])
 
 
 class ReceivedCommands:
@@ -28,14 +40,14 @@ class ReceivedCommands:
         self._shown = [dict.fromkeys(range(body.led_count), 0) for _ in range(robots)]
 
     def add(self, robot: int, command: RobotCommand) -> None:
-        """Keep what a robot is told."""
+        """Keep a command for a robot."""
         with self._lock:
             if command.settings & RobotSettingsBits.AVOID:
-                self._counts["avoidance_refused"] += 1  # it goes as it is told
+                self._counts["avoidance_refused"] += 1  # its speeds still apply
             if command.settings & RobotSettingsBits.SET_STEPS:
                 self._counters[robot] = command.left, command.right
             else:
-                if max(abs(command.left), abs(command.right)) > FASTEST:
+                if max(abs(command.left), abs(command.right)) > MAX_STEPS_PER_S:
                     self._counts["speeds_clipped"] += 1
                 self._speeds[robot] = body_speeds(command.left, command.right, self._wheel_base_m)
             before = self._shown[robot]
@@ -45,17 +57,17 @@ class ReceivedCommands:
                 self._shown[robot] = shown
 
     def halt(self, robot: int) -> None:
-        """Keep that a robot was switched on: at rest, and dark."""
+        """Reset a robot that was switched on: at rest, LEDs off."""
         self.add(robot, RobotCommand())
 
     def counters(self) -> dict[int, tuple[int, int]]:
-        """What step counters were to show, by robot, since the last call."""
+        """New values of the step counters, by robot, since the last call."""
         with self._lock:
             counters, self._counters = self._counters, {}
         return counters
 
     def taken(self) -> Commands:
-        """What came since the last call."""
+        """The commands since the last call."""
         with self._lock:
             speeds, self._speeds = self._speeds, {}
             leds, self._leds = self._leds, {}
@@ -67,20 +79,8 @@ class ReceivedCommands:
         return Commands(drive, linear_mps, angular_radps, lateral_mps, LedChanges(*changes.copy()))
 
 
-# --- The readings of a group as the packets that its robots answer with.
-
-
-Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)
-
-WIFI_SELECTOR = 15  # where the selector of a robot stands that answers over WiFi
-ROOM_C = 25
-LEVEL_UT, DOWN_UT = 22.0, 42.0  # the earth's field in central Europe
-UPRIGHT_DEG, OVER_DEG = 5.0, 160.0  # the firmware tells no orientation of a robot that leans less, or more
-_ANSWER = np.dtype([("header", "u1"), ("sensors", SENSORS)])
-
-
 class SensorPackets:
-    """What each robot of a group would answer now. A reading that is lost (nan) leaves the number as it was."""
+    """The present answer of each robot of a group. A lost reading (nan) leaves the number unchanged."""
 
     def __init__(self, body: Body, robots: int, compass: Compass) -> None:
         self._body, self._compass = body, compass
@@ -100,7 +100,7 @@ class SensorPackets:
         self._at_rest()
 
     def fill(self, fields: Fields) -> None:
-        """Take over these readings, of which a body need not have all."""
+        """Store these readings; a body need not have all of them."""
         for name, values in fields.items():
             if name in self._to_wire:
                 place, to_wire = self._to_wire[name]
@@ -111,7 +111,7 @@ class SensorPackets:
             self._set_steps(fields)
 
     def count_from(self, robot: int, left: int, right: int) -> None:
-        """Let a robot's step counters show these numbers now."""
+        """Set a robot's step counters to these numbers."""
         self._counted_from[robot] = self._travelled[robot] - (left, right)
 
     def answers(self) -> list[bytes]:
