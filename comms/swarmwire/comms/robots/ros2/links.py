@@ -1,4 +1,7 @@
-"""zenoh sessions of a gateway, which routes as a ROS 2 router does, and of a driver, which is a client of one."""
+"""zenoh sessions and topics of ROS 2 links: a gateway is a router, as in ROS 2, and a driver is a client of one.
+
+`Inlet` subscribes to a topic and `Outlet` publishes to one, each with or without rmw_zenoh's attachment.
+"""
 
 import json
 import re
@@ -14,7 +17,7 @@ from swarmwire.comms.wire.sessions import close_session
 ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
 EXAMPLE = "tcp/192.168.1.7:7447"
 LEASE_MS = 2000  # a peer that is cut off is noticed after this
-CLOSE_S = 10.0  # as long as zenoh itself waits: a robot's last command may be on its way
+CLOSE_TIMEOUT_S = 10.0  # as long as zenoh itself waits: a robot's last command may be on its way
 
 
 def check_endpoint(endpoint: str, where: str, key: str) -> None:
@@ -51,7 +54,7 @@ def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
 
 def close(session: zenoh.Session) -> None:
     """Close a session; what was put before still goes out."""
-    close_session(session, CLOSE_S)
+    close_session(session, CLOSE_TIMEOUT_S)
 
 
 def is_linked(session: zenoh.Session) -> bool:
@@ -72,11 +75,8 @@ def _config(mode: str, more: dict[str, object], *, gossip: bool) -> zenoh.Config
     )
 
 
-# --- One topic on its way in: payloads as they come, those that rmw_zenoh would drop counted instead.
-
-
 class Inlet:
-    """A subscriber on one key. `take` gets each payload, in the thread of the network, so it must be done at once."""
+    """A subscriber on one key. `take` gets each payload in the network's thread, so it must return at once."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class Inlet:
         self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.Callback(self._receive, indirect=False))
 
     def close(self) -> None:
-        """Nobody subscribes any more."""
+        """End the subscription."""
         self._subscriber.undeclare()
 
     def _receive(self, sample: zenoh.Sample) -> None:
@@ -105,15 +105,12 @@ class Inlet:
         self._take(sample.payload.to_bytes())
 
 
-# --- One topic on its way out, with or without rmw_zenoh's attachment.
-
-
 class Outlet:
     """A publisher on one key. Payloads are dropped where the network cannot keep up.
 
     Attributes:
-        wanted: whether anybody subscribes. It is told from the thread of the network: to ask costs 1 to 20 us, and a
-            gateway has hundreds of these.
+        wanted: whether the key has a subscriber. The network's thread updates it: a query would cost 1 to 20 us, and a
+            gateway has hundreds of outlets.
     """
 
     def __init__(self, session: zenoh.Session, key: str, token: str | None) -> None:
@@ -123,8 +120,8 @@ class Outlet:
         self._sequence = 0
         self.wanted = False
         self._publisher.declare_matching_listener(zenoh.handlers.Callback(self._match, indirect=False))
-        # Whoever was there before is not told of. The listener may tell of a change while that is asked: the last word
-        # must be the newest, or a base that is there would never be found.
+        # The listener does not report earlier subscribers, and may report a change during this query: the last value
+        # must be the newest, or a present base would never be found.
         while self.wanted != (now := self._publisher.matching_status.matching):
             self.wanted = now
 

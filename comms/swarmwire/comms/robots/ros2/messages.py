@@ -1,4 +1,4 @@
-"""Messages of a ROS 2 distribution and their CDR encoding, by the library rosbags."""
+"""Messages of a ROS 2 distribution and their CDR encoding, by the library rosbags; Twist and TwistStamped by hand."""
 
 import struct
 from math import isfinite
@@ -8,7 +8,11 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame, BadInput
 
 DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
-NO_HASH = "TypeHashNotSupported"  # what Humble's rmw_zenoh has in place of a hash
+NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh
+LITTLE = b"\x00\x01\x00\x00"
+SIZE = 4 + 48  # of a Twist
+MAX_STAMPED = 512  # of a TwistStamped: a frame's name of hundreds of letters is invalid
+PADDING = 4  # some writers fill up to a multiple of four
 
 
 class Messages:
@@ -57,45 +61,40 @@ def stamp_ns(header: Any) -> int:
     return header.stamp.sec * NS_PER_S + header.stamp.nanosec
 
 
-# --- Twist and TwistStamped, the commands of a base: short enough to be laid out by hand.
-#
-# CDR: two bytes of zero and endianness, two of options; then fields, each at a multiple of its size from there on.
-
-
-LITTLE = b"\x00\x01\x00\x00"
-SIZE = 4 + 48
-MAX_STAMPED = 512  # a frame's name of hundreds of letters is none
-PADDING = 4  # some writers fill up to a multiple of four
+# Twist and TwistStamped, the commands of a base. CDR: two bytes of zero and endianness, two of options; then fields,
+# each at a multiple of its size from there on.
 
 
 class Velocities(NamedTuple):
-    """What a base is told, in its own frame."""
+    """The commanded velocities of a base in its own frame."""
 
     linear_mps: float
     angular_radps: float  # positive to the left
     lateral_mps: float = 0.0  # to the left
 
 
-def encode_twist(told: Velocities) -> bytes:
+def encode_twist(velocities: Velocities) -> bytes:
     """A Twist of 52 bytes."""
-    return LITTLE + struct.pack("<6d", told.linear_mps, told.lateral_mps, 0.0, 0.0, 0.0, told.angular_radps)
+    return LITTLE + struct.pack(
+        "<6d", velocities.linear_mps, velocities.lateral_mps, 0.0, 0.0, 0.0, velocities.angular_radps
+    )
 
 
-def encode_twist_stamped(told: Velocities, stamp_ns: int, frame: str) -> bytes:
+def encode_twist_stamped(velocities: Velocities, stamp_ns: int, frame: str) -> bytes:
     """A TwistStamped of the time in ns since 1970."""
     name = frame.encode() + b"\0"
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
     head = struct.pack("<iII", seconds, nanoseconds, len(name)) + name
-    return LITTLE + head + bytes(-len(head) % 8) + encode_twist(told)[4:]
+    return LITTLE + head + bytes(-len(head) % 8) + encode_twist(velocities)[4:]
 
 
 def decode_twist(payload: bytes) -> Velocities:
-    """What a Twist says; BadFrame if it is none, or not all of it finite."""
+    """The velocities of a Twist; BadFrame for other bytes, or numbers that are not finite."""
     return _velocities(payload, SIZE)
 
 
 def decode_twist_stamped(payload: bytes) -> Velocities:
-    """What a TwistStamped says, whenever it was made; BadFrame as `decode_twist`."""
+    """The velocities of a TwistStamped of any time; BadFrame as `decode_twist`."""
     if not SIZE < len(payload) <= MAX_STAMPED:
         raise BadFrame("malformed", f"{len(payload)} bytes are no TwistStamped")
     (length,) = struct.unpack_from(_order(payload) + "I", payload, 12)
@@ -103,7 +102,7 @@ def decode_twist_stamped(payload: bytes) -> Velocities:
 
 
 def decode_either(payload: bytes) -> Velocities:
-    """What a Twist or a TwistStamped says, which is the longer of the two; BadFrame as `decode_twist`."""
+    """The velocities of a Twist or of a TwistStamped, which is longer; BadFrame as `decode_twist`."""
     return decode_twist(payload) if len(payload) < SIZE + PADDING else decode_twist_stamped(payload)
 
 

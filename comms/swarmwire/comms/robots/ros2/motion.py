@@ -1,4 +1,8 @@
-"""Turns about the vertical as ROS's quaternions have them."""
+"""Motion of a base in ROS 2 messages: yaw and quaternions, Odometry from and to wheel travel, and Imu.
+
+`WheelPoses` integrates wheel travel into the poses that an emulated base sends. `WheelTravel` does the reverse for the
+poses of a real base.
+"""
 
 from math import atan2, cos, hypot, isfinite, isnan, nan, pi, radians, remainder, sin
 from typing import Any, NamedTuple
@@ -11,9 +15,17 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import IMU, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 
+ODOMETRY_FRAME, CHILD_FRAME, IMU_FRAME = "odom", "base_footprint", "imu_link"
+# A measured pose may be further on by this margin, and by this multiple of the base's largest speed; more is a jump.
+JUMP_MARGIN_M, JUMP_FACTOR = 0.1, 2.0
+STRAIGHT_RAD = 1e-6  # below this turn an arc is as long as its chord
+GRAVITY_MPS2 = 9.80665  # upward acceleration that an accelerometer at rest measures
+
+Pose = tuple[float, float, float]
+
 
 def yaw_of(quaternion: Any) -> float:
-    """The turn about the vertical of a quaternion, in rad, in [-pi, pi]; nan if it is none."""
+    """The yaw of a quaternion in rad, in [-pi, pi]; nan for a quaternion of length 0."""
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
     if not x * x + y * y + z * z + w * w > 0.0:
         return float("nan")
@@ -21,24 +33,18 @@ def yaw_of(quaternion: Any) -> float:
 
 
 def quaternion(messages: Messages, yaw_rad: float) -> Any:
-    """The quaternion of a turn about the vertical."""
+    """The quaternion of a yaw."""
     return messages.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, sin(0.5 * yaw_rad), cos(0.5 * yaw_rad))
 
 
 def within_turn(angle_rad: float) -> float:
-    """This angle in (-pi, pi]."""
+    """The angle wrapped into (-pi, pi]."""
     wrapped = remainder(angle_rad, 2.0 * pi)
     return pi if wrapped == -pi else wrapped
 
 
-# --- Where bases believe to be, from what their wheels have rolled: the pose in the Odometry messages that they send.
-
-
-ODOMETRY_FRAME, CHILD_FRAME = "odom", "base_footprint"
-
-
 class WheelPoses:
-    """The poses of n bases, each of which drives an arc between two readings, and up to the first one from the origin.
+    """The poses of n bases by their wheel travel, from the origin; between two readings a base drives an arc.
 
     Attributes:
         pose: (n, 3) x and y in m, turn since the start in rad, which is not wrapped.
@@ -51,7 +57,7 @@ class WheelPoses:
         self._before_ns, self._before_m = 0, np.zeros((2, bases))
 
     def follow(self, time_ns: int, left_m: FloatArray, right_m: FloatArray) -> None:
-        """Add the travel (n,) of both wheels since the last reading; where it is nan, as soon as it is told again."""
+        """Add the travel (n,) of both wheels since the last reading; nan travel is added with the next valid one."""
         travel_m = np.stack([left_m, right_m])
         travel_m = np.where(np.isnan(travel_m), self._before_m, travel_m)
         by_m, for_ns = travel_m - self._before_m, time_ns - self._before_ns
@@ -82,26 +88,16 @@ class WheelPoses:
         )
 
 
-# --- What the two wheels of a base have rolled, from the poses that it tells in Odometry messages.
-#
-# Between two of them the base is taken to drive an arc: of chord c and turn a it is c (a / 2) / sin(a / 2) long,
-# forwards or backwards as the chord lies to the heading half way. The wheels roll that length -+ a times half the wheel
-# base.
-
-
-SPARE_M, SPARE = 0.1, 2.0  # a base may be measured that much further on, and that many times as fast as it can drive
-STRAIGHT_RAD = 1e-6  # below this an arc is as long as its chord
-
-Pose = tuple[float, float, float]
-
-
 class WheelTravel:
-    """Adds up the travel of both wheels since the first message.
+    """The travel of both wheels of a base since the first message, from the poses in its Odometry messages.
+
+    Between two poses the base drives an arc: with chord c and turn a it is c (a / 2) / sin(a / 2) long, forwards or
+    backwards as the chord lies to the heading half way. The wheels roll that length -+ a times half the wheel base.
 
     Attributes:
         left_m: travelled by the left wheel.
         right_m: travelled by the right wheel.
-        jumps: how often the pose went further than the base can drive: it began anew there.
+        jumps: number of poses further away than the base can drive; the travel continues from there.
     """
 
     def __init__(self, wheel_base_m: float, max_linear_mps: float) -> None:
@@ -111,7 +107,7 @@ class WheelTravel:
         self._last: tuple[int, Pose] | None = None
 
     def follow(self, message: Any) -> None:
-        """Add what an Odometry message says, later than the last one; BadFrame if its pose is none."""
+        """Add an Odometry message, later than the last one; BadFrame if its pose is not finite."""
         pose, at = message.pose.pose, stamp_ns(message.header)
         x_m, y_m, yaw_rad = pose.position.x, pose.position.y, yaw_of(pose.orientation)
         if not (isfinite(x_m) and isfinite(y_m) and isfinite(yaw_rad)):
@@ -123,7 +119,7 @@ class WheelTravel:
 
     def _add(self, by: Pose, yaw_rad: float, for_s: float) -> None:
         chord_m, turn_rad = hypot(by[0], by[1]), within_turn(by[2])
-        if chord_m > SPARE * self._max_mps * max(for_s, 0.0) + SPARE_M:
+        if chord_m > JUMP_FACTOR * self._max_mps * max(for_s, 0.0) + JUMP_MARGIN_M:
             self.jumps += 1
             return
         half_rad = 0.5 * turn_rad
@@ -134,15 +130,8 @@ class WheelTravel:
         self.right_m += arc_m + turn_rad * self._half_base_m
 
 
-# --- Imu messages: accelerations, turn rate and heading of a base on a level floor.
-
-
-IMU_FRAME = "imu_link"
-GRAVITY_MPS2 = 9.80665  # what an accelerometer at rest feels upwards
-
-
 class Motion(NamedTuple):
-    """What an Imu message says, in the frame of the base; nan: it does not tell."""
+    """The values of an Imu message for a base on a level floor, in the frame of the base; nan: not measured."""
 
     forward_mps2: float = nan
     left_mps2: float = nan
@@ -151,23 +140,24 @@ class Motion(NamedTuple):
 
 
 def motion_of(message: Any, north_deg: float) -> Motion:
-    """What a message says; the heading is its yaw turned by `north_deg`.
+    """The motion in a message; the heading is its yaw turned by `north_deg`.
 
-    Orientation, turn rate or acceleration whose first covariance is -1 it does not tell (its definition says so).
+    By the message's definition, a first covariance of -1 means that orientation, turn rate or acceleration is not
+    measured.
     """
     turn, acceleration = message.angular_velocity, message.linear_acceleration
-    told = message.linear_acceleration_covariance[0] != -1.0
+    has_acceleration = message.linear_acceleration_covariance[0] != -1.0
     yaw_rad = yaw_of(message.orientation) if message.orientation_covariance[0] != -1.0 else nan
     return Motion(
-        acceleration.x if told else nan,
-        acceleration.y if told else nan,
+        acceleration.x if has_acceleration else nan,
+        acceleration.y if has_acceleration else nan,
         turn.z if message.angular_velocity_covariance[0] != -1.0 else nan,
         within_turn(yaw_rad + radians(north_deg)) if not isnan(yaw_rad) else nan,
     )
 
 
 def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> Any:
-    """The message of a motion; what is nan it does not tell."""
+    """The message of a motion; nan values are marked as not measured."""
     make = messages.make
     known = not isnan(motion.forward_mps2 + motion.left_mps2)
     turn_radps, heading_rad = motion.turn_radps, motion.heading_rad
@@ -177,16 +167,16 @@ def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> 
         IMU,
         messages.header(stamp_ns, IMU_FRAME),
         quaternion(messages, yaw_rad),
-        _covariance(told=not isnan(heading_rad)),
+        _covariance(measured=not isnan(heading_rad)),
         make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0 if isnan(turn_radps) else turn_radps),
-        _covariance(told=not isnan(turn_radps)),
+        _covariance(measured=not isnan(turn_radps)),
         make("geometry_msgs/msg/Vector3", forward_mps2, left_mps2, GRAVITY_MPS2),
-        _covariance(told=known),
+        _covariance(measured=known),
     )
 
 
-def _covariance(told: bool) -> Any:
-    """Zeros: not known; its first element -1: there is no such measurement."""
+def _covariance(measured: bool) -> Any:
+    """A covariance of zeros (unknown), or with the first element -1 (not measured)."""
     covariance = np.zeros(9)
-    covariance[0] = 0.0 if told else -1.0
+    covariance[0] = 0.0 if measured else -1.0
     return covariance

@@ -1,4 +1,4 @@
-"""BatteryState messages."""
+"""BatteryState and Illuminance messages, and the readings of batteries and photocells in them."""
 
 from math import isnan, nan
 from typing import Any
@@ -11,13 +11,13 @@ from swarmwire.comms.robots.ros2.messages import Messages
 
 FRAME = ""
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
+FULL_LUX = 1000.0  # default illuminance for a photocell's reading of 1
 
 
 def charge_of(message: Any, spec: BatterySpec) -> float:
-    """The charge, 0 to 1: as told, else as the voltage lies between the sheet's when empty and when full; nan: neither.
+    """The charge, 0 to 1: from `percentage`, else from the voltage between the spec's `empty_v` and `full_v`; else nan.
 
-    `percentage` is a share by its definition. A base that tells more than 1 means per cent, and 1 could be either: then
-    the voltage counts.
+    `percentage` is a share by its definition. A base that sends more than 1 means per cent: then the voltage counts.
     """
     share = float(message.percentage)
     if 0.0 <= share <= 1.0 and message.present:
@@ -29,7 +29,7 @@ def charge_of(message: Any, spec: BatterySpec) -> float:
 
 
 def battery_state(messages: Messages, charge: float, voltage_v: float, stamp_ns: int) -> Any:
-    """The message of a battery that is being drained; what nobody measures is nan, as its definition wants it."""
+    """The message of a discharging battery; values that are not measured are nan, by the message's definition."""
     none = np.empty(0, np.float32)
     return messages.make(
         BATTERY_STATE,
@@ -48,14 +48,8 @@ def battery_state(messages: Messages, charge: float, voltage_v: float, stamp_ns:
     )
 
 
-# --- Illuminance messages: one photocell each.
-
-
-FULL_LUX = 1000.0  # that a photocell's reading of 1 stands for, unless somebody measured it
-
-
 def topics_of_light(topic: str, cells: int) -> tuple[str, ...]:
-    """The topic of each of some photocells: numbered, unless there is one.
+    """The topic of each photocell; with more than one cell the topics are numbered.
 
     >>> topics_of_light("illuminance", 1), topics_of_light("illuminance", 2)
     (('illuminance',), ('illuminance_0', 'illuminance_1'))
@@ -64,7 +58,7 @@ def topics_of_light(topic: str, cells: int) -> tuple[str, ...]:
 
 
 def brightness_of(message: Any, full_lux: float) -> float:
-    """What a photocell reads, 0 dark to 1 at `full_lux` and more; 0 if the message does not tell."""
+    """The reading of a photocell, 0 dark to 1 at `full_lux` and more; 0 if the message has no valid value."""
     lux = float(message.illuminance)
     return min(lux / full_lux, 1.0) if lux > 0.0 else 0.0
 
