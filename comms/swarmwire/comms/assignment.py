@@ -1,4 +1,4 @@
-"""Which robots a backend or a runner plays, and all that its agents may know before the first tick."""
+"""The assignment of robots to a backend or a runner, with all facts that its agents get before the first tick."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ class GroupAssignment:
 
     name: str
     agent: str  # "package.module:Class" or "/path/file.py:Class"
-    params: dict[str, Any]  # a list has a value for each of the rows
+    params: dict[str, Any]  # a list has one value per row
     body: Body
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
-    robot_names: tuple[str, ...]  # (n,) for messages to people
-    keys: KeyArray  # (n,) for the agents' draws; derived one way, they tell nothing of the arena's seed
-    act_every_ticks: int = 1  # the robots' period
+    robot_names: tuple[str, ...]  # (n,) for messages to users
+    keys: KeyArray  # (n,) for the agents' draws; one-way derived, so that they do not reveal the arena's seed
+    act_every_ticks: int = 1  # the robots act when the tick modulo this is 0
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Assignment:
 
     groups: tuple[GroupAssignment, ...]
     rate_hz: int
-    measures: tuple[str, ...] | None  # columns that the radio tells with a packet; None: there is no radio
+    measures: tuple[str, ...] | None  # measurements of the radio with each packet; None: there is no radio
 
     @property
     def robot_names(self) -> tuple[str, ...]:
@@ -44,8 +44,9 @@ class Assignment:
         return robots_text(list(self.robot_names))
 
     def with_agents(self, agents: Mapping[str, str]) -> "Assignment":
-        """The same, with these agents, by group, in place of those that it names."""
-        return replace(self, groups=tuple(replace(of, agent=agents.get(of.name, of.agent)) for of in self.groups))
+        """A copy with these agents, by group, in place of its own."""
+        groups = tuple(replace(group, agent=agents.get(group.name, group.agent)) for group in self.groups)
+        return replace(self, groups=groups)
 
     def as_mapping(self) -> dict[str, Any]:
         """The assignment as plain values that msgpack takes."""
@@ -68,32 +69,32 @@ class Assignment:
         }
 
     @classmethod
-    def from_mapping(cls, given: dict[str, Any]) -> "Assignment":
-        """The assignment that `as_mapping` described; BadFrame if this is none."""
+    def from_mapping(cls, mapping: dict[str, Any]) -> "Assignment":
+        """The assignment that `as_mapping` wrote down; BadFrame for other values."""
         try:
-            measures = None if given["measures"] is None else _texts(given["measures"])
-            return cls(tuple(_group(group) for group in given["groups"]), _whole(given["rate_hz"]), measures)
+            measures = None if mapping["measures"] is None else _texts(mapping["measures"])
+            return cls(tuple(_group(group) for group in mapping["groups"]), _whole(mapping["rate_hz"]), measures)
         except (KeyError, TypeError, ValueError, OverflowError, BadInput) as error:
             raise BadFrame("malformed", f"expected robots: {' '.join(str(error).split())}") from error
 
 
-def _group(given: Any) -> GroupAssignment:
+def _group(values: Any) -> GroupAssignment:
     group = GroupAssignment(
-        name=_text(given["name"]),
-        agent=_text(given["agent"]),
-        params=given["params"],
-        body=body_from_mapping(given["body"], where="assignment"),
-        rows=np.array(given["rows"], np.int64),
-        robot_names=_texts(given["robot_names"]),
-        keys=np.array(given["keys"], np.uint64),
-        act_every_ticks=_whole(given["act_every_ticks"]),
+        name=_text(values["name"]),
+        agent=_text(values["agent"]),
+        params=values["params"],
+        body=body_from_mapping(values["body"], where="assignment"),
+        rows=np.array(values["rows"], np.int64),
+        robot_names=_texts(values["robot_names"]),
+        keys=np.array(values["keys"], np.uint64),
+        act_every_ticks=_whole(values["act_every_ticks"]),
     )
     rows = group.rows
     if rows.ndim != 1 or not len(rows) or rows[0] < 0 or (rows[1:] <= rows[:-1]).any():
         raise ValueError("rows: robots by rising numbers")
     if len(group.robot_names) != len(rows) or group.keys.shape != rows.shape:
         raise ValueError("robot_names, keys: one for each of the rows")
-    if type(given["params"]) is not dict or not all(type(name) is str for name in group.params):
+    if type(values["params"]) is not dict or not all(type(name) is str for name in group.params):
         raise ValueError("params: a map")
     return group
 
@@ -117,7 +118,7 @@ def _whole(value: object) -> int:
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
-    """The parameters of the robots `index` (k,) alone: of a list, which has a value for each robot, theirs."""
+    """The parameters of the robots `index` (k,): from lists, which have a value per robot, only their values."""
     return {
         name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
         for name, value in params.items()

@@ -1,7 +1,7 @@
-"""Keyed random draws: a value belongs to what it is for, not to the order in which it was asked.
+"""Keyed random draws: the value of a draw depends on its purpose, not on the order of the calls.
 
 One counter-based generator, Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
-a draw is a pure function of a 64-bit key (whose randomness) and four 32-bit counters (what for). This is the numpy
+a draw is a pure function of a 64-bit key (its owner) and four 32-bit counters (its purpose). This is the numpy
 form; `draws_compiled` is the numba form, equal bit for bit. Normals therefore use + - * / and sqrt only, also for the
 logarithm.
 """
@@ -94,7 +94,7 @@ SQRT2 = 1.4142135623730951
 
 
 def derive_key(*parts: int | str) -> int:
-    """A 64-bit key for whatever `parts` name; one-way, so that a holder learns nothing of the parts (BLAKE2b)."""
+    """A 64-bit key derived from `parts` one-way (BLAKE2b), so that it does not reveal them."""
     plain = tuple(
         str(part) if isinstance(part, str) else int(part) for part in parts
     )  # numpy's scalars print otherwise
@@ -103,7 +103,7 @@ def derive_key(*parts: int | str) -> int:
 
 
 def purpose(name: str) -> int:
-    """The 32-bit counter word that stands for a purpose, such as "proximity noise"."""
+    """The 32-bit counter word of a purpose, such as "proximity noise"."""
     return int.from_bytes(blake2b(name.encode(), digest_size=4, person=b"purpose").digest(), "little")
 
 

@@ -1,4 +1,4 @@
-"""Messages: what robots say to one another, with the exact bytes that go on air.
+"""Messages between robots, with the exact bytes that go on air.
 
     >>> class Beacon(Message):
     ...     heading_rad: f4
@@ -39,7 +39,7 @@ DICT_TAG = 0  # a dict in msgpack, for prototypes; no class has this tag
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Message:
-    """Base of all messages; subclasses declare their fields with `f4`, `f8`, `i1` … `u4`.
+    """The base class of messages; subclasses declare their fields with `f4`, `f8`, `i1` … `u4`.
 
     Raises TypeError where a class declares a field of another type or with a default, or an instance is made with a
     missing or unknown field or with anything but numbers; `encode` rounds to whole numbers where a field takes no
@@ -103,7 +103,7 @@ class Message:
         try:
             whole = [round(fields[name]) if whole else fields[name] for name, (_, _, whole) in self.ranges.items()]
             return self.packing.pack(self.tag, *whole)
-        except (OverflowError, ValueError, struct.error):  # it does not fit: told there which field, and why
+        except (OverflowError, ValueError, struct.error):  # a number does not fit: `encode_rows` names the field
             return encode_rows(type(self), 1, dict(fields)).row(0)
 
     @classmethod
@@ -122,9 +122,9 @@ class Message:
         return message
 
 
-def message_classes(of: type[Message] = Message) -> Iterator[type[Message]]:
-    """Every class of messages that this process knows."""
-    for kind in of.__subclasses__():
+def message_classes(base: type[Message] = Message) -> Iterator[type[Message]]:
+    """All message classes below `base` in this process."""
+    for kind in base.__subclasses__():
         yield kind
         yield from message_classes(kind)
 
@@ -155,13 +155,13 @@ def encode_rows(kind: type[Message], rows: int, fields: dict[str, Any]) -> Paylo
         except (FloatingPointError, OverflowError):
             what = "whole numbers" if whole else "numbers"
             got = _misfit(np.rint(values) if whole else values, lowest, highest)
-            wanted = f"expected {what} from {lowest:.10g} to {highest:.10g}"
-            raise OverflowError(f"{kind.__name__}.{name}: {wanted}, got {got:.10g}") from None
+            expected = f"expected {what} from {lowest:.10g} to {highest:.10g}"
+            raise OverflowError(f"{kind.__name__}.{name}: {expected}, got {got:.10g}") from None
     return Payloads(table.view(np.uint8), np.arange(rows + 1) * kind.size_bytes)
 
 
 def decode_alike(kind: type[Message], payloads: Payloads, index: IntArray) -> dict[str, FloatArray] | None:
-    """As `decode_rows`, quickly, where all payloads are of this class; None where they are not."""
+    """As `decode_rows`, but faster, for payloads that are all of this class; None if one is not."""
     if (payloads.sizes != kind.size_bytes).any():
         return None
     table = payloads.data.view(kind.on_air)
@@ -182,7 +182,7 @@ def decode_rows(kind: type[Message], payloads: Payloads, index: IntArray) -> dic
 def encode_dict(message: dict[str, Any]) -> bytes:
     """A dict on air: the dict tag, then msgpack; TypeError unless its keys are texts and msgpack takes its values."""
     payload = DICT_TAG.to_bytes(TAG_BYTES, "little") + msgpack.packb(message)
-    read = dict_in(payload)  # what cannot be read is refused here, not there
+    read = dict_in(payload)  # the sender's error, not the receivers': a dict that cannot be decoded is refused here
     if read is None or not all(type(key) is str for key in read):
         raise TypeError(f"a dict message has texts as keys, got {list(message)}")
     return payload
@@ -200,7 +200,7 @@ def decode_dict(payload: bytes) -> dict[str, Any]:
 
 
 def dict_in(payload: bytes) -> dict[str, Any] | None:
-    """The dict of these bytes; None if they hold none: its sender may be anybody's code."""
+    """The dict in these bytes; None if they hold none, since the sender may run any code."""
     try:
         return decode_dict(payload)
     except ValueError:

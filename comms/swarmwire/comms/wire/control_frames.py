@@ -1,4 +1,4 @@
-"""What people ask of a run on the observers' endpoint, and its answers: small msgpack maps, checked on arrival."""
+"""Control requests to a run at the observers' endpoint, and its replies: small msgpack maps, checked on arrival."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ MAX_BYTES = 64 * 1024  # of a request
 MAX_REPLY_BYTES = 16 * 1024 * 1024
 MAX_STEPS = 1_000_000
 
-# What may be asked, and the key that comes with it.
+# The requests, each with the key of its value.
 DOES: dict[str, str | None] = {
     "pause": None,
     "resume": None,
@@ -30,14 +30,14 @@ DOES: dict[str, str | None] = {
 
 @dataclass(frozen=True, slots=True)
 class ControlRequest:
-    """One thing that is asked of a run."""
+    """One control request."""
 
     do: str
     value: Any = None  # of its key: ticks, a factor (None: no limit), an event's table, an event's number
 
 
 def encode_request(request: ControlRequest) -> bytes:
-    """The bytes of a request; BadInput if its value cannot be told."""
+    """The bytes of a request; BadInput if msgpack cannot hold its value."""
     key = DOES[request.do]
     try:
         return msgpack.packb({"v": CONTROL_VERSION, "do": request.do} | ({key: request.value} if key else {}))
@@ -47,31 +47,31 @@ def encode_request(request: ControlRequest) -> bytes:
 
 
 def decode_request(data: bytes) -> ControlRequest:
-    """The request of these bytes; BadInput says in one line what was expected instead."""
+    """The request in these bytes; BadInput states the expectation in one line."""
     try:
-        asked = _map_of(data, MAX_BYTES)
+        values = _map_of(data, MAX_BYTES)
     except BadFrame as fault:
         raise BadInput("", "", f"expected a request: {fault}") from None
-    if type(asked.get("v")) is not int or asked["v"] != CONTROL_VERSION:
-        raise BadInput("", "v", f"expected version {CONTROL_VERSION} of control, got {_shown(asked.get('v'))}")
-    do = asked.get("do")
+    if type(values.get("v")) is not int or values["v"] != CONTROL_VERSION:
+        raise BadInput("", "v", f"expected version {CONTROL_VERSION} of control, got {_shown(values.get('v'))}")
+    do = values.get("do")
     if not isinstance(do, str) or do not in DOES:
         raise BadInput("", "do", f"expected {did_you_mean(DOES, do)}; got {_shown(do)}")
     key = DOES[do]
-    for name in asked:
+    for name in values:
         if name not in ("v", "do", key):
             raise BadInput("", name, f"unknown key of {do!r}; expected {key or 'none'}")
-    value = _value(do, asked.get(key, 1 if do == "step" else None)) if key else None
+    value = _value(do, values.get(key, 1 if do == "step" else None)) if key else None
     return ControlRequest(do, value)
 
 
 def encode_reply(reply: Mapping[str, Any]) -> bytes:
-    """The bytes of an answer: of control `done`, `tick` and `event`, of status what there is to tell."""
+    """The bytes of a reply: `done`, `tick` and `event` to a control request, the run's status to a status query."""
     return msgpack.packb({"v": CONTROL_VERSION, **reply})
 
 
 def decode_reply(data: bytes) -> dict[str, Any]:
-    """The answer in these bytes; BadFrame if they are none."""
+    """The reply in these bytes; BadFrame if they hold none."""
     reply = _map_of(data, MAX_REPLY_BYTES)
     if type(reply.get("v")) is not int or reply["v"] != CONTROL_VERSION:
         raise BadFrame("malformed", f"version {reply.get('v')!r} of control, expected {CONTROL_VERSION}")
@@ -99,8 +99,8 @@ def _value(do: str, value: object) -> Any:
     raise BadInput("", "event", f"{expected}; got {_shown(cast('object', value))}")
 
 
-def _map_of(data: bytes, most_bytes: int) -> dict[str, Any]:
-    body: object = unpacked(data, most_bytes)
+def _map_of(data: bytes, max_bytes: int) -> dict[str, Any]:
+    body: object = unpacked(data, max_bytes)
     if type(body) is not dict or not all(type(name) is str for name in cast("dict[object, object]", body)):
         raise BadFrame("malformed", "expected a map with texts as keys")
     return cast("dict[str, Any]", body)
