@@ -1,4 +1,4 @@
-"""The floor of an arena as arrays, and its shade at a point. Compiled; what ground sensors look at."""
+"""The floor of an arena as arrays, and its shade at a point. Compiled; for ground sensors."""
 
 # pyright: basic, reportUnknownMemberType=false
 

@@ -1,7 +1,7 @@
-"""Obstacles sorted into cells once, so that what a robot looks at does not depend on how many there are. Compiled.
+"""The spatial index of obstacles: built once, so that the cost of a look does not grow with their number. Compiled.
 
-A cell lists every obstacle within a given reach of it: a robot reads the list of its own cell and no other. On a torus
-obstacles are there once more, as images, wherever they reach into the arena over its edge.
+A cell lists every obstacle within a fixed reach of it: a robot reads the list of its own cell only. On a torus the
+index also has images of the obstacles that reach into the arena over its edge.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,7 +17,7 @@ from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, r
 from swarmwire.comms.kernels import kernel
 
 CELLS_PER_OBSTACLE = 4
-MARGIN_M = 1e-9  # an obstacle that is left out is farther than any rounding
+MARGIN_M = 1e-9  # added to the reach against rounding
 
 
 class ObstacleIndex(NamedTuple):

@@ -1,6 +1,6 @@
-"""Obstacles as arrays, and rays against them. Compiled; shared by the world's sensors and the medium's line of sight.
+"""Obstacles as arrays, and ray intersections. Compiled; for the world's sensors and the medium's line of sight.
 
-A box is a polygon with four sides: there are circles and convex polygons, nothing else.
+There are circles and convex polygons only: a box is a polygon with four sides.
 """
 
 # pyright: basic, reportUnknownMemberType=false

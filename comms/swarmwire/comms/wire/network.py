@@ -1,4 +1,4 @@
-"""Where a member of the robots' network listens and whom it calls, and how it proves who it is."""
+"""The network settings of one member: its endpoints, its certificates, and the checks that both are safe."""
 
 import ipaddress
 from collections.abc import Mapping
@@ -10,25 +10,26 @@ from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")  # that zenoh's wheel speaks
-PROVEN = ("tls", "quic")  # where both ends show a certificate
-OF_OTHERS = 0o077  # bits of a file's mode that let others than its owner at it
+PROVEN = ("tls", "quic")  # protocols with certificates of both ends
+GROUP_AND_OTHERS = 0o077  # bits of a file's mode that give access to others than its owner
+_SAFE = "{}; expected ca, certificate and key, or insecure = true"
 
 
 @dataclass(frozen=True)
 class Network:
-    """One member's settings: a robot's, the run's, the operator's.
+    """The settings of one member: a robot, the run, or the operator.
 
     Attributes:
-        listen: endpoints that others may call, such as "tls/0.0.0.0:7447"; port 0: one that is free.
-        connect: endpoints of others, which are called until they answer, and again when they are lost.
-        multicast: whether members in the same network find one another by themselves.
-        ca: the certificate of who signed the members' certificates, PEM; with it go the next two.
+        listen: endpoints for connections of others, such as "tls/0.0.0.0:7447"; port 0: any free port.
+        connect: endpoints of others; the member connects until they answer, and again when a link is lost.
+        multicast: whether members in the same network find one another by multicast.
+        ca: the certificate of the authority that signed the members' certificates, PEM; it needs the next two.
         certificate: this member's certificate, with its name as common name.
-        key: its key, which its owner alone may read.
-        operator: name in the certificate of whoever may ask robots for their state and stop them.
-        tracker: name in the certificate of whoever may tell poses and plays the medium.
-        revoked: names whose certificates count no more.
-        insecure: whether it may do without certificates beyond this machine.
+        key: its private key, which only its owner may read.
+        operator: certificate name of the member that may query robots' status and stop them.
+        tracker: certificate name of the member that publishes poses and serves the radio medium.
+        revoked: names whose certificates are no longer valid.
+        insecure: whether it may connect beyond this machine without certificates.
     """
 
     listen: tuple[str, ...] = ()
@@ -43,19 +44,19 @@ class Network:
     insecure: bool = False
 
     @classmethod
-    def from_mapping(cls, given: Mapping[str, Any], where: str, folder: Path, key: str = "network") -> "Network":
-        """The settings of a table of a file, whose paths are beside it in `folder`; BadInput if they will not do."""
-        known = [of.name for of in fields(cls)]
-        for name in given:
+    def from_mapping(cls, table: Mapping[str, Any], where: str, folder: Path, key: str = "network") -> "Network":
+        """The settings of a table of a file, with paths relative to `folder`; BadInput if they are invalid."""
+        known = [field.name for field in fields(cls)]
+        for name in table:
             if name not in known:
                 raise BadInput(where, f"{key}.{name}", f"unknown; expected {did_you_mean(known, name)}")
-        values = {name: _typed(value, name, folder, where, f"{key}.{name}") for name, value in given.items()}
+        values = {name: _typed(value, name, folder, where, f"{key}.{name}") for name, value in table.items()}
         network = cls(**values)
         network.check(where, key)
         return network
 
     def check(self, where: str, key: str = "network") -> None:
-        """BadInput unless it reaches somebody, its files are there, and it is safe or says that it is not."""
+        """BadInput unless it has an endpoint, its files exist, and it is safe or set to insecure."""
         if not (self.listen or self.connect or self.multicast):
             raise BadInput(where, key, "expected listen, connect or multicast = true: nobody would be reached")
         for name in ("listen", "connect"):
@@ -70,19 +71,19 @@ class Network:
 
     @property
     def proves(self) -> bool:
-        """Whether this member has a certificate, and asks others for theirs."""
+        """Whether this member has a certificate, and requires those of others."""
         return self.certificate is not None
 
     @property
     def warning(self) -> str | None:
-        """What to tell the user each time, where others could take part unseen."""
+        """The warning of an insecure network, which others could join; None if it is safe."""
         outside = self.multicast or not all(map(is_local, (*self.listen, *self.connect)))
         if self.proves or not outside:
             return None
         return "network: insecure = true: whoever is in the network can drive, stop and overhear the robots"
 
     def check_files(self, where: str, key: str) -> None:
-        """BadInput unless there are all three files of a certificate, or none, and others cannot read the key."""
+        """BadInput unless all three files of a certificate exist, or none is set, and others cannot read the key."""
         files = {name: cast("Path | None", getattr(self, name)) for name in ("ca", "certificate", "key")}
         if all(path is None for path in files.values()):
             return
@@ -90,22 +91,22 @@ class Network:
             if path is None:
                 raise BadInput(where, f"{key}.{name}", "is missing: ca, certificate and key go together")
             try:
-                there = path.is_file()
-            except OSError as error:  # in a folder that is not open to this user, or of a name that no file can have
+                exists = path.is_file()
+            except OSError as error:  # a folder without permission, or an impossible name
                 raise BadInput(where, f"{key}.{name}", f"expected a readable file, got {path}: {error}") from None
-            if not there:
+            if not exists:
                 raise BadInput(where, f"{key}.{name}", f"expected a file, {path} is none")
         assert self.key is not None
-        if self.key.stat().st_mode & OF_OTHERS:
+        if self.key.stat().st_mode & GROUP_AND_OTHERS:
             raise BadInput(where, f"{key}.key", f"expected a file that its owner alone may read: chmod 600 {self.key}")
 
     def check_endpoint(self, endpoint: str, where: str, key: str) -> None:
-        """BadInput unless it is an endpoint, and one that may be used with this member's certificates, or without."""
+        """BadInput unless it is an endpoint that this member may use, with or without certificates."""
         _check_endpoint(endpoint, where, key)
         self.check_safe(endpoint, where, key)
 
     def check_safe(self, endpoint: str, where: str, key: str) -> None:
-        """BadInput if others could be at its other end who prove nothing; of one on this machine it asks nothing."""
+        """BadInput if its other end could be a member without a certificate, unless both ends are on this machine."""
         if protocol_of(endpoint) in PROVEN or not is_local(endpoint):
             self._check_proven(endpoint, where, key)
 
@@ -120,11 +121,8 @@ class Network:
             raise BadInput(where, key, _SAFE.format(f'"{endpoint}" reaches beyond this machine'))
 
 
-_SAFE = "{}; expected ca, certificate and key, or insecure = true"
-
-
 def protocol_of(endpoint: str) -> str:
-    """What an endpoint begins with.
+    """The protocol of an endpoint.
 
     >>> protocol_of("tls/10.0.0.5:7447")
     'tls'
@@ -159,7 +157,7 @@ def _check_endpoint(endpoint: str, where: str, key: str) -> None:
 
 
 def _typed(value: object, name: str, folder: Path, where: str, key: str) -> Any:
-    """A value of a file as the attribute's type; BadInput if it is of another."""
+    """A value of a file as the attribute's type; BadInput if it has another type."""
     if name in ("listen", "connect", "revoked"):
         if isinstance(value, list) and all(isinstance(item, str) for item in cast("list[object]", value)):
             return tuple(cast("list[str]", value))
