@@ -1,4 +1,4 @@
-"""The numbers that agents tell: kept for observers, without any effect on the run."""
+"""Annotations by agents: numbers and named states of robots, kept for observers without any effect on the run."""
 
 import numpy as np
 
@@ -27,9 +27,6 @@ class LatestValues:
         """These robots (rows,) have told nothing."""
         if self.value is not None and rows.any():
             self.value = np.where(rows, np.nan, self.value)
-
-
-# --- What robots are at, as their agents name it: kept for observers, without any effect on the run.
 
 
 ONE_TOO_MANY = -1

@@ -1,4 +1,4 @@
-"""The dispatcher of events: what is due at the start of a tick changes world and air before anything else."""
+"""The event scheduler: events that are due at the start of a tick change world and radio before anything else."""
 
 from bisect import insort
 from collections.abc import Sequence

@@ -1,4 +1,9 @@
-"""An event that is given while a run goes on: read and checked as those of its scenario are, with faults as plain."""
+"""Live events: events that users submit to a running simulation.
+
+They are parsed and checked like the events of a scenario. The loop takes them at the next tick. The events of a
+scenario are numbered by their index; live events continue these numbers. Every event is recorded before it takes
+effect: with that record a run can be repeated bit for bit.
+"""
 
 import json
 import threading
@@ -59,12 +64,6 @@ def _as_given(error: BadInput) -> BadInput:
 @cache
 def _schema() -> Node:
     return GivenTable.model_json_schema()
-
-
-# --- What people do to a run while it goes on: events checked at the door, which the loop takes at the next tick.
-#
-# A scenario's events have their places in it as numbers; those that are given go on from there. All that the loop takes
-# is kept before it takes effect: with that record a run is repeated bit for bit.
 
 
 MAX_TOLD = 200

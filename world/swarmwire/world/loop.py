@@ -1,4 +1,7 @@
-"""The mailbox: packets, and tx statuses of packets, wait here for robots that do not act in every tick."""
+"""The loop: the steps of one tick, the same in all modes; modes differ only in the agent backend.
+
+`Loop.step` is one tick. `Mailbox` keeps packets and transmit statuses for robots that do not act in every tick.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,51 +23,47 @@ from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
 
+ALWAYS_REPORTED = ("clipped_commands", "nan_commands")  # counts that are reported also if they are 0
+
 
 class Mailbox:
-    """What robots received, and learned of their packets, since they last acted.
+    """The packets and transmit statuses that robots got since they last acted.
 
-    Where all act in every tick it passes everything on at no cost.
+    If all robots act in every tick, it passes everything on at no cost.
     """
 
     def __init__(self, static: Static) -> None:
-        self._every: IntArray = np.tile(static.act_every_ticks, static.arenas)  # (rows,)
-        self._always = bool((self._every == 1).all())
+        self._act_every: IntArray = np.tile(static.act_every_ticks, static.arenas)  # (rows,)
+        self._always = bool((self._act_every == 1).all())
         self._waiting = ReceivedPackets.none()
         self._tx_status = NO_TX_STATUSES
 
     def hand_over(self, tick: int, received: ReceivedPackets, alive: BoolArray) -> ReceivedPackets:
-        """All that waits for the robots that act in this tick, with what they `received` since the last tick.
+        """The waiting packets of the robots that act in this tick, with those `received` since the last tick.
 
-        What waits for a robot that is not `alive` (rows,) is lost with it.
+        The waiting packets of a robot that is not `alive` (rows,) are lost.
         """
         if self._always:
             return received
-        here = received.merged(self._waiting) if len(self._waiting) else received
-        acts = (tick % self._every == 0)[here.receiver]
-        self._waiting = here.select(np.flatnonzero(~acts & alive[here.receiver])).compacted()
-        return here.select(np.flatnonzero(acts))
+        pending = received.merged(self._waiting) if len(self._waiting) else received
+        acts = (tick % self._act_every == 0)[pending.receiver]
+        self._waiting = pending.select(np.flatnonzero(~acts & alive[pending.receiver])).compacted()
+        return pending.select(np.flatnonzero(acts))
 
     def hand_over_tx_status(self, tick: int, tx_status: TxStatuses, alive: BoolArray) -> TxStatuses:
-        """The same of `tx_status`; `alive` is (rows,)."""
+        """As `hand_over`, for transmit statuses; `alive` is (rows,)."""
         if self._always:
             return tx_status
-        here = TxStatuses.joined([self._tx_status, tx_status])
-        acts = (tick % self._every == 0)[here.row]
-        self._tx_status = here.select(np.flatnonzero(~acts & alive[here.row]))
-        return here.select(np.flatnonzero(acts))
-
-
-# --- The loop: one tick, written once. What differs between modes is only the backend.
-
-
-ALWAYS_TOLD = ("clipped_commands", "nan_commands")
+        pending = TxStatuses.joined([self._tx_status, tx_status])
+        acts = (tick % self._act_every == 0)[pending.row]
+        self._tx_status = pending.select(np.flatnonzero(~acts & alive[pending.row]))
+        return pending.select(np.flatnonzero(acts))
 
 
 class Loop:
-    """Drives world, air and backend through `ticks` ticks and shows each to the observers.
+    """Drives world, radio medium and agent backend through the ticks of a run, and shows each tick to the observers.
 
-    An arena that its judge finds over leaves the world: what it came to is what it would have come to alone.
+    An arena whose stop conditions hold leaves the world; its results are those that it would have alone.
 
     Attributes:
         ticks_done: ticks so far.
@@ -81,24 +80,34 @@ class Loop:
         interventions: LiveEvents | None = None,
         timed: TimedBackend | None = None,
     ) -> None:
-        """`stop_conditions` are asked after each tick, once observers saw it; without them none ends before the run.
+        """Make a loop for a backend that has been started before `run`.
 
-        `interventions` are asked at the start of each tick for events that people want. `timed` is the backend, if it
-        is to put packets on air and hand them over while a tick goes on.
+        Args:
+            world: the world.
+            medium: the radio medium; None: the run has no radio.
+            backend: the agents.
+            observers: they see each tick at its end.
+            events: the scenario's events.
+            stop_conditions: checked after each tick, after the observers; None: no arena ends before the run.
+            interventions: live events, taken at the start of each tick.
+            timed: the backend, if it sends and delivers packets within a tick.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
         self._stop_conditions = stop_conditions
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._interventions = interventions
-        course = interventions.course if interventions else None
-        self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, course)
+        progress = interventions.course if interventions else None
+        self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, progress)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
-        self._in_time = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
-        self._to_nobody, self._without_radio = np.zeros_like(self._left_after), np.zeros_like(self._left_after)
-        self._open: PacketCounts | None = None  # of the tick under way: no observer has seen it yet
-        self._stranded: PacketCounts | None = None  # in arenas that left: no observer has seen that they did
+        self._subtick = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
+        self._invalid_destination, self._without_radio = (
+            np.zeros_like(self._left_after),
+            np.zeros_like(self._left_after),
+        )
+        self._open: PacketCounts | None = None  # of the open tick: no observer has seen it yet
+        self._stranded: PacketCounts | None = None  # of arenas that left: no observer has seen these
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
 
     def run(
@@ -106,7 +115,7 @@ class Loop:
     ) -> None:
         """Run up to tick `ticks`, until all arenas are over, or until `stopped()`; the backend must have been started.
 
-        `hold` returns when the tick that it is given may begin; it changes when a tick begins, never what is in it.
+        `hold` blocks until a tick may begin; it changes the start of a tick, never its content.
         """
         while self.ticks_done < ticks and self._running.any():
             hold(self.ticks_done)
@@ -115,21 +124,21 @@ class Loop:
             self.step()
 
     def step(self) -> Truth:
-        """One tick, in the order of the design: events, air, senses, backend, air, physics, observers, judge."""
+        """One tick: events, radio medium, sensors, backend, radio medium, physics, observers, stop conditions."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
         events = self._events.apply(start_ns, world, self.medium)
-        news, packets, tx_status = self._receive(start_ns)
+        results, packets, tx_status = self._receive(start_ns)
         readings = world.sense(tick)
         actions = self._act(start_ns, readings, packets, tx_status)
-        received = news.received if news else ReceivedPackets.none()
+        received = results.received if results else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
         onsets = world.move(actions)
         command = world.command
         self._hash.add(pose, velocity, command, received)
         edges = self.medium.edges(pose, alive) if self.medium else None
-        tally, finished = (news.tally, news.finished) if news else (None, None)
+        tally, finished = (results.tally, results.finished) if results else (None, None)
         self._open = None
         truth = Truth(
             tick=tick,
@@ -148,32 +157,32 @@ class Loop:
             tally=tally,
             finished=finished,
             events=events,
-            departed=news.departed if news else None,
+            departed=results.departed if results else None,
             movable=movable,
             value=world.values.value,
         )
         for observer in self.observers:
             observer.see(truth)
         self.ticks_done += 1
-        over = self._stop_conditions.done() if self._stop_conditions else None
-        if over is not None:
-            self._leave(over & self._running)
+        done = self._stop_conditions.done() if self._stop_conditions else None
+        if done is not None:
+            self._leave(done & self._running)
         return truth
 
     def end(self) -> PacketCounts | None:
-        """End the medium: what was in flight, and what no observer has seen of a tick that was broken off."""
+        """End the medium: the counts of packets in flight, and those of a broken-off tick that no observer has seen."""
         if self.medium is None:
             return None
-        if self._in_time:
-            self._in_time.end()
+        if self._subtick:
+            self._subtick.end()
         last = self.medium.end()
-        for more in (self._stranded, self._open):
-            last = last if more is None else last + more
+        for counts in (self._stranded, self._open):
+            last = last if counts is None else last + counts
         return last
 
     @property
     def arena_ticks(self) -> IntArray:
-        """Ticks that each arena took part in, (arenas,)."""
+        """The number of ticks of each arena, (arenas,)."""
         return np.where(self._running, self.ticks_done, self._left_after)
 
     def hexdigests(self) -> list[str]:
@@ -181,44 +190,44 @@ class Loop:
         return self._hash.hexdigests()
 
     def counts(self) -> dict[str, int]:
-        """Faults on the way between agents and world so far, by name; what is always told also where there is none."""
-        told = {name: int(counted.sum()) for name, counted in self._counted().items()}
+        """Faults between agents and world so far, by name: those above 0, and ALWAYS_REPORTED."""
+        totals = {name: int(counted.sum()) for name, counted in self._counted().items()}
         return {
             **self.backend.counts(),
-            **{name: count for name, count in told.items() if count or name in ALWAYS_TOLD},
+            **{name: count for name, count in totals.items() if count or name in ALWAYS_REPORTED},
         }
 
     def arena_counts(self) -> list[dict[str, int]]:
-        """Those of them that belong to an arena, of each: by name, where there is any."""
+        """The faults of each arena, by name, those above 0."""
         counted = {name: counts.tolist() for name, counts in self._counted().items()}
         arenas = range(self.world.static.arenas)
         return [{name: counts[arena] for name, counts in counted.items() if counts[arena]} for arena in arenas]
 
     def _counted(self) -> dict[str, IntArray]:
         """Faults by name, (arenas,) each."""
-        packets = {"packets_to_nobody": self._to_nobody, "packets_without_radio": self._without_radio}
+        packets = {"packets_to_nobody": self._invalid_destination, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
     def _receive(self, start_ns: int) -> tuple[Results | None, ReceivedPackets, TxStatuses]:
-        """What came of the radio up to a tick's start; of that, what the backend is to be told."""
-        if self._in_time:
-            news, packets, tx_status = self._in_time.begin(start_ns)
-            self._open = news.tally
-            return news, packets, tx_status
+        """The results of the medium up to a tick's start, and the packets and statuses for the backend."""
+        if self._subtick:
+            results, packets, tx_status = self._subtick.begin(start_ns)
+            self._open = results.tally
+            return results, packets, tx_status
         tick, alive = self.ticks_done, self.world.alive
-        news = self.medium.advance(start_ns) if self.medium else None
-        self._open = news.tally if news else None
-        packets = self._mailbox.hand_over(tick, news.received if news else ReceivedPackets.none(), alive)
-        tx_status = self._mailbox.hand_over_tx_status(tick, news.tx_status if news else NO_TX_STATUSES, alive)
-        return news, packets, tx_status
+        results = self.medium.advance(start_ns) if self.medium else None
+        self._open = results.tally if results else None
+        packets = self._mailbox.hand_over(tick, results.received if results else ReceivedPackets.none(), alive)
+        tx_status = self._mailbox.hand_over_tx_status(tick, results.tx_status if results else NO_TX_STATUSES, alive)
+        return results, packets, tx_status
 
     def _act(self, start_ns: int, readings: Readings, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        """What the robots do in a tick; what they send is the medium's."""
+        """The actions of the robots in a tick; their packets go to the medium."""
         world, tick = self.world, self.ticks_done
         if self.medium:
             self.medium.hold(world.pose, world.alive.copy())
-        if self._timed and self._in_time:
-            return self._timed.act_in_time(tick, readings, packets, tx_status, self._in_time)
+        if self._timed and self._subtick:
+            return self._timed.act_in_time(tick, readings, packets, tx_status, self._subtick)
         actions = self.backend.act(tick, readings, packets, tx_status)
         if self.medium:
             self.medium.send(start_ns, tick, self._addressable(actions.sent))
@@ -227,7 +236,7 @@ class Loop:
         return actions
 
     def _intervene(self, tick: int, start_ns: int) -> None:
-        """Have begin and end what people want of this tick."""
+        """Begin and end the live events of this tick."""
         if self._interventions is None:
             return
         for number, event in self._interventions.take(tick, self.world.static.rate_hz):
@@ -236,25 +245,25 @@ class Loop:
             else:
                 self._events.begin(number, event, start_ns)
 
-    def _leave(self, over: BoolArray) -> None:
-        """These arenas (arenas,) take no part in the ticks to come."""
-        if not over.any():
+    def _leave(self, done: BoolArray) -> None:
+        """Remove these arenas (arenas,) from the ticks to come."""
+        if not done.any():
             return
-        self._running = self._running & ~over  # observers may keep what they were shown
-        self._left_after[over] = self.ticks_done
-        self._hash.close(over)
-        self.world.leave(over)
+        self._running = self._running & ~done  # a new array: observers may keep the old one
+        self._left_after[done] = self.ticks_done
+        self._hash.close(done)
+        self.world.leave(done)
         if self.medium:
-            if self._in_time:
-                self._in_time.leave(over)
-            stranded = self.medium.leave(over)
+            if self._subtick:
+                self._subtick.leave(done)
+            stranded = self.medium.leave(done)
             self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def _addressable(self, sent: SentPackets) -> SentPackets:
-        """Packets for a robot that is not there, or for the sender itself, are counted and go NOWHERE."""
+        """Count packets to a robot that does not exist or to the sender itself, and send them NOWHERE."""
         robots = self.world.static.robots
-        nobody = (sent.to >= robots) | (sent.to == sent.sender % robots)
-        if not nobody.any():
+        invalid = (sent.to >= robots) | (sent.to == sent.sender % robots)
+        if not invalid.any():
             return sent
-        np.add.at(self._to_nobody, sent.sender[nobody] // robots, 1)
-        return replace(sent, to=np.where(nobody, NOWHERE, sent.to))
+        np.add.at(self._invalid_destination, sent.sender[invalid] // robots, 1)
+        return replace(sent, to=np.where(invalid, NOWHERE, sent.to))

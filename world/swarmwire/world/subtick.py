@@ -1,10 +1,16 @@
-"""The medium of a loop whose backend takes its time: packets are put on it, and received, also in the middle of a tick.
+"""Sub-ticks: packets are sent and received also within a tick, for backends in real time.
 
-    a tick begins    `begin`      what became final since the last tick, for observers; what of it nobody was handed yet
-    it goes on       `send`       packets come: those of a step wait for their robot's turn, others go out at once
-                     `advance`    what is received is handed over when it is due
+`SubtickRadio` is the radio medium of such a loop:
 
-When which part of a packet's way is asked for changes nothing of it; so a run is repeated from what came in, and when.
+    start of a tick   `begin`      results since the last tick, for observers; of these, packets not yet delivered
+    within the tick   `send`       packets of a step wait for their robot's turn, others are sent at once
+                      `advance`    received packets are delivered when they are due
+
+The times of these calls do not change the course of a packet, so a run can be repeated from its inputs and their times.
+
+`Subticks` wakes the loop many times in a tick. In every sub-tick `take_in` returns the packets that agents sent since
+the last one, with their times; they go to the medium, the medium advances to the present, and `hand_over` delivers the
+received packets. The same happens at the end of the tick, where commands are taken as usual.
 """
 
 from collections.abc import Callable, Sequence
@@ -93,13 +99,6 @@ class SubtickRadio:
             self._medium.send_at(first_ns, self._waiting.select(going))
             self._turn_ns[going] = NEVER_NS
             self._next_ns = int(self._turn_ns.min())
-
-
-# --- A tick in subticks: the loop wakes many times in it, to take in what came and hand over what is due.
-#
-# In every subtick `take_in` gives what agents sent since, with the time at which it came; these packets go on air,
-# it advances to now, and `hand_over` takes what was received. So once more at the tick's end, where commands are taken
-# as ever.
 
 
 MEAN_OF = 16  # sleeps, about: that were late

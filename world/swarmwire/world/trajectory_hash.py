@@ -1,4 +1,4 @@
-"""The trajectory hash: equal exactly where two runs of an arena moved and received the same, bit for bit."""
+"""The trajectory hash: equal exactly if motion and received packets of two runs of an arena agree bit for bit."""
 
 # pyright: basic, reportUnknownMemberType=false
 

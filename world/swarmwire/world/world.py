@@ -1,4 +1,7 @@
-"""What the world shows of its bodies once they have moved. Compiled."""
+"""The world: the bodies and sensors of every arena, tick by tick. It knows neither agents nor the radio.
+
+It does no I/O, except that its constructor reads the images that a scenario names.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -50,11 +53,6 @@ def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
             for column in range(3):
                 velocity[row, column] = state[arena, i, 3 + column]
     return pose, velocity
-
-
-# --- The world: every arena's bodies and senses, tick by tick. It knows neither agents nor the radio.
-#
-# It does no I/O but that it reads the pictures that a scenario names, when it is made.
 
 
 class World:

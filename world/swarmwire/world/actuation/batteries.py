@@ -1,4 +1,4 @@
-"""Batteries: what robots draw from them in a tick. Compiled."""
+"""Batteries: the energy that robots draw in a tick. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 

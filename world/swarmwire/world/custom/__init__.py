@@ -1,4 +1,4 @@
-"""Senses and actuators of the user's own: all that their classes are made of."""
+"""Custom sensors and actuators: all names that a user's class needs."""
 
 from swarmwire.comms.config import parameter
 from swarmwire.world.custom.actuators import CustomActuator

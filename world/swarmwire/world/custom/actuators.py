@@ -1,4 +1,4 @@
-"""An actuator of the user's own: the class to write, and how the world lets it act."""
+"""Custom actuators: the base class, and how the world runs it."""
 
 from abc import ABC, abstractmethod
 

@@ -1,4 +1,7 @@
-"""Own senses and actuators at the door: their classes are found, and their keys checked, before a run."""
+"""Loading of custom sensors and actuators: classes are found and keys checked before a run.
+
+`CustomActuators` holds the custom actuators of all groups: agents set them, and they act in each tick.
+"""
 
 import traceback
 from collections.abc import Mapping, Sequence
@@ -97,9 +100,6 @@ def _made(base: type[K], kind: str, params: Mapping[str, Any], where: str, key: 
         raise
     except Exception as error:  # of its own __post_init__
         raise BadInput(where, key, f"{found.__name__} refuses: {type(error).__name__}: {error}") from error
-
-
-# --- The actuators of the user's own, of all groups: set by agents, and let act in each tick.
 
 
 class CustomActuators:

@@ -1,4 +1,4 @@
-"""A sense of the user's own: the class to write, and how the world asks it."""
+"""Custom sensors: the base class, how the world reads it, and checks of its fields at run time."""
 
 import traceback
 from abc import ABC, abstractmethod
@@ -91,9 +91,6 @@ class CheckedSensor:
             return method(*args)
         except (Exception, SystemExit) as error:
             raise CustomCodeFailed(self._what, traceback.format_exc()) from error
-
-
-# --- What is wrong with a field of a sense of the user's own, which no type checker looked at.
 
 
 KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)["kind"])

@@ -1,4 +1,4 @@
-"""Which contacts began, pairs that touch now and did not before, and who touches anything. Compiled."""
+"""Onsets of contacts: pairs that touch now and did not before, and the robots that touch anything. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 

@@ -1,4 +1,4 @@
-"""Obstacles that robots push: where they are, kept up to date in the arrays that everybody looks at. Compiled."""
+"""Movable obstacles: their poses, kept up to date in the shared obstacle arrays. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 

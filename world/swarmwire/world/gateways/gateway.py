@@ -1,4 +1,7 @@
-"""What every gateway is: emulated robots of one group behind the protocol that real ones speak."""
+"""The gateway interface: emulated robots of one group behind the protocol of real ones.
+
+Gateways are entry points of the group `swarmwire.gateways`; `gateway_kind` imports one of them on demand.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -12,25 +15,27 @@ from swarmwire.comms.config import NoParameters
 from swarmwire.comms.plugins import installed_class, installed_points
 from swarmwire.comms.tick_io import LedChanges
 
+GROUP = "swarmwire.gateways"  # of entry points
+
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """What foreign programs told the robots of a gateway since they were asked last, a row per robot of the group."""
+    """The commands of foreign programs to the robots of a gateway since the last call, a row per robot of the group."""
 
     drive: BoolArray  # (n,) False: the last command holds
     linear_mps: FloatArray  # (n,)
     angular_radps: FloatArray  # (n,)
     lateral_mps: FloatArray  # (n,)
-    leds: LedChanges  # rows are places in the group, 0 to n - 1
+    leds: LedChanges  # rows are indices in the group, 0 to n - 1
 
 
 class Gateway(ABC):
-    """Emulated robots of one group. The loop calls it, from one thread; what serves the programs runs beside it.
+    """Emulated robots of one group. The loop calls it, from one thread; the servers for programs run beside it.
 
     Attributes:
         options: the class of the gateway's options, a frozen dataclass of `parameter`s.
-        senses: the senses of a body that it can tell, by the names that sheets have for them.
-        unsaid: senses that the emulated robot's own sheet has and it does not tell either: no difference.
+        sensors: the sensors of a body that it can publish, by their names in specs.
+        unsaid: sensors that the emulated robot has and does not publish either: no difference.
     """
 
     options: ClassVar[type] = NoParameters
@@ -38,7 +43,7 @@ class Gateway(ABC):
     unsaid: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:
-        """`address` is where they answer, empty: of the gateway's choice; BadInput if it will not do, or the body."""
+        """Empty `address`: the gateway chooses one. BadInput if the address or the body does not fit."""
         self.names, self.body, self.address, self.options_given, self.clock = (
             tuple(names),
             body,
@@ -48,47 +53,41 @@ class Gateway(ABC):
         )
 
     def differences(self) -> tuple[str, ...]:
-        """What to know of this body as the robot that the gateway emulates, in words; none: it is one.
+        """The differences between this body and the emulated robot, in words; none: they are the same.
 
-        Senses that a tracker tells are no difference.
+        Sensors that a tracker provides are no difference.
         """
-        told = self.sensors | self.unsaid
-        untold = [name for name, spec in self.body.sensors.items() if not (name in told or spec.is_global)]
-        unmoved = [*self.body.actuators]
+        known = self.sensors | self.unsaid
+        missing = [name for name, spec in self.body.sensors.items() if not (name in known or spec.is_global)]
+        without_actuator = [*self.body.actuators]
         return tuple(
             f"{words} {', '.join(names)}"
-            for words, names in (("nobody is told its", untold), ("nobody moves its", unmoved))
+            for words, names in (("nobody is told its", missing), ("nobody moves its", without_actuator))
             if names
         )
 
     @abstractmethod
     def open(self) -> tuple[str, ...]:
-        """Answer from now on; returns each robot's address, as its driver takes it. BadInput if one is taken."""
+        """Start to answer; returns each robot's address, as its driver takes it. BadInput if one is in use."""
 
     @abstractmethod
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
-        """The newest readings: "sense.field" -> (n,) or (n, width); those of a dead robot (n,) are not to be told.
+        """Publish the newest readings: "sensor.field" -> (n,) or (n, width); those of a dead robot stay private.
 
         A dead robot is silent: it answers nothing, and takes no command.
         """
 
     @abstractmethod
     def take(self) -> Commands:
-        """The newest command of each robot, among those that came since the last call."""
+        """The newest command of each robot since the last call."""
 
     @abstractmethod
     def counts(self) -> dict[str, int]:
-        """What programs sent that no robot takes, and what else went wrong, by name."""
+        """Faults by name, such as input from programs that no robot accepts."""
 
     @abstractmethod
     def close(self) -> None:
-        """Hang up and free the addresses; safe to call more than once."""
-
-
-# --- Gateways by kind: entry points of the group `swarmwire.gateways`, of which one is imported where somebody asks.
-
-
-GROUP = "swarmwire.gateways"  # of entry points
+        """Close all connections and free the addresses; safe to call more than once."""
 
 
 def gateway_names() -> list[str]:

@@ -1,4 +1,4 @@
-"""The world's air as driver-run robots have it, and the run's session in the robots' network."""
+"""The radio bridge: carries packets between the world's radio medium and driver-run robots on their network."""
 
 # pyright: reportUnknownMemberType=false
 
@@ -28,13 +28,13 @@ MAX_WAITING = 4096  # frames that may wait for the loop
 
 @dataclass(frozen=True, slots=True)
 class BridgedRadio:
-    """What the world's radio is to every robot of an arena; `BridgeInfo` says the same to one of them."""
+    """The properties of the world's radio for all robots of an arena; `BridgeInfo` holds those for one robot."""
 
     robots: tuple[str, ...]  # all of the arena, by index
     rate_hz: int
     max_payload_bytes: int
     measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
-    needs: tuple[str, ...]  # what of an agent's needs it meets
+    needs: tuple[str, ...]  # the needs of agents that it meets
 
     def terms(self, row: int) -> BridgeInfo:
         """The terms of the robot of this row."""
@@ -42,10 +42,10 @@ class BridgedRadio:
 
 
 class RadioBridge:
-    """Carries packets between the loop and driver-run robots, which say by their key who they are.
+    """Carries packets between the loop and driver-run robots; the key of a frame identifies its robot.
 
     Attributes:
-        session: the run's, for whoever else speaks in that network; from `open` to `close`.
+        session: the run's session in that network, also for other users; from `open` to `close`.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class RadioBridge:
         medium: BridgedRadio | None,
         access: Mapping[str, Any] | None = None,
     ) -> None:
-        """`rows` are those of the world's robots that may take part, by name.
+        """`rows` holds the rows of the robots that may take part, by name.
 
         `medium` is None in a run without radio.
         """
@@ -66,9 +66,9 @@ class RadioBridge:
         self._inbox = BoundedInbox[tuple[int, bytes]](MAX_WAITING)
         self._session: zenoh.Session | None = None
         self._publishers: dict[int, zenoh.Publisher] = {}  # by row
-        self._declared: tuple[object, ...] = ()  # zenoh takes back what nobody holds on to
+        self._declarations: tuple[object, ...] = ()  # zenoh undeclares what is not referenced
         self._counted = Counter[str]()
-        self._of_nobody = self._far_too_large = 0  # refused by the network's threads
+        self._unknown_keys = self._oversized = 0  # refused by the network's threads
 
     @property
     def session(self) -> zenoh.Session:
@@ -78,7 +78,7 @@ class RadioBridge:
         return self._session
 
     def open(self) -> tuple[str, ...]:
-        """Take part in the network; returns the endpoints to call. BadInput if one is taken, or a file will not do."""
+        """Join the network; returns its endpoints. BadInput if one is in use or a file does not fit."""
         session = self._session = open_swarm(self._network, self._access, small=False)
         self._publishers = {
             row: session.declare_publisher(
@@ -86,36 +86,36 @@ class RadioBridge:
             )
             for name, row in self._rows.items()
         }
-        self._declared = (
+        self._declarations = (
             session.declare_subscriber(self._keys.any_bridge_sent, Callback(self._arrive, indirect=False)),
             session.declare_queryable(self._keys.any_bridge_join, Callback(self._answer, indirect=False)),
         )
         return endpoints_of(session, self._network)
 
     def publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """A frame to each robot that received something or learns of its packets; rows of others are left out."""
+        """Send a frame to each robot with received packets or transmit statuses; other rows are left out."""
         concerned = {*np.unique(received.receiver).tolist(), *np.unique(tx_status.row).tolist()}
         for row in sorted(concerned & self._publishers.keys()):
-            its = received.select(np.flatnonzero(received.receiver == row)).compacted()
-            told = tx_status.select(np.flatnonzero(tx_status.row == row))
+            robot_packets = received.select(np.flatnonzero(received.receiver == row)).compacted()
+            robot_status = tx_status.select(np.flatnonzero(tx_status.row == row))
             try:
-                self._publishers[row].put(encode_bridged(tick, row, its, told))
+                self._publishers[row].put(encode_bridged(tick, row, robot_packets, robot_status))
             except zenoh.ZError:  # the session was closed
                 self._counted["frames_refused"] += 1
             else:
-                self._counted["packets_to_robots"] += len(its)
+                self._counted["packets_to_robots"] += len(robot_packets)
 
     def take(self) -> SentPackets:
-        """Packets that the robots sent since the last call; those of robots that died are for the medium to end."""
+        """The packets from robots since the last call; the medium ends those of dead robots."""
         parts = [sent for row, frame in self._inbox.take() if (sent := self._sent(row, frame)) is not None]
         self._counted["packets_from_robots"] += sum(map(len, parts))
         return SentPackets.joined(parts)
 
     def counts(self) -> dict[str, int]:
-        """Packets carried, and what came that was of no use, by name, where there is any."""
+        """Carried packets and unusable frames, by name, those above 0."""
         counted = Counter(self._counted)
-        counted["frames_of_nobody"] += self._of_nobody
-        counted["frames_oversized"] += self._far_too_large
+        counted["frames_of_nobody"] += self._unknown_keys
+        counted["frames_oversized"] += self._oversized
         counted["frames_dropped"] += self._inbox.dropped
         return {name: count for name, count in sorted(counted.items()) if count}
 
@@ -126,18 +126,18 @@ class RadioBridge:
             close_session(session)
 
     def _arrive(self, sample: zenoh.Sample) -> None:
-        """Called by the network's threads: it must take no time, and keep nothing that is large."""
+        """Called by the network's threads: it must be fast, and store nothing large."""
         row = self._row_of.get(str(sample.key_expr))  # the exact key alone speaks for a robot
         if row is None:
-            self._of_nobody += 1
+            self._unknown_keys += 1
         elif len(sample.payload) > MAX_RADIO_FRAME_BYTES:
-            self._far_too_large += 1
+            self._oversized += 1
         else:
             self._inbox.put((row, sample.payload.to_bytes()))
 
     def _answer(self, query: zenoh.Query) -> None:
-        """Called by the network's threads: what there is to say is known."""
-        with query:  # one that is kept alive holds its asker
+        """Answer a join query. Called by the network's threads: the answers are fixed."""
+        with query:  # a query that is kept alive blocks its sender
             row = self._joins.get(key := str(query.key_expr))
             if self._medium is None:
                 query.reply_err("expected a world with a radio; this run has none")

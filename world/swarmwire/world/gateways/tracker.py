@@ -1,4 +1,4 @@
-"""The world as the tracker of its robots: what a camera above a real arena would publish."""
+"""The emulated tracker: publishes the poses of robots, as a camera above a real arena would."""
 
 # pyright: reportUnknownMemberType=false
 
@@ -16,7 +16,7 @@ from swarmwire.comms.wire.robot_network import SwarmKeys
 
 
 class EmulatedTracker:
-    """Publishes where each robot alive is, once per tick; of a world of several arenas, those of the first."""
+    """Publishes the pose of each robot that is alive, once per tick; of several arenas, only the first."""
 
     def __init__(self, session: zenoh.Session, keys: SwarmKeys, clock: DatedClock) -> None:
         """`clock` dates the poses: by the pace of the run, where that is not the wall clock's."""
@@ -25,7 +25,7 @@ class EmulatedTracker:
         self._refused = 0
 
     def begin(self, static: Static) -> None:
-        """Ready to publish, under the names that robots have in their arena."""
+        """Declare the publishers, under the names of the robots in their arena."""
         self._publishers = [
             self._session.declare_publisher(
                 self._keys.pose(name),
@@ -36,11 +36,11 @@ class EmulatedTracker:
         ]
 
     def tell(self, poses: FloatArray, alive: BoolArray) -> None:
-        """Where the robots (rows, 3) of the first arena are now, if they are alive (rows,)."""
+        """Publish the poses (rows, 3) of the robots of the first arena that are alive (rows,)."""
         stamp_ns = self._clock.utc_ns()
         pose = cast("list[list[float]]", poses[: len(self._publishers)].tolist())
-        for publisher, living, place in zip(self._publishers, alive.tolist(), pose, strict=False):
-            if not living:
+        for publisher, is_alive, place in zip(self._publishers, alive.tolist(), pose, strict=False):
+            if not is_alive:
                 continue
             try:
                 publisher.put(encode_pose(Pose(*place), stamp_ns))
@@ -48,7 +48,7 @@ class EmulatedTracker:
                 self._refused += 1
 
     def counts(self) -> dict[str, int]:
-        """Poses that the network did not take, since the session was closed, by name, where there is any."""
+        """Poses that a closed session refused, by name, if any."""
         return {"tracker_poses_refused": self._refused} if self._refused else {}
 
     def end(self) -> None:

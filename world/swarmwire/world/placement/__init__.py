@@ -1,1 +1,1 @@
-"""Where things stand at the start of an arena."""
+"""Initial placement: the layout of arenas, and the places of obstacles, lights and robots."""

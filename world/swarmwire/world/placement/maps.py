@@ -1,4 +1,8 @@
-"""Pictures as greys: maps of obstacles and floors are given so."""
+"""The layout that all arenas of a scenario share: size, obstacles of the map image, floor.
+
+`read_grey` reads an image file as grey values. `merged_boxes` (compiled) merges the occupied pixels of a map into
+rectangles: few obstacles for engines, rays and the radio. `read_layout` builds the `Layout`.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -23,19 +27,21 @@ if TYPE_CHECKING:
 
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")  # PGM is one of PPM's family
 MAX_PIXELS = 2**24
+MAX_BOXES = 10_000
+MAX_SIDE_M = 10_000.0
 
 GreyArray = NDArray[np.float32]
 
 
 def beside(where: str, name: str) -> Path:
-    """The path of a file that a scenario names, which lies beside the scenario."""
+    """The path of a file that a scenario names, relative to the scenario's folder."""
     return Path(where).parent / name
 
 
 def read_grey(path: Path, where: str, key: str) -> GreyArray:
     """The greys of a picture, (rows, columns), 0 black … 1 white, top row first; on white where it is transparent.
 
-    BadInput names `where` and `key` for a file that is no picture, or one of more than `MAX_PIXELS`.
+    BadInput names `where` and `key` for a file that is no image, or one of more than `MAX_PIXELS`.
     """
     from PIL import Image
 
@@ -66,63 +72,53 @@ def _greys(image: "Image.Image") -> GreyArray:
     return np.asarray(image.convert("L"), np.float32) / np.float32(255)
 
 
-# --- Occupied pixels merged into rectangles: few obstacles for engines, rays and signals to look at. Compiled.
-
-
-def merged_boxes(occupied: BoolArray, most: int) -> IntArray:
+def merged_boxes(occupied: BoolArray, max_boxes: int) -> IntArray:
     """Rectangles that cover the occupied pixels (rows, columns) and nothing else, none of them twice, (boxes, 4).
 
     Each is its first row, first column, rows and columns. Of every first pixel in reading order that is not covered yet
     it is the larger of two rectangles: as wide as can be and then as tall, or the other way round. If there would be
-    more than `most`, there are `most + 1`.
+    more than `max_boxes`, there are `max_boxes + 1`.
     """
-    return _merged(occupied.copy(), most)
+    return _merged(occupied.copy(), max_boxes)
 
 
 @njit(cache=True)
-def _merged(left, most):
-    boxes = np.empty((most + 1, 4), np.int64)
-    found = 0
-    for row in range(left.shape[0]):
-        for column in range(left.shape[1]):
-            if not left[row, column]:
+def _merged(uncovered, max_boxes):
+    boxes = np.empty((max_boxes + 1, 4), np.int64)
+    count = 0
+    for row in range(uncovered.shape[0]):
+        for column in range(uncovered.shape[1]):
+            if not uncovered[row, column]:
                 continue
-            if found > most:
+            if count > max_boxes:
                 return boxes
-            wide = _columns(left, row, column, 1)
-            below = _rows(left, row, column, wide)
-            tall = _rows(left, row, column, 1)
-            beside = _columns(left, row, column, tall)
-            rows, columns = (below, wide) if below * wide >= tall * beside else (tall, beside)
-            left[row : row + rows, column : column + columns] = False
-            boxes[found] = row, column, rows, columns
-            found += 1
-    return boxes[:found]
+            wide = _columns(uncovered, row, column, 1)
+            rows_of_wide = _rows(uncovered, row, column, wide)
+            tall = _rows(uncovered, row, column, 1)
+            beside = _columns(uncovered, row, column, tall)
+            rows, columns = (rows_of_wide, wide) if rows_of_wide * wide >= tall * beside else (tall, beside)
+            uncovered[row : row + rows, column : column + columns] = False
+            boxes[count] = row, column, rows, columns
+            count += 1
+    return boxes[:count]
 
 
 @njit(cache=True)
-def _columns(left, row, column, rows):
+def _columns(uncovered, row, column, rows):
     """How many columns from `column` on are occupied in all of these rows."""
     columns = 0
-    while column + columns < left.shape[1] and left[row : row + rows, column + columns].all():
+    while column + columns < uncovered.shape[1] and uncovered[row : row + rows, column + columns].all():
         columns += 1
     return columns
 
 
 @njit(cache=True)
-def _rows(left, row, column, columns):
+def _rows(uncovered, row, column, columns):
     """How many rows from `row` on are occupied in all of these columns."""
     rows = 0
-    while row + rows < left.shape[0] and left[row + rows, column : column + columns].all():
+    while row + rows < uncovered.shape[0] and uncovered[row + rows, column : column + columns].all():
         rows += 1
     return rows
-
-
-# --- What is the same in every arena of a scenario: its size, the obstacles of its map, its floor.
-
-
-MAX_BOXES = 10_000
-MAX_M = 10_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,18 +140,18 @@ def read_layout(arena: ArenaTable, where: str) -> Layout:
 
 
 def _read_map(
-    table: MapTable, wanted_m: tuple[float, float] | None, where: str
+    table: MapTable, table_size_m: tuple[float, float] | None, where: str
 ) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
     """Size of the arena in m, and boxes."""
     key, path = "arena.map.image", beside(where, table.image)
     occupied = read_grey(path, where, key) < table.occupied_below
     rows, columns = occupied.shape
     size_m = columns * table.resolution_m, rows * table.resolution_m
-    if wanted_m is not None and not np.allclose(wanted_m, size_m, rtol=1e-6, atol=0.0):
-        size, got = (" x ".join(f"{side:g}" for side in sides) for sides in (size_m, wanted_m))
+    if table_size_m is not None and not np.allclose(table_size_m, size_m, rtol=1e-6, atol=0.0):
+        size, got = (" x ".join(f"{side:g}" for side in sides) for sides in (size_m, table_size_m))
         raise BadInput(where, "arena.size_m", f"expected {size} m, the size of the map, or none; got {got} m")
-    if max(size_m) > MAX_M:
-        raise BadInput(where, "arena.map.resolution_m", f"expected an arena of at most {MAX_M:g} m a side")
+    if max(size_m) > MAX_SIDE_M:
+        raise BadInput(where, "arena.map.resolution_m", f"expected an arena of at most {MAX_SIDE_M:g} m a side")
     if occupied.all():
         expected = f"expected free space: no pixel is as bright as occupied_below = {table.occupied_below:g}"
         raise BadInput(where, key, f"{expected}: {path}")

@@ -1,4 +1,4 @@
-"""Where candidates for a place lie, and the keyed draws that give them. Compiled."""
+"""Rejection sampling of places: keyed candidates in a region, of which the first free one is taken. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -20,12 +20,13 @@ from swarmwire.world.placement.occupancy import (
     within_arena,
 )
 
+MAX_CANDIDATES = 1000
 BOX, DISC, RING = range(3)
 TURN_RAD = 2.0 * np.pi
 
 
 class Region(NamedTuple):
-    """Where candidates lie."""
+    """The region of the candidates."""
 
     kind: int  # BOX, DISC or RING
     x_m: float
@@ -49,28 +50,22 @@ def candidate(region, key, entity, attempt, purpose):
     return region.x_m + u * region.half_x_m, region.y_m + v * region.half_y_m, inside
 
 
-# --- The first of the keyed candidates for a place that is free. Compiled.
-
-
-MAX_CANDIDATES = 1000
-
-
 @njit(cache=True)
 def free_circle(
-    taken: Occupancy, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
+    occupancy: Occupancy, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
 ) -> tuple[float, float]:
     """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
     for attempt in range(MAX_CANDIDATES):
         x, y, inside = candidate(region, key, entity, attempt, purpose)
-        inside = inside and within_arena(taken, x, y, disc.radius_m)  # obstacles lie within even a torus
-        if inside and disc_clear_of_obstacles(taken, x, y, disc):
+        inside = inside and within_arena(occupancy, x, y, disc.radius_m)  # obstacles lie within even a torus
+        if inside and disc_clear_of_obstacles(occupancy, x, y, disc):
             return x, y
     return np.nan, np.nan
 
 
 @njit(cache=True)
 def free_polygon(
-    taken: Occupancy,
+    occupancy: Occupancy,
     region: Region,
     key: np.uint64,
     entity: int,
@@ -92,14 +87,14 @@ def free_polygon(
         c, s = np.cos(turn), np.sin(turn)
         placed[:, 0] = x + c * corners[:, 0] - s * corners[:, 1]
         placed[:, 1] = y + s * corners[:, 0] + c * corners[:, 1]
-        if inside and polygon_clear_of_obstacles(taken, placed, gap_m):
+        if inside and polygon_clear_of_obstacles(occupancy, placed, gap_m):
             return x, y, turn
     return np.nan, np.nan, np.nan
 
 
 @njit(cache=True)
 def put_robots(
-    taken: Occupancy,
+    occupancy: Occupancy,
     region: Region,
     fixed: FloatArray,
     key: np.uint64,
@@ -108,28 +103,31 @@ def put_robots(
     stop: int,
     disc: Disc,
 ) -> int:
-    """Put robots start to stop - 1, each at its first free candidate; the first that found no place, else -1.
+    """Put robots start to stop - 1, each at its first free candidate; returns the first without room, else -1.
 
-    `fixed` (robots put, 2) gives each its only candidate; with no rows candidates are drawn from the region.
+    `fixed` (stop - start, 2) holds the only candidate of each; without rows candidates are drawn from the region.
     """
-    ny, nx = taken.head.shape
+    ny, nx = occupancy.head.shape
     for robot in range(start, stop):
-        found = False
+        is_free = False
         for attempt in range(1 if len(fixed) else MAX_CANDIDATES):
             if len(fixed):
                 x, y, inside = fixed[robot - start, 0], fixed[robot - start, 1], True
             else:
                 x, y, inside = candidate(region, key, robot, attempt, purpose)
-            if taken.wraps:
-                x, y = on_torus(x, taken.half_x_m), on_torus(y, taken.half_y_m)
-            found = inside and disc_clear_of_obstacles(taken, x, y, disc)
-            found = found and disc_clear_of_robots(taken, x, y, disc)
-            if found:
+            if occupancy.wraps:
+                x, y = on_torus(x, occupancy.half_x_m), on_torus(y, occupancy.half_y_m)
+            is_free = inside and disc_clear_of_obstacles(occupancy, x, y, disc)
+            is_free = is_free and disc_clear_of_robots(occupancy, x, y, disc)
+            if is_free:
                 break
-        if not found:
+        if not is_free:
             return robot
-        taken.robot[robot] = x, y, disc.radius_m, disc.bottom_m, disc.top_m
-        cell = cell_of(y, -taken.half_y_m, taken.cell_m, ny), cell_of(x, -taken.half_x_m, taken.cell_m, nx)
-        taken.follow[robot] = taken.head[cell]
-        taken.head[cell] = robot
+        occupancy.robot[robot] = x, y, disc.radius_m, disc.bottom_m, disc.top_m
+        cell = (
+            cell_of(y, -occupancy.half_y_m, occupancy.cell_m, ny),
+            cell_of(x, -occupancy.half_x_m, occupancy.cell_m, nx),
+        )
+        occupancy.next_robot[robot] = occupancy.head[cell]
+        occupancy.head[cell] = robot
     return -1

@@ -1,4 +1,4 @@
-"""The body of each group: one that comes with swarmwire, or a sheet of the user's own beside the scenario."""
+"""The body of each group: a bundled one, or a custom model file beside the scenario."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""`--set path=value`: a value of a scenario given from outside, put at its place before the scenario is checked."""
+"""Reading scenarios: from a file, a mapping and `--set` overrides to a checked `Scenario`.
+
+Overrides (`--set path=value`) change the mapping before the checks. Every fault is one BadInput.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -14,32 +17,34 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.validation import check, fault
 
+FORMAT = 1  # the format number in a scenario's file
+
 
 def put(mapping: dict[str, Any], text: str) -> str:
-    """Set the value that an override names by its path, in which a number is a place in a list.
+    """Set the value of an override at its path, in which a number is an index of a list.
 
-    The path of what is new with it. BadInput if there is no such place.
+    Returns the path of the first new key, or the whole path. BadInput if the path does not exist.
     """
     keys, value = _parsed(text)
-    at: Any = mapping
+    node: Any = mapping
     new = len(keys)  # keys that lead to what is new
     for depth, key in enumerate(keys):
-        if isinstance(at, list):
-            items = cast("list[Any]", at)
+        if isinstance(node, list):
+            items = cast("list[Any]", node)
             if not key.isdecimal() or int(key) >= len(items):
                 expected = f"expected a place in a list of {len(items)}, counted from 0"
                 raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), expected)
             holder, index = cast(Any, items), int(key)
-        elif isinstance(at, dict):
-            holder, index = cast(Any, at), key
+        elif isinstance(node, dict):
+            holder, index = cast(Any, node), key
         else:
             raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
-        if isinstance(at, dict) and key not in at:
+        if isinstance(node, dict) and key not in node:
             new = min(new, depth + 1)
         if depth == len(keys) - 1:
             holder[index] = value
         else:
-            at = holder[index] if isinstance(at, list) else holder.setdefault(index, {})
+            node = holder[index] if isinstance(node, list) else holder.setdefault(index, {})
     return ".".join(keys[:new])
 
 
@@ -49,16 +54,10 @@ def _parsed(text: str) -> tuple[list[str], Any]:
     if not equals or not all(keys):
         raise BadInput(f"--set {text}", "", "expected path=value, such as robots.flock.count=30")
     try:
-        found = from_toml(f"value = {value}")
+        parsed = from_toml(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return keys, value.strip()
-    return keys, found["value"] if len(found) == 1 else value
-
-
-# --- From a file, a mapping and `--set` overrides to a checked scenario; every fault is one BadInput.
-
-
-FORMAT = 1  # that a scenario's file names
+    return keys, parsed["value"] if len(parsed) == 1 else value
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -76,10 +75,10 @@ def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[st
 
     BadInput names `where`, or the override, the key and what was expected.
     """
-    given = deepcopy(dict(mapping))
-    settings = [(put(given, text), text) for text in overrides]
+    mapping_copy = deepcopy(dict(mapping))
+    settings = [(put(mapping_copy, text), text) for text in overrides]
     try:
-        return _checked(given, where)
+        return _checked(mapping_copy, where)
     except BadInput as error:
         for key, text in reversed(settings):
             if f"{error.key}.".startswith(f"{key}."):  # the fault is the override's, not the scenario's
@@ -92,14 +91,14 @@ def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
     return scenario_from(_read(path, str(path)), str(path), overrides)
 
 
-def _checked(given: dict[str, Any], where: str) -> Scenario:
-    check_format(given, FORMAT, where)
+def _checked(mapping_copy: dict[str, Any], where: str) -> Scenario:
+    check_format(mapping_copy, FORMAT, where)
     try:
-        scenario = Scenario.model_validate(given)
+        scenario = Scenario.model_validate(mapping_copy)
     except ValidationError as error:
         raise fault(error, _schema(), where) from None
     check(scenario, where)
-    return scenario.with_source(where, deepcopy(given))
+    return scenario.with_source(where, deepcopy(mapping_copy))
 
 
 def _read(path: Path | str, where: str) -> dict[str, Any]:

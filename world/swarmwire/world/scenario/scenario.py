@@ -163,11 +163,8 @@ class Scenario(Table):
         return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))
 
 
-# --- A scenario as the mapping that describes it: the way back from `scenario_from`, for whoever writes it to a file.
-
-
 def mapping_of(scenario: Scenario) -> dict[str, Any]:
-    """The mapping that gives an equal scenario: texts, numbers, lists and tables only.
+    """The mapping of a scenario, the inverse of `scenario_from`: texts, numbers, lists and tables only.
 
     It is the mapping that the scenario was read from, as long as it still describes it; a scenario that was made or
     changed in Python is taken apart instead, and then says defaults of radio and events, too. The mapping is the

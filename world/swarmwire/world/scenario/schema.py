@@ -1,4 +1,8 @@
-"""A JSON schema in words: what a key expects, as errors and descriptions say it."""
+"""The schema layer of scenarios: JSON schema nodes in words, and parameter dataclasses as pydantic tables.
+
+`words` describes the value that a key expects, for errors and descriptions. `table_of` makes a pydantic model of a
+dataclass made with `parameter`: one declaration gives validation, JSON schema and a frozen object.
+"""
 
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from decimal import Decimal
@@ -70,9 +74,6 @@ def words(node: Node, schema: Node) -> str:
     return text + (f" ({node['unit']})" if "unit" in node else "")
 
 
-# --- Parameter dataclasses as tables of a scenario: one declaration gives validation, JSON schema and frozen object.
-
-
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
 # Their keys have their help from `parameter`; pydantic would search all modules of the process for sources of each.
 MADE_TABLE: ConfigDict = {**TABLE, "use_attribute_docstrings": False}
@@ -138,15 +139,15 @@ def table_of(kind: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
     kind = written_form(kind)
     hints = get_type_hints(kind)
-    columns: dict[str, Any] = {of.name: (_hint(hints[of.name], of), _field(of)) for of in fields(kind)}
+    columns: dict[str, Any] = {item.name: (_hint(hints[item.name], item), _field(item)) for item in fields(kind)}
     return pydantic.create_model(kind.__name__, __config__=MADE_TABLE, __doc__=kind.__doc__, **columns)
 
 
-def _hint(hint: Any, of: "Field[Any]") -> Any:
-    limits = bounds_of(of)
+def _hint(hint: Any, item: "Field[Any]") -> Any:
+    limits = bounds_of(item)
     if limits.choices:
         choices: Any = Literal[limits.choices]
-        return choices | None if of.default is None else choices
+        return choices | None if item.default is None else choices
     if get_origin(hint) in (Union, UnionType):
         return Union[tuple(_readable(item) for item in get_args(hint))]  # noqa: UP007 - made at run time
     return _readable(hint)
@@ -161,16 +162,16 @@ def _readable(hint: Any) -> Any:
     return hint
 
 
-def _field(of: "Field[Any]") -> Any:
-    limits = bounds_of(of)
-    given: dict[str, Any] = {"ge": limits.at_least, "le": limits.at_most, "gt": limits.above, "lt": limits.below}
-    given = {name: bound for name, bound in given.items() if bound is not None}
+def _field(item: "Field[Any]") -> Any:
+    limits = bounds_of(item)
+    keywords: dict[str, Any] = {"ge": limits.at_least, "le": limits.at_most, "gt": limits.above, "lt": limits.below}
+    keywords = {name: bound for name, bound in keywords.items() if bound is not None}
     if limits.help:
-        given["description"] = limits.help
+        keywords["description"] = limits.help
     if limits.unit:
-        given["json_schema_extra"] = {"unit": limits.unit}
-    if of.default is not MISSING:
-        given["default"] = of.default
-    elif of.default_factory is not MISSING:
-        given["default_factory"] = of.default_factory
-    return pydantic.Field(**given)
+        keywords["json_schema_extra"] = {"unit": limits.unit}
+    if item.default is not MISSING:
+        keywords["default"] = item.default
+    elif item.default_factory is not MISSING:
+        keywords["default_factory"] = item.default_factory
+    return pydantic.Field(**keywords)

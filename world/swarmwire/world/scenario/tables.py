@@ -1,4 +1,7 @@
-"""What the tables of a scenario's file are made of: metres, points, headings."""
+"""The tables of a scenario's file below the top level: places, metrics and stop conditions, the arena.
+
+The docstring below each key is its description in the JSON schema.
+"""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, get_args
@@ -41,15 +44,12 @@ class Table(BaseModel):
     model_config = TABLE
 
 
-# --- Convex polygons: the one shape with corners that the world knows.
-
-
 Corner = tuple[float, float]
 MAX_POINTS = 100
 
 
 def counter_clockwise(points: Sequence[Corner]) -> tuple[Corner, ...]:
-    """These corners of a convex polygon, turned counter-clockwise; ValueError says what is wrong with them."""
+    """The corners of a convex polygon in counter-clockwise order; ValueError names the fault of other corners."""
     if not 3 <= len(points) <= MAX_POINTS:
         raise ValueError(f"expected 3 to {MAX_POINTS} points, got {len(points)}")
     turned = tuple(points) if _turn(points[0], points[1], points[2]) > 0.0 else tuple(reversed(points))
@@ -69,9 +69,6 @@ def counter_clockwise(points: Sequence[Corner]) -> tuple[Corner, ...]:
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
     """Twice the area of the triangle a, b, c; positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-# --- Where things stand at the start: in a region, at random and apart from one another, in rows, or at given poses.
 
 
 class DiscTable(Table):
@@ -174,11 +171,8 @@ RandomPlace = InDisc | InBox | InRing | InArena
 PlaceTable = Annotated[RandomPlace | OnGrid | AtPoses, Field(discriminator="how")]
 
 
-# --- What is measured, and what of it ends an arena: the tables of `metrics` and `[stop]`.
-#
-# Only their form is known here: which metrics there are, with which parameters, is found where the run is put together.
-
-
+# The tables of `metrics` and `[stop]`. Only their form is checked here; the names and parameters of metrics are checked
+# when the run is built.
 Name = Annotated[str, StringConstraints(min_length=1)]
 Comparison = Literal["at_least", "at_most", "above", "below"]
 COMPARISONS: tuple[Comparison, ...] = get_args(Comparison)
@@ -216,11 +210,11 @@ class StopTable(Table):
 
     @model_validator(mode="after")
     def _one_comparison(self) -> "StopTable":
-        given = [name for name in COMPARISONS if getattr(self, name) is not None]
-        if len(given) != 1:
+        comparisons = [name for name in COMPARISONS if getattr(self, name) is not None]
+        if len(comparisons) != 1:
             text = "expected just one of {all}; got {given}"
             raise PydanticCustomError(
-                "stop", text, {"all": ", ".join(COMPARISONS), "given": " and ".join(given) or "none"}
+                "stop", text, {"all": ", ".join(COMPARISONS), "given": " and ".join(comparisons) or "none"}
             )
         return self
 
@@ -235,9 +229,6 @@ MetricItem = Annotated[_Item, Discriminator(form_of)]
 
 _Stops = Annotated[tuple[StopTable, ...], Field(strict=False), Tag("array")]
 StopTables = Annotated[Annotated[StopTable, Tag("object")] | _Stops, Discriminator(form_of)]
-
-
-# --- [arena]: its size and boundary, and what stands, shines or is painted in it.
 
 
 NEEDS_MASS = "is missing; expected the mass of what is movable (kg)"

@@ -1,4 +1,8 @@
-"""Validation errors as one plain line: which key, what was expected. The words come from the JSON schema."""
+"""Validation of scenarios: pydantic's errors as one line, and checks that need more than one key.
+
+`fault` turns a validation error into a BadInput with the key and the expectation, worded from the JSON schema. `check`
+tests bodies, physics steps, obstacles, the radio's offset and events against one another.
+"""
 
 import math
 from collections.abc import Mapping
@@ -24,19 +28,20 @@ from swarmwire.world.scenario.schema import UNFIT, Node, forms, plain, words
 from swarmwire.world.scenario.tables import ObstacleTable
 
 MAX_KEYS = 6  # that are named after the first fault
+MAX_STEP_RADII = 0.25  # the greatest move of a robot at full speed in one physics step, in radii
 
 
 def fault(error: ValidationError, schema: Node, where: str) -> BadInput:
     """The first fault of a validation error, with the keys of those that follow."""
-    first, *others = (_explained(of, schema) for of in error.errors(include_url=False))
+    first, *others = (_explain(detail, schema) for detail in error.errors(include_url=False))
     keys = list(dict.fromkeys(key for key, _ in others))
     more = f" (also wrong: {', '.join(keys[:MAX_KEYS])}{', …' if len(keys) > MAX_KEYS else ''})" if keys else ""
     return BadInput(where, first[0], first[1] + more)
 
 
-def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
-    names, node, holder = _followed(error["loc"], schema)
-    kind, key, got = error["type"], ".".join(names), _shown(error["input"])
+def _explain(error: ErrorDetails, schema: Node) -> tuple[str, str]:
+    names, node, holder = _follow(error["loc"], schema)
+    kind, key, got_text = error["type"], ".".join(names), _format(error["input"])
     if kind == "extra_forbidden":
         return key, f"unknown key; expected {did_you_mean(holder.get('properties', {}), names[-1])}"
     if kind == "missing":
@@ -45,24 +50,27 @@ def _explained(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         tag = node["discriminator"]["propertyName"]
         kinds = node["discriminator"]["mapping"]
         if not isinstance(error["input"], dict):
-            return key, f"expected a table with {tag} = {did_you_mean(kinds)}; got {got}"
-        given = cast("Node", error["input"])
-        choices = f"expected {did_you_mean(kinds, given.get(tag))}"
-        return f"{key}.{tag}", f"{choices}; got {_shown(given[tag])}" if tag in given else f"is missing; {choices}"
+            return key, f"expected a table with {tag} = {did_you_mean(kinds)}; got {got_text}"
+        table_input = cast("Node", error["input"])
+        choices = f"expected {did_you_mean(kinds, table_input.get(tag))}"
+        return (
+            f"{key}.{tag}",
+            f"{choices}; got {_format(table_input[tag])}" if tag in table_input else f"is missing; {choices}",
+        )
     if error["loc"][-1] == "[key]":
-        return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got}"
+        return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got_text}"
     if kind == UNFIT:
         return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
     if kind in ("place", "poses", "points", "stop"):  # worded by the scenario's own validators
         return key, error["msg"]
     if "patternProperties" in holder and node.get("type") == "object":
-        return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got}"
+        return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got_text}"
     expected = did_you_mean(map(str, node["enum"]), error["input"]) if "enum" in node else words(node, schema)
-    return key, f"expected {expected}, got {got}"
+    return key, f"expected {expected}, got {got_text}"
 
 
-def _followed(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, Node]:
-    """The keys that a location names, the schema's node there, and the node that holds it."""
+def _follow(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, Node]:
+    """The keys of a location, the schema's node there, and the node that holds it."""
     names: list[str] = []
     node = holder = schema
     for part in loc:
@@ -86,15 +94,9 @@ def _table(node: Node, name: str) -> Node:
     return node.get(name) or Node()
 
 
-def _shown(value: object) -> str:
+def _format(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-# --- Checks that need more than one key of a scenario: bodies, physics steps, obstacles, the radio's offset, events.
-
-
-MAX_OF_RADIUS = 0.25  # how far a robot at full speed may move in one physics step
 
 
 def check(scenario: Scenario, where: str) -> None:
@@ -118,7 +120,7 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
     for group, engine in engines_of(scenario, bodies).items():
         body = bodies[group]
         tick_m = body.max_linear_mps * max(1.0, noise_of(body.drive).factor) / scenario.time.rate_hz
-        needed = math.ceil(tick_m / (MAX_OF_RADIUS * body.radius_m) - 1e-9)
+        needed = math.ceil(tick_m / (MAX_STEP_RADII * body.radius_m) - 1e-9)
         if engine != "kinematic" and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
@@ -127,26 +129,26 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
 def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
     """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
     size_m = np.array(extents_m)
-    least, greatest = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
-    fits = np.all(greatest - least <= size_m + 2e-9)
-    if not fits or (table.at and (np.any(greatest > 0.5 * size_m + 1e-9) or np.any(least < -0.5 * size_m - 1e-9))):
+    low, high = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
+    fits = np.all(high - low <= size_m + 2e-9)
+    if not fits or (table.at and (np.any(high > 0.5 * size_m + 1e-9) or np.any(low < -0.5 * size_m - 1e-9))):
         size = " x ".join(f"{side:g}" for side in size_m)
         raise BadInput(where, key, f"expected the {table.shape} to lie within the arena of {size} m")
 
 
 def _check_send_offset(scenario: Scenario, where: str) -> None:
     offset, tick_s = scenario.radio.send_offset if scenario.radio else "uniform", 1.0 / scenario.time.rate_hz
-    known = offset in ("uniform", "tick") if isinstance(offset, str) else 0.0 <= offset < tick_s
-    if not known:
+    is_valid = offset in ("uniform", "tick") if isinstance(offset, str) else 0.0 <= offset < tick_s
+    if not is_valid:
         expected = "expected uniform, tick, or an offset in s from 0 to below the period of a tick"
         raise BadInput(where, "radio.send_offset", f"{expected}; got {offset!r}")
 
 
 def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
-    unfit = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
-    if unfit is not None:
+    key = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
+    if key is not None:
         expected = "expected a disk without bodies_block: what is between two robots across a torus's seam is not known"
-        raise BadInput(where, f"radio.{unfit}", expected)
+        raise BadInput(where, f"radio.{key}", expected)
 
 
 def _check_antennas(scenario: Scenario, where: str) -> None:
@@ -157,7 +159,7 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
 
 
 def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impulse) -> None:
-    """Only engines with forces can push; and who is pushed must not get through what stands in the way in one step."""
+    """Only engines with forces can push, and a pushed robot must not pass through an obstacle in one step."""
     engines = engines_of(scenario, bodies)
     for group in event.robots.groups(scenario.groups()):
         if engines[group] == "kinematic":
@@ -165,14 +167,14 @@ def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impuls
                 f"expected robots whose bodies have contacts: those of {group} go where they are told (kinematic)"
             )
             raise BadInput("", "robots", expected)
-        most_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
-        if event.speed_mps > most_mps:
+        max_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
+        if event.speed_mps > max_mps:
             why = f"with which a robot of {group} moves by its radius in one of {scenario.physics.steps} physics.steps"
-            raise BadInput("", "speed_mps", f"expected at most {most_mps:g} m/s, {why}; got {event.speed_mps!r}")
+            raise BadInput("", "speed_mps", f"expected at most {max_mps:g} m/s, {why}; got {event.speed_mps!r}")
 
 
 def check_event(scenario: Scenario, bodies: Mapping[str, Body], event: Event, key: str, where: str) -> None:
-    """Raise BadInput unless an event names robots that there are, and fits the radio and the engines that it needs."""
+    """Raise BadInput unless the robots of an event exist and the radio and the engines support it."""
     if event.needs_radio and scenario.radio is None:
         raise BadInput(where, f"{key}.do", f"expected a scenario with a [radio] for {event.do!r}")
     try:

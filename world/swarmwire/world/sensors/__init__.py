@@ -1,6 +1,6 @@
-"""What robots sense, a file per sensor: the truth (`sensor.Sensor`), of which `staged.Staged` makes readings.
+"""Sensors: each has the truth (`sensor.Sensor`), from which `pipeline.Staged` makes readings.
 
-A new one: a sheet in `swarmwire.comms.bodies.sensors`, a file here, a line below.
+A new sensor needs a spec in `swarmwire.comms.bodies`, a class here, and a line below.
 """
 
 from collections.abc import Callable

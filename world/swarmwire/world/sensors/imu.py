@@ -1,8 +1,8 @@
-"""The IMU: what a body feels of its own motion, with a bias that each robot has for itself and that drifts.
+"""The IMU: accelerations and turn rate of a body, with a bias per robot that drifts.
 
-Accelerations are the change of velocity over the tick before, seen in the frame of the body half way through it: a
-robot that drives a circle feels v w to the inside. The turn rate is the change of heading over that tick. The bias
-begins as a normal draw once per robot and field, and takes a normal step of drift x sqrt(tick) in each tick.
+Accelerations are the change of velocity over the tick before, in the frame of the body half way through that tick: a
+robot that drives a circle measures v w towards its centre. The turn rate is the change of heading over that tick. The
+bias begins as a normal draw per robot and field, and takes a normal step of drift x sqrt(tick) in each tick.
 """
 
 # pyright: basic, reportUnknownMemberType=false

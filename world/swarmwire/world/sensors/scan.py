@@ -1,4 +1,4 @@
-"""Laser scan: many rays of one origin. Each near thing is tested against the rays that may meet it alone. Compiled."""
+"""Laser scan: many rays from one origin. Each near thing is tested only against the rays that may meet it. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 

@@ -1,4 +1,4 @@
-"""What a sense is to the world: its fields, and the truth about them. What goes wrong with it is left to the stages."""
+"""The sensor interface: fields and their truth, and the `Scene` that sensors read. `pipeline` adds the errors."""
 
 from dataclasses import dataclass, field
 from math import inf, nan
@@ -59,9 +59,6 @@ class Following(Protocol):
     def follow(self, tick: int) -> None:
         """Add what the time since the last tick brought; called instead of `truth` where no reading is taken."""
         ...
-
-
-# --- What sensors look at.
 
 
 @dataclass(frozen=True, slots=True)

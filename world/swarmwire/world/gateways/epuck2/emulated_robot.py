@@ -1,4 +1,4 @@
-"""Where emulated e-puck2s answer: an address for each."""
+"""The TCP side of emulated e-puck2s: the address of each, its connections, and the server thread of a group."""
 
 import asyncio
 import socket
@@ -12,12 +12,17 @@ from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, PacketRequest
 
 MAX_HOSTS = 254  # of a network of the last byte
+MAX_WAITING = 4  # connections; beyond that the oldest is dropped
+MAX_UNREAD_BYTES = 1 << 20  # of answers; a client beyond that reads none
+BACKLOG = 16
+_BLACK_IMAGE = bytes([Header.IMAGE]) + bytes(PAYLOAD_BYTES[Header.IMAGE])
+_EMPTY = bytes([Header.EMPTY])
 WHERE = "gateway epuck2"
 EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
 
 
 def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
-    """Host and port of each robot; BadInput if the address is of no such form, or does not reach for all.
+    """Host and port of each robot; BadInput if the address is malformed or has too few ports or hosts.
 
     >>> addresses_of("127.0.0.1:11000", 2), addresses_of("127.0.1.*", 2)
     ([('127.0.0.1', 11000), ('127.0.0.1', 11001)], [('127.0.1.1', 1000), ('127.0.1.2', 1000)])
@@ -36,22 +41,16 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
     return [(host, first + i if first else 0) for i in range(robots)]
 
 
-# --- One emulated e-puck2 as its connections see it; everything here runs in the gateway's thread.
-
-
-MAX_WAITING = 4  # connections; the one that has waited longest has given up
-MAX_UNREAD_BYTES = 1 << 20  # of answers; whoever reads none of them will not begin to
-_BLACK_IMAGE = bytes([Header.IMAGE]) + bytes(PAYLOAD_BYTES[Header.IMAGE])
-_EMPTY = bytes([Header.EMPTY])
+# `Connection` and `EmulatedRobot` run in the thread of the `Server`.
 
 
 class Connection(asyncio.Protocol):
-    """One connection, whose robot decides when it is read."""
+    """One connection; its robot decides when it is read."""
 
     def __init__(self, robot: "EmulatedRobot") -> None:
         self._robot = robot
         self.commands = Commands()
-        self.unanswered = False  # whether an answer could not be handed over, since it was gone by then
+        self.unanswered = False  # whether an answer was lost, since the connection was gone
         self.transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -59,7 +58,7 @@ class Connection(asyncio.Protocol):
         self.transport = cast("asyncio.Transport", transport)
         # asyncio leaves that out for sockets that it has not made itself, and an answer could wait for 40 ms.
         transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._robot.knock(self)
+        self._robot.on_connect(self)
 
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
@@ -67,24 +66,26 @@ class Connection(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """As asyncio has it."""
-        self._robot.miss(self)
+        self._robot.on_disconnect(self)
 
 
 class EmulatedRobot:
-    """A robot that serves one connection at a time, as the firmware does; those that come meanwhile wait unread.
+    """A robot that serves one connection at a time, as the firmware does; other connections wait unread.
 
-    A dead one serves none. One that is revived has booted: all connections from before are gone.
+    A dead robot serves none. A revived robot has booted: all earlier connections are gone.
     """
 
-    def __init__(self, told: Callable[[RobotCommand], None], answer: Callable[[], bytes], counts: Counter[str]) -> None:
-        self._told, self._answer, self._counts = told, answer, counts
+    def __init__(
+        self, on_command: Callable[[RobotCommand], None], answer: Callable[[], bytes], counts: Counter[str]
+    ) -> None:
+        self._on_command, self._answer, self._counts = on_command, answer, counts
         self._served: Connection | None = None
         self._waiting: deque[Connection] = deque()
         self._request: PacketRequest | None = None  # of the last command of the one that is served
         self._alive = True
 
-    def knock(self, connection: Connection) -> None:
-        """A connection came."""
+    def on_connect(self, connection: Connection) -> None:
+        """Serve a new connection, or let it wait."""
         self._waiting.append(connection)
         if self._alive and self._served is None:
             self._serve_next()
@@ -101,18 +102,18 @@ class EmulatedRobot:
             connection.transport.pause_reading()
 
     def on_receive(self, connection: Connection, data: bytes) -> None:
-        """The connection that is served sent this; what it told is done, even if it did not wait for the answers."""
+        """Execute the commands in this data and answer them, also if the client does not wait for the answers."""
         try:
             for command in connection.commands.fed(data):
                 self._request = command.request
-                self._told(command)
+                self._on_command(command)
                 self._reply(connection, command.request)
         except BadFrame as bad:
             self._counts[bad.fault] += 1
             connection.transport.abort()
 
-    def miss(self, connection: Connection) -> None:
-        """A connection is gone; the robot keeps to what it was told last."""
+    def on_disconnect(self, connection: Connection) -> None:
+        """Forget a lost connection; the robot keeps its last command."""
         if connection.commands.begun:
             self._counts["half_commands"] += 1
         if connection in self._waiting:
@@ -123,7 +124,7 @@ class EmulatedRobot:
                 self._serve_next()
 
     def live(self, alive: bool) -> None:
-        """Whether the robot is alive from now on."""
+        """Set whether the robot is alive."""
         if alive and not self._alive:
             self.hang_up()
         elif self._alive and not alive and self._served is not None:
@@ -131,7 +132,7 @@ class EmulatedRobot:
         self._alive = alive
 
     def tell_unasked(self) -> None:
-        """Answer the last command once more, unless the answer before still waits to be taken."""
+        """Answer the last command once more, unless the last answer is still unread."""
         connection, request = self._served, self._request
         if connection and request is not None and self._alive and not connection.transport.get_write_buffer_size():
             self._reply(connection, request)
@@ -162,47 +163,41 @@ class EmulatedRobot:
         if request & PacketRequest.IMAGE:
             self._counts["images_without_camera"] += 1
             image = _BLACK_IMAGE
-        told = self._answer() if request & PacketRequest.SENSORS else b"" if request else _EMPTY
-        connection.transport.write(image + told)  # at once: it could be gone after the first half
-
-
-# --- A thread that serves the connections of all emulated e-puck2s of a group.
-
-
-BACKLOG = 16
+        packet = self._answer() if request & PacketRequest.SENSORS else b"" if request else _EMPTY
+        connection.transport.write(image + packet)  # at once: it could be gone after the first half
 
 
 class Server:
-    """Sockets that answer from the moment that this is made until `close`."""
+    """A thread that serves the connections of all emulated e-puck2s of a group, from its creation until `close`."""
 
     def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]]) -> None:
-        """BadInput if an address is taken, or not ours to take."""
+        """BadInput if an address is in use or not permitted."""
         self._robots = robots
         self._sockets = _listening(addresses)
         self.addresses: list[tuple[str, int]] = [listening.getsockname()[:2] for listening in self._sockets]
         self._loop = asyncio.new_event_loop()
-        self._end = asyncio.Event()
+        self._ended = asyncio.Event()
         self._serving = Event()
         self._thread = Thread(target=self._run, name="epuck2 gateway", daemon=True)
         self._thread.start()
         self._serving.wait()
 
     def live(self, alive: Sequence[bool]) -> None:
-        """Which robots are alive from now on."""
+        """Set which robots are alive."""
         self._loop.call_soon_threadsafe(self._live, alive)
 
     def tell_unasked(self) -> None:
-        """Have the newest readings sent to whoever is connected."""
+        """Send the newest readings to all connected clients."""
         self._loop.call_soon_threadsafe(self._tell_unasked)
 
     def close(self) -> None:
-        """Hang up, and free the addresses."""
-        self._loop.call_soon_threadsafe(self._end.set)
+        """Close all connections, and free the addresses."""
+        self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join()
 
     def _live(self, alive: Sequence[bool]) -> None:
-        for robot, lives in zip(self._robots, alive, strict=True):
-            robot.live(lives)
+        for robot, is_alive in zip(self._robots, alive, strict=True):
+            robot.live(is_alive)
 
     def _tell_unasked(self) -> None:
         for robot in self._robots:
@@ -213,7 +208,7 @@ class Server:
             with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
                 runner.run(self._serve())
         finally:
-            self._serving.set()  # whatever ends the thread, nobody waits for it
+            self._serving.set()  # so that the constructor returns also if the thread fails
 
     async def _serve(self) -> None:
         servers = [
@@ -221,7 +216,7 @@ class Server:
             for robot, listening in zip(self._robots, self._sockets, strict=True)
         ]
         self._serving.set()
-        await self._end.wait()
+        await self._ended.wait()
         for server in servers:
             server.close()
         for robot in self._robots:
@@ -229,7 +224,7 @@ class Server:
 
 
 def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
-    """A socket for each address; none stays open if one cannot be had."""
+    """A listening socket for each address; if one fails, all are closed."""
     sockets: list[socket.socket] = []
     for host, port in addresses:
         try:

@@ -1,4 +1,7 @@
-"""What a user may tell the gateway of emulated e-puck2s."""
+"""The gateway of emulated e-puck2s: its options, differences of a body from an e-puck2, and the gateway itself.
+
+The gateway runs a TCP server for each robot, all in one thread.
+"""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -39,43 +42,40 @@ class Epuck2GatewayOptions:
         return Compass(self.magnetometer, radians(self.north_deg))
 
 
-# --- In what a body that an e-puck2 could be is another one, as a program sees that takes it for an e-puck2.
-
-
-SHOWN = 3  # angles
+MAX_ANGLES = 3  # that a difference lists
 
 
 def differences_of(body: Body) -> tuple[str, ...]:
-    """In words, each for itself; none for an e-puck2.
+    """The differences of a body from an e-puck2, as a program for the e-puck2 sees them, in words.
 
     >>> differences_of(load_body("epuck2"))
     ()
     """
     model = load_body("epuck2")
-    return (*_looking(body, model), *_driving(body, model), *_at_rest(body, model))
+    return (*_sensor_differences(body, model), *_drive_differences(body, model), *_at_rest(body, model))
 
 
-def _looking(body: Body, model: Body) -> list[str]:
+def _sensor_differences(body: Body, model: Body) -> list[str]:
     pairs = [(name, body.sensors.get(name), model.sensors.get(name)) for name in ("proximity", "light")]
     return [
-        f"its {name} looks to {_angles(its)}, not {_angles(usual)}"
-        for name, its, usual in pairs
-        if isinstance(its, ProximitySpec | LightSpec)
-        and isinstance(usual, ProximitySpec | LightSpec)
-        and its.angles_deg != usual.angles_deg
+        f"its {name} looks to {_angles(spec)}, not {_angles(model_value)}"
+        for name, spec, model_value in pairs
+        if isinstance(spec, ProximitySpec | LightSpec)
+        and isinstance(model_value, ProximitySpec | LightSpec)
+        and spec.angles_deg != model_value.angles_deg
     ]
 
 
 def _angles(spec: ProximitySpec | LightSpec) -> str:
-    return f"{', '.join(f'{angle:g}' for angle in spec.angles_deg[:SHOWN])}, ... deg"
+    return f"{', '.join(f'{angle:g}' for angle in spec.angles_deg[:MAX_ANGLES])}, ... deg"
 
 
-def _driving(body: Body, model: Body) -> list[str]:
-    base_m, usual_m = body.wheels.wheel_base_m, model.wheels.wheel_base_m
-    fastest, usual = body.drive.max_linear_mps, model.drive.max_linear_mps
+def _drive_differences(body: Body, model: Body) -> list[str]:
+    base_m, model_base_m = body.wheels.wheel_base_m, model.wheels.wheel_base_m
+    fastest, model_value = body.drive.max_linear_mps, model.drive.max_linear_mps
     return [
-        *([f"its wheels are {base_m:g} m apart, not {usual_m:g}"] if base_m != usual_m else []),
-        *([f"it goes up to {fastest:g} m/s, not {usual:g}"] if fastest != usual else []),
+        *([f"its wheels are {base_m:g} m apart, not {model_base_m:g}"] if base_m != model_base_m else []),
+        *([f"it goes up to {fastest:g} m/s, not {model_value:g}"] if fastest != model_value else []),
     ]
 
 
@@ -84,14 +84,11 @@ def _at_rest(body: Body, model: Body) -> list[str]:
     return [f"it has no {', '.join(absent)}, which are told as of a robot at rest"] if absent else []
 
 
-# --- The gateway of emulated e-puck2s: a TCP server for each, all in one thread.
-
-
 class Epuck2Gateway(Gateway):
-    """Emulated e-puck2s. Each takes and answers commands as the firmware does, but for what is counted as refused.
+    """Emulated e-puck2s. Each executes and answers commands as the firmware does, except those counted as refused.
 
-    A robot goes on as it was told when its connection is lost, since the real one has no watchdog. Its own obstacle
-    avoidance is refused: it goes as it is told. Images are black.
+    A robot keeps its last command when its connection is lost, since the real one has no watchdog. The firmware's
+    obstacle avoidance is refused: the commanded speeds apply. Images are black.
     """
 
     options: ClassVar[type] = Epuck2GatewayOptions

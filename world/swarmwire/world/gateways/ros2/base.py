@@ -1,4 +1,7 @@
-"""The commands that come for one base, from whatever program."""
+"""One emulated ROS 2 base: the commands that it receives, and its topics on the network.
+
+A base has its topics on the keys of a bridge and of rmw_zenoh, and its place in the ROS graph.
+"""
 
 import threading
 from collections import Counter
@@ -88,9 +91,6 @@ class CommandInbox:
         with self._lock:
             self._came = self._until_ns = None
             self._rests = True
-
-
-# --- One emulated base on the network: its topics on the keys of a bridge and of rmw_zenoh, and its place in the graph.
 
 
 COMMAND_TOPIC, NODE = "cmd_vel", "base"

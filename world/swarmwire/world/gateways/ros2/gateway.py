@@ -1,4 +1,4 @@
-"""The gateway that lets ROS 2 nodes drive the robots of a group."""
+"""The ROS 2 gateway: ROS 2 nodes drive the robots of a group."""
 
 from collections import Counter
 from collections.abc import Sequence

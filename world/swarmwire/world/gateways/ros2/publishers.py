@@ -1,4 +1,4 @@
-"""Options of the ROS 2 gateway."""
+"""The topics of emulated ROS 2 bases, from the readings of their group, and the options of the ROS 2 gateway."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -34,14 +34,11 @@ class Ros2GatewayOptions:
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
 
 
-# --- When a sensor has a new reading.
-
-
-NEAR = 1e-6  # a reading that is due but for rounding is due
+NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
 
 
 class Rate:
-    """Says of each tick whether a reading is due in it, as the sensors of the world themselves do."""
+    """The ticks in which a reading is due, as for the sensors of the world."""
 
     def __init__(self, rate_hz: float) -> None:
         """0: in each tick."""
@@ -57,10 +54,7 @@ class Rate:
         return due
 
 
-# --- What the bases of a gateway tell on each topic, from the readings of their group.
-
-
-Fields = dict[str, FloatArray]  # "sense.field" -> (n,) or (n, width)
+Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 
 
 class Teller(ABC):
