@@ -1,4 +1,4 @@
-"""Limits of parameters: what a behaviour's formulas cannot take is refused before anything runs."""
+"""Shared by behaviours: checks of parameters before a run, and the wrapping of angles."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,9 +34,6 @@ def check_order(kind: type, params: Mapping[str, Any], lower: str, upper: str) -
     low, high = (params.get(name, getattr(kind, name)) for name in (lower, upper))
     if low > high:
         raise BadParameter(lower, f"expected at most {upper}, {high}; got {low}")
-
-
-# --- Angles: the same direction in another turn.
 
 
 def wrapped(angle_rad: FloatArray) -> FloatArray:

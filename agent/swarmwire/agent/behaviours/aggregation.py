@@ -1,4 +1,4 @@
-"""Aggregation: approach whom one hears, wait beside them, and leave again by chance."""
+"""Aggregation: approach received neighbours, wait next to them, and leave again by chance."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -25,17 +25,17 @@ NAMES = {APPROACH: "approaches", WAIT: "waits", REPEL: "leaves"}
 
 
 class Beacon(Message):
-    """What an aggregating robot broadcasts in every step: that it is there. Range and bearing tell where."""
+    """What an aggregating robot broadcasts in every step: its presence. Range and bearing give its place."""
 
 
 class Gathering(Walk):
-    """A walker, and what it is at."""
+    """A walker, and its state."""
 
     at: IntColumn = column(START)
 
 
 class Aggregation(VectorAgent[Gathering]):
-    """Robots gather: they approach whom they hear, wait when near, and leave by chance, the less the more are near.
+    """Robots gather: they approach received neighbours, wait when near, and leave by chance, less with more near.
 
     The three states and two probabilities of Soysal and Sahin (2005), beside avoidance by rays:
 
@@ -44,8 +44,8 @@ class Aggregation(VectorAgent[Gathering]):
         repel      with probability return_per_s                                    -> approach (per second)
 
     Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours received in the
-    last step, repelled against it; who hears nobody walks at random. The source's robots hear an aggregate's sound
-    where ours hear beacons by radio, and they leave whatever the number near: that is `crowding = 0`. We had only its
+    last step, repelled against it; a robot without packets walks at random. The source's robots hear an aggregate's
+    sound where ours receive beacons, and they leave whatever the number near: that is `crowding = 0`. We had only its
     abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
     cockroaches depends (Jeanson et al. 2005).
     """
@@ -53,22 +53,22 @@ class Aggregation(VectorAgent[Gathering]):
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
     speed_mps: float = 0.1  # straight ahead
     near_m: float = 0.15  # a neighbour received from so near, centre to centre, is company to wait with
-    leave_per_s: float = 0.1  # rate at which a waiting robot that hears nobody near leaves
-    crowding: float = 2.0  # how much those near hold it: 0 not at all
+    leave_per_s: float = 0.1  # rate at which a waiting robot without near neighbours leaves
+    crowding: float = 2.0  # effect of near neighbours on leaving: 0 none
     return_per_s: float = 1.0  # rate at which a robot that leaves turns back
     approach_m: float = 0.1  # length of a spell towards or away from neighbours
     spell_m: float = 1.0  # mean length of a spell where nobody is received, exponential
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Spells end, turns too, and no rate is negative."""
+        """Spells and turns end, and no rate is negative."""
         check_above_zero(params, "spell_m", "approach_m", "turn_radps", "faint")
         check_not_negative(params, "leave_per_s", "return_per_s")
 
     def step(self, robots: Robots, state: Gathering) -> None:
-        """Change what it is at, walk unless waiting, and be received."""
+        """Change the state, walk unless waiting, and broadcast."""
         received = robots.radio.received(Beacon)
         near = received.sum((received.range_m <= self.near_m).astype(np.float64))
         self._change(robots, state, near)
@@ -79,7 +79,7 @@ class Aggregation(VectorAgent[Gathering]):
         robots.radio.send(Beacon)
 
     def _change(self, robots: Robots, state: Gathering, near: FloatArray) -> None:
-        """By the state at the start of the step; who begins to wait or to leave drops its spell."""
+        """Change states by those at the start of the step; a change ends the spell."""
         period_s, before = robots.period_s, state.at.copy()
         leave = self.leave_per_s / (1.0 + near) ** self.crowding
         leaves = robots.draw.uniform("leave") < -np.expm1(-leave * period_s)
@@ -93,7 +93,7 @@ class Aggregation(VectorAgent[Gathering]):
             robots.note(name, (state.at == at) & (state.at != before))
 
     def _walk(self, robots: Robots, state: Gathering, receives: BoolArray, towards: FloatArray) -> None:
-        """A spell along `towards` where somebody is received, at random elsewhere; not for who waits."""
+        """A spell along `towards` for robots with packets, at random for others; waiting robots stand."""
         turn = np.where(receives, towards, turns_at_random(robots, 0.0))
         length = np.where(receives, self.approach_m, spell_lengths(robots, self.spell_m))
         walks = state.at != WAIT

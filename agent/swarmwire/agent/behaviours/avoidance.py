@@ -1,4 +1,7 @@
-"""Avoidance: drive straight, and turn on the spot from whatever is in the way."""
+"""Published avoidance rules: turn on the spot, or back off and turn, while an obstacle is near.
+
+`Avoidance` reads proximity rays; `ThresholdRule` reads a laser scan, and `ThresholdRuleProximity` proximity rays.
+"""
 
 from typing import ClassVar
 
@@ -12,7 +15,7 @@ from swarmwire.comms.arrays import FloatArray
 class Avoidance(VectorAgent):
     """The avoidance rule of the paper on swarm algorithms in the ARGoS simulator, by proximity alone.
 
-    The sum of the rays' vectors (value towards angle) says in which direction the obstacle is. It is harmless if it is
+    The sum of the rays' vectors (value towards angle) gives the direction of the obstacle. It is harmless if it is
     behind (further round than `behind_rad`), or if it is ahead (within `ahead_rad`) and farther than `safe_m`: then the
     robot drives straight. From any other the robot turns away: to the right of one to its left, and the other way
     round; one dead ahead counts as to the right.
@@ -29,7 +32,7 @@ class Avoidance(VectorAgent):
     safe_m: float = 0.03  # an obstacle ahead is harmless if its nearest point is farther than this from the rim
     ahead_rad: float = 0.7854  # half width of the sector ahead (45 degrees)
     behind_rad: float = 2.618  # an obstacle is behind beyond this angle to either side (150 degrees)
-    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
 
     def step(self, robots: Robots, state: State) -> None:
         """Straight, or turning."""
@@ -45,16 +48,13 @@ class Avoidance(VectorAgent):
         robots.drive(linear_mps=linear, angular_radps=np.where(harmless, 0.0, away))
 
 
-# --- Threshold rule: back off and turn while anything is too near, else straight on.
-
-
 class ThresholdRule(VectorAgent):
     """The avoidance rule of the article on testing swarm logic with ROS 2 and ARGoS, by a laser scan.
 
     While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
     `turn_radps`; else it drives straight on at `speed_mps`. Ranges and speeds are the article's, and so is that the
     rays behind count as those ahead. It has no memory: robots that hold one another on the threshold go to and fro,
-    and one that a wall keeps below it drives in a circle of back_mps / turn_radps (0.2 m).
+    and one next to a wall, always below it, drives in a circle of back_mps / turn_radps (0.2 m).
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
@@ -75,23 +75,20 @@ class ThresholdRule(VectorAgent):
         return np.min(robots.scan.range_m, axis=1)
 
 
-# --- Threshold rule by short rays around the body.
-
-
 class ThresholdRuleProximity(ThresholdRule):
     """The article's threshold rule for bodies that have proximity rays instead of a scanner.
 
-    As ThresholdRule, with distances from the rim. What they should be for such bodies the article does not say: the
-    defaults here are within the reach of a foot-bot's rays, and of an e-puck's.
+    As ThresholdRule, with distances from the rim. The article gives none for such bodies: the defaults here are within
+    the range of the rays of a foot-bot and an e-puck.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
     safe_m: float = 0.04  # least distance from the rim at which the robot goes on
     speed_mps: float = 0.1  # straight ahead
     back_mps: float = 0.05  # backwards, while anything is nearer
-    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
 
     def nearest_m(self, robots: Robots) -> FloatArray:
-        """The least distance of all rays that see something, (n,), from the rim; inf if none does."""
+        """The least distance of all rays with an answer, (n,), from the rim; inf if none has one."""
         proximity = robots.proximity
         return np.min(np.where(proximity.value >= self.faint, proximity.distance_m, np.inf), axis=1)

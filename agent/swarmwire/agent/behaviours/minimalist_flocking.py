@@ -1,4 +1,7 @@
-"""What rays around a body see in four sectors of 90 degrees, and in their halves."""
+"""Minimalist flocking: four sectors, four thresholds, no radio, and no memory but the side of the current turn.
+
+`Sectors` sorts the rays around a body into four sectors of 90 degrees, and into the halves of the body.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,11 +26,11 @@ AXIS = 1e-9  # sine of an angle: nearer to the axis a ray is in neither half
 class Sectors:
     """The rays of n robots by sector, each with its border towards the left.
 
-    Answers are compared, not distances: an answer is the greater the nearer a thing is, and is there already.
+    Answers are compared, not distances: a nearer object gives a greater answer, and needs no conversion.
 
     Attributes:
-        answer: (rays, n) 0 for nothing, 1 for touching. A row per ray: of few rays of many robots the most is found
-            many times as fast so, and is as exact.
+        answer: (rays, n) 0 for nothing, 1 for touching. With a row per ray, the maximum over few rays of many robots is
+            many times faster, and as exact.
         front, left, rear, right: (rays,) which rays look there.
         left_half, right_half: (rays,) which look to either side of the body's axis.
     """
@@ -42,7 +45,7 @@ class Sectors:
 
     @classmethod
     def of(cls, reading: ProximityReading[FloatArray] | InfraredReading[FloatArray]) -> "Sectors":
-        """The sectors of the rays of a sense."""
+        """The sectors of the rays of a sensor."""
         angle_rad = reading.angle_rad
         front = (angle_rad > -FRONT_RAD) & (angle_rad <= FRONT_RAD)
         left = (angle_rad > FRONT_RAD) & (angle_rad <= REAR_RAD)
@@ -52,7 +55,7 @@ class Sectors:
         return cls(answer, front, left, ~(front | left | right), right, across > AXIS, across < -AXIS)
 
     def weaker_than(self, answer: float) -> "Sectors":
-        """The same, but that rays see nothing which answer as much as this or more: what is farther alone."""
+        """The sectors without rays of this answer or more, so with farther objects alone."""
         return replace(self, answer=np.where(self.answer < answer, self.answer, 0.0))
 
     def strongest(self, rays: BoolArray) -> FloatArray:
@@ -60,11 +63,11 @@ class Sectors:
         return np.max(self.answer[rays], axis=0, initial=0.0)
 
     def count(self, rays: BoolArray) -> IntArray:
-        """How many of these rays see anything, (n,)."""
+        """Number of these rays with an answer, (n,)."""
         return np.count_nonzero(self.answer[rays], axis=0)
 
     def nearer_half(self, rays: BoolArray) -> IntArray:
-        """LEFT or RIGHT, the half of these rays in which something is nearest, (n,); EITHER where it is in both."""
+        """LEFT or RIGHT, the half of these rays with the nearest object, (n,); EITHER where both are equal."""
         return self._half(rays, LEFT, RIGHT)
 
     def farther_half(self, rays: BoolArray) -> IntArray:
@@ -76,11 +79,8 @@ class Sectors:
         return np.where(left > right, if_left, np.where(right > left, if_right, EITHER))
 
 
-# --- Minimalist flocking: four sectors, four thresholds, no radio, and no memory but the side of a turn under way.
-
-
 class Turning(State):
-    """What is kept of the step before."""
+    """The memory of the last step."""
 
     side: IntColumn = column(STRAIGHT)  # to which the robot turned
 
@@ -149,9 +149,9 @@ class MinimalistFlocking(VectorAgent[Turning]):
         if self.random_turn > 0.0:
             rules.insert(0, (robots.draw.uniform("whether") < self.random_turn, EITHER))
         side = np.zeros(robots.n, np.int64)
-        for applies, turn in reversed(rules):  # so that the first has the last word
+        for applies, turn in reversed(rules):  # so that the first rule prevails
             side = np.where(applies, turn, side)
-        if np.any(side == EITHER):  # in most steps of a few robots nobody has to draw
+        if np.any(side == EITHER):  # most steps of a few robots need no draw
             drawn = np.where(robots.draw.uniform("side") < 0.5, LEFT, RIGHT)
             side = np.where(side == EITHER, drawn, side)
         state.side = side
@@ -160,5 +160,5 @@ class MinimalistFlocking(VectorAgent[Turning]):
 
 
 def _answer_at(spec: RayArraySpec, distance_m: float) -> float:
-    """What an ideal ray answers to a thing so far from the rim."""
+    """The answer of an ideal ray to an object at this distance from the rim."""
     return float(spec.response.value(np.array(distance_m)))

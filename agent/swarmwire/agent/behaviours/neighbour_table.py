@@ -40,7 +40,7 @@ def pass_time(table: Remembered, own_mps: Vectors, period_s: float) -> None:
 
 
 def forget(table: Remembered, after_s: float) -> None:
-    """Empty the slots of those whose newest packet is older than that."""
+    """Empty the slots whose newest packet is older than `after_s`."""
     old = table.age_s > after_s
     for name, (_, empty, _) in Remembered.columns.items():
         getattr(table, name)[old] = empty
@@ -62,12 +62,12 @@ def remember(
     """
     if len(row) == 0:
         return
-    told = (sender, sequence, place_m.x, place_m.y, velocity_mps.x, velocity_mps.y, age_s)
+    new_columns = (sender, sequence, place_m.x, place_m.y, velocity_mps.x, velocity_mps.y, age_s)
     held, slot = np.nonzero(table.sender != NOBODY)
     rows = np.concatenate((held, row))
     both: dict[str, Any] = {
         name: np.concatenate((getattr(table, name)[held, slot], new))
-        for name, new in zip(Remembered.columns, told, strict=True)
+        for name, new in zip(Remembered.columns, new_columns, strict=True)
     }
     kept = _newest(rows, both["sender"], both["sequence"])
     kept, place = _nearest(kept, rows, both["sender"], np.hypot(both["x_m"], both["y_m"]))
@@ -83,8 +83,8 @@ def _newest(rows: IntArray, sender: IntArray, sequence: IntArray) -> IntArray:
     return order[last]
 
 
-def _nearest(of: IntArray, rows: IntArray, sender: IntArray, far_m: FloatArray) -> tuple[IntArray, IntArray]:
-    """Which of the entries `of` are among the SLOTS nearest of their row, and at which place, the nearest at 0."""
-    order = of[np.lexsort((sender[of], far_m[of], rows[of]))]
+def _nearest(entries: IntArray, rows: IntArray, sender: IntArray, far_m: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which of `entries` are among the SLOTS nearest of their row, and at which place, the nearest at 0."""
+    order = entries[np.lexsort((sender[entries], far_m[entries], rows[entries]))]
     place = np.arange(len(order)) - np.searchsorted(rows[order], rows[order])
     return order[place < SLOTS], place[place < SLOTS]

@@ -1,4 +1,8 @@
-"""Walking: straight spells with turns on the spot between them, and away from what is in the way."""
+"""Random walks: straight spells with turns on the spot between them, and turns away from obstacles.
+
+`RandomWalk` draws its turns, `Coverage` also walks away from received neighbours, and `Diffusion` is ARGoS's rule
+without draws. The functions for spells and turns also serve `aggregation.py`.
+"""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
@@ -13,30 +17,30 @@ from swarmwire.comms.messages import Message
 
 
 class Walk(State):
-    """What a walker remembers."""
+    """The memory of a walker."""
 
-    left_m: FloatColumn = column(0.0)  # of the present spell
-    turn_rad: FloatColumn = column(0.0)  # yet to be made before it goes on, positive to the left
+    left_m: FloatColumn = column(0.0)  # remaining length of the spell
+    turn_rad: FloatColumn = column(0.0)  # remaining turn before the spell, positive to the left
 
 
 W = TypeVar("W", bound=Walk)
 
 
 def begin_spells(state: Walk, rows: BoolArray, turn_rad: FloatArray, length_m: FloatArray | float) -> None:
-    """The robots of the mask `rows` turn so far, (n,), and then go straight for so long."""
+    """The robots of the mask `rows` turn by `turn_rad`, (n,), and then go straight for `length_m`."""
     np.copyto(state.turn_rad, wrapped(turn_rad), where=rows)
     np.copyto(state.left_m, length_m, where=rows)
 
 
 def ended(state: Walk) -> BoolArray:
-    """Who has neither a way nor a turn left, (n,)."""
+    """Robots whose spell and turn are both complete, (n,)."""
     return (state.left_m <= 0.0) & (state.turn_rad == 0.0)
 
 
 def turns_away(robots: Robots, faint: float) -> tuple[BoolArray, FloatArray]:
-    """Who has something in the way, and a turn to a heading uniform over the half circle away from it, (n,) each.
+    """Robots with an obstacle ahead, and a turn to a heading uniform over the half circle away from it, (n,) each.
 
-    In the way is what rays of the front half answer to by at least `faint`; it is where their vector sum points.
+    An obstacle is ahead if a ray of the front half answers at least `faint`; its direction is that of their vector sum.
     """
     near, ahead = robots.proximity, np.cos(robots.proximity.angle_rad) > 0.0
     value = np.where(ahead, near.value, 0.0)
@@ -48,7 +52,7 @@ def turns_away(robots: Robots, faint: float) -> tuple[BoolArray, FloatArray]:
 
 
 def walk_on(robots: Robots, state: Walk, speed_mps: float, turn_radps: float, goes: BoolArray | None = None) -> None:
-    """Turn on the spot where a turn is left, else straight on; who is not in the mask `goes` stands."""
+    """Turn on the spot while a turn remains, else go straight; robots outside the mask `goes` stand."""
     period_s, going = robots.period_s, 1.0 if goes is None else goes.astype(np.float64)
     turned = going * np.clip(state.turn_rad, -turn_radps * period_s, turn_radps * period_s)
     linear = going * np.where(state.turn_rad == 0.0, speed_mps, 0.0)
@@ -57,11 +61,8 @@ def walk_on(robots: Robots, state: Walk, speed_mps: float, turn_radps: float, go
     state.left_m -= linear * period_s
 
 
-# --- Random walk: straight spells, and turns at random between them.
-
-
 class RandomWalk(VectorAgent[Walk]):
-    """Straight spells, turns at random between them, and a turn away from what is in the way.
+    """Straight spells, turns at random between them, and a turn away from obstacles.
 
     The length of a spell is exponential of mean `spell_m`, or always that. The turn is from the wrapped Cauchy
     distribution, of which `persistence` is the mean cosine:
@@ -79,11 +80,11 @@ class RandomWalk(VectorAgent[Walk]):
     exponential: bool = True  # lengths are exponential; false: all are spell_m
     persistence: float = 0.0  # mean cosine of the turn between two spells, 0 to 1
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Spells end, and turns too."""
+        """Spells and turns end."""
         check_above_zero(params, "spell_m", "turn_radps", "faint")
         check_share(params, "persistence")
 
@@ -108,14 +109,11 @@ def turns_at_random(robots: Robots, persistence: float) -> FloatArray:
     return 2.0 * np.arctan2((1.0 - persistence) * np.sin(half), (1.0 + persistence) * np.cos(half))
 
 
-# --- Diffusion: drive straight until something is near, then turn away on one wheel.
-
-
 class Diffusion(VectorAgent):
     """ARGoS's diffusion rule (argos3-examples, footbot_diffusion.cpp), by proximity alone.
 
-    The mean of the rays' vectors (value towards angle) says where things are. While it is short and points into the
-    go-straight sector the robot drives straight; otherwise one wheel stops, so that it turns away.
+    The mean of the rays' vectors (value towards angle) gives the direction of obstacles. While it is short and points
+    into the go-straight sector the robot drives straight; otherwise one wheel stops, so that it turns away.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
@@ -136,15 +134,12 @@ class Diffusion(VectorAgent):
         robots.drive(linear_mps=linear, angular_radps=angular)
 
 
-# --- Coverage: a random walk that leads away from the neighbours received.
-
-
 class Present(Message):
-    """What a covering robot broadcasts in every step: that it is there. Range and bearing tell where."""
+    """What a covering robot broadcasts in every step: its presence. Range and bearing give its place."""
 
 
 class Coverage(VectorAgent[Walk]):
-    """Robots spread, and sweep what is between them: a random walk that neighbours received push away.
+    """Robots spread, and sweep the space between them: a random walk that received neighbours push away.
 
     Neighbours push as in the potential field of Howard, Mataric and Sukhatme (2002), which spreads a network of sensors
     over a building and then rests. To go on sweeping, ours turns the directions of a random walk by that push: at the
@@ -152,22 +147,22 @@ class Coverage(VectorAgent[Walk]):
 
         u - repulsion_m2 sum of r / |r|^3,    u a unit vector at random, r from the robot to each neighbour received
 
-    over the packets of the last step alone: there is no memory of who was where. Who hears nobody walks as `RandomWalk`
-    does. Walls push by rays instead of by a field: the next heading is uniform over the half circle away from them.
-    The source's viscous friction, which ends the motion, is left out.
+    over the packets of the last step alone: there is no memory of earlier ones. A robot without packets walks as
+    `RandomWalk`. Walls push by rays instead of by a field: the next heading is uniform over the half circle away from
+    them. The source's viscous friction, which ends the motion, is left out.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
     speed_mps: float = 0.1  # straight ahead
     spell_m: float = 2.0  # mean length of a spell, exponential
     repulsion_m2: float = 1.0  # a neighbour at the root of this, in m, pushes as much as chance
-    nearest_m: float = 0.1  # who is nearer than this pushes as if it were not
+    nearest_m: float = 0.1  # a nearer neighbour pushes as at this range
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # least answer of a ray, 0 to 1, to a thing; above the noise of the bodies' rays
+    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Spells end, turns too, and nobody pushes without bound."""
+        """Spells and turns end, and every push is bounded."""
         check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "faint")
 
     def step(self, robots: Robots, state: Walk) -> None:

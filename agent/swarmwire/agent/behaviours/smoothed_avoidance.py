@@ -1,4 +1,4 @@
-"""Smoothed avoidance: the cure for the threshold rule, a potential field with low-pass and hysteresis."""
+"""Smoothed avoidance: a potential field with low-pass and hysteresis, in place of the threshold rule."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -21,9 +21,9 @@ class Smoothed(State):
 
 
 class SmoothedAvoidance(VectorAgent[Smoothed]):
-    """Around what is near, smoothly, by a laser scan: what the article names as the cure for its threshold rule.
+    """Smooth avoidance of near objects by a laser scan: the article's suggested improvement of its threshold rule.
 
-    The way ahead, of length 1, and `strength` times the repulsion of what is nearer than `reach_m` (see
+    The way ahead, of length 1, and `strength` times the repulsion of objects nearer than `reach_m` (see
     `swarmwire.agent.fields`) add up to where the robot wants to go, at an angle a: it drives at `speed_mps` cos a, 0 if
     that is negative, and turns at `turn_gain_per_s` a. Two things keep that from flickering:
 
@@ -36,11 +36,11 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
-    reach_m: float = 0.5  # what is farther away does not push
+    reach_m: float = 0.5  # farther objects do not push
     strength: float = 40.0  # weight of the repulsion against the way ahead
     speed_mps: float = 0.2  # straight ahead
     turn_gain_per_s: float = 1.5  # turn rate per angle to the wanted direction
-    blocked_rad: float = 1.5708  # from this angle to what is wanted on the side is kept (90 degrees)
+    blocked_rad: float = 1.5708  # from this angle of the field's sum on, the side is kept (90 degrees)
     free_rad: float = 0.7854  # until it has fallen to this (45 degrees)
     smooth_s: float = 0.3  # time constant of the commands' low-pass
 
@@ -63,19 +63,16 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
         robots.note("going on", ~state.blocked)
 
     def repulsion(self, robots: Robots) -> Vectors:
-        """Away from what is near, (n,)."""
+        """Away from near objects, (n,)."""
         scan = robots.scan
         return repulsion_of_ranges(scan.range_m, scan.angle_rad, self.reach_m)
 
     def _keep_side(self, wanted: Vectors, state: Smoothed) -> Vectors:
-        """What is wanted, mirrored to the side to which a blocked robot already turns."""
+        """The wanted vector, mirrored to the side to which a blocked robot already turns."""
         side = np.where(wanted.y < 0.0, -1.0, 1.0)
         state.side = np.where(state.blocked, state.side, side)
         state.blocked = hysteresis(state.blocked, np.abs(wanted.angle_rad), self.blocked_rad, self.free_rad)
         return Vectors(wanted.x, np.where(state.blocked, state.side * np.abs(wanted.y), wanted.y))
-
-
-# --- Smoothed avoidance by short rays around the body.
 
 
 class SmoothedAvoidanceProximity(SmoothedAvoidance):
@@ -92,5 +89,5 @@ class SmoothedAvoidanceProximity(SmoothedAvoidance):
     smooth_s: float = 0.1  # time constant of the commands' low-pass
 
     def repulsion(self, robots: Robots) -> Vectors:
-        """Away from what is near, (n,)."""
+        """Away from near objects, (n,)."""
         return repulsion_of_rays(robots.proximity)

@@ -1,4 +1,9 @@
-"""The ring of a particle swarm: neighbours by index, wherever they are."""
+"""Particle swarm search for a light: the robots are the particles, and the radio is their neighbourhood.
+
+`ring_neighbours` is the optional ring topology, neighbours by index. `Particle` is the memory of a robot, with the
+functions that update it; `ParticleSwarm` is the rule. How a robot measures its motion, sends places and drives is in
+`variants.py`.
+"""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -13,9 +18,11 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, IntColumn, PerRobot, State, VectorAgent, column, per_robot
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
+DARK = -1.0  # below any light: nothing seen or received yet
+
 
 def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -> BoolArray:
-    """Who of the senders (k,) is at most `width` places from the index (k,) of the robot that received it."""
+    """Mask (k,) of senders at most `width` places from the index (k,) of the receiving robot."""
     apart = np.mod(sender - index, count)
     return np.minimum(apart, count - apart) <= width
 
@@ -39,14 +46,8 @@ def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
         raise BadParameter("ring_index", f"{expected}, got {index}")
 
 
-# --- Particle: what a robot of a particle swarm remembers, and how what it senses and hears changes that.
-
-
-DARK = -1.0  # below any light: nothing seen, or received of, yet
-
-
 class Particle(State):
-    """What a particle remembers; vectors lead from the robot, in m, along the axes of the compass."""
+    """The memory of a particle; vectors lead from the robot, in m, along the axes of the compass."""
 
     steps: IntColumn = column(0)
     own_brightness: FloatColumn = column(DARK)
@@ -103,7 +104,7 @@ def look(state: Particle, brightness: FloatArray, again_m: float) -> None:
 
 
 def listen(state: Particle, bests: Bests) -> None:
-    """Of all that was received, keep the brightest of each row; as bright as the one known, it is fresher."""
+    """Keep the brightest received best of each row; one as bright as the known best replaces it, as it is newer."""
     order = np.lexsort((bests.brightness, bests.row))
     last = order[np.flatnonzero(np.diff(bests.row[order], append=-1))]  # of each row
     last = last[bests.brightness[last] >= state.best_brightness[bests.row[last]]]
@@ -111,9 +112,6 @@ def listen(state: Particle, bests: Bests) -> None:
     state.best_brightness[row] = bests.brightness[last]
     state.best_x[row] = bests.x[last]
     state.best_y[row] = bests.y[last]
-
-
-# --- Particle swarm search for a light: the robots are the particles, and the radio is their neighbourhood.
 
 
 P = TypeVar("P", bound=Particle)
@@ -129,7 +127,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     v.
 
     Neighbours are those who are received: all with a radio that reaches all, else those in its range; with
-    `ring_count` only those next to it on a ring of indices, if they are received. What a neighbour told counts for
+    `ring_count` only those next to it on a ring of indices, if they are received. What a neighbour sent counts for
     good, also when it is gone; with `keeps_received = false` up to the next update, which is how a particle swarm in a
     computer asks its neighbourhood.
 
@@ -137,7 +135,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     the own best is measured again, and the mean of all its readings counts, as in Pugh's code for noisy fitness (new
     mean = ((k - 1) mean + reading) / k at the k-th). A robot can measure only where it stands: so a reading counts as
     one of the own best whenever the robot is that near to it, on its way out, when it comes back and while it rests
-    there. What was told is corrected by telling anew, for those who do not keep what they received.
+    there. A best that was sent is corrected by sending it again, for robots that do not keep what they received.
 
     How a robot knows its motion, speaks of places and moves is its subclasses' part.
     """
@@ -148,7 +146,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     own_weight: float = 1.4962  # a: pull of the own best
     neighbour_weight: float = 1.4962  # b: pull of the neighbours' best
     speed_mps: float = 0.1  # straight ahead
-    keeps_received: bool = True  # whether what neighbours told counts for longer than until the next update
+    keeps_received: bool = True  # whether received bests count beyond the next update
     again_m: float = 0.0  # a reading so near to the own best is one more of it; 0: the brightest reading counts
     ring_count: int = 0  # robots on the ring; 0: no ring, all who are received are neighbours
     ring_index: PerRobot[int] = per_robot(0)  # of the robot in the arena: its place on the ring
@@ -165,11 +163,11 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         """How far each robot moved since its last step, in m, (n,) each, along the axes of the compass."""
 
     @abstractmethod
-    def tell(self, robots: Robots, state: P, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, state: P, rows: BoolArray) -> None:
         """Broadcast the own best."""
 
     @abstractmethod
-    def told(self, robots: Robots) -> Bests:
+    def received_bests(self, robots: Robots) -> Bests:
         """Every best that was received."""
 
     @abstractmethod
@@ -177,12 +175,12 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         """Drive on."""
 
     def step(self, robots: Robots, state: P) -> None:
-        """Look, listen, update or tell if it is time, and drive on."""
+        """Look, listen, update or send the best if it is time, and drive on."""
         shift(state, self.moved(robots, state))
         look(state, np.add.reduce(robots.light.value, 1), self.again_m)
-        listen(state, self._of_neighbours(self.told(robots)))
+        listen(state, self._of_neighbours(self.received_bests(robots)))
         self._update(robots, state, state.steps % self.update_every_ticks == 0)
-        self.tell(robots, state, (state.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
+        self.send_best(robots, state, (state.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
         self.head_for_target(robots, state)
         state.steps += 1
 

@@ -1,4 +1,8 @@
-"""Particles that are told where they are, and tell one another places."""
+"""Variants of the particle swarm search: by global positions or by dead reckoning, on wheels or as a point.
+
+`PsoSearch` uses only what a robot measures itself: wheels, compass, and a radio with range and bearing.
+`PsoSearchPositioned` uses global positions, and `PsoModel` is its point-particle model.
+"""
 
 from typing import ClassVar, Generic, TypeVar
 
@@ -21,7 +25,7 @@ class BestPlace(Message):
 
 
 class PositionedParticle(Particle):
-    """A particle that is told where it is, in m, arena frame."""
+    """A particle with positioning, in m, arena frame."""
 
     x_m: FloatColumn = column(np.nan)  # as in its last step
     y_m: FloatColumn = column(np.nan)
@@ -38,21 +42,18 @@ class ParticlesByPlaces(ParticleSwarm[PositionedParticle]):
         state.y_m[:] = here.y_m
         return Vectors(x, y)
 
-    def tell(self, robots: Robots, state: PositionedParticle, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, state: PositionedParticle, rows: BoolArray) -> None:
         """The own best, as a place."""
         here = robots.positioning
         x, y = here.x_m + state.own_x, here.y_m + state.own_y
         robots.radio.send(BestPlace, rows=rows, brightness=state.own_brightness, x_m=x, y_m=y)
 
-    def told(self, robots: Robots) -> Bests:
+    def received_bests(self, robots: Robots) -> Bests:
         """Places of those that were received, seen from here."""
         received = robots.radio.received(BestPlace)
         here = robots.positioning
         x, y = received.message.x_m - here.x_m[received.row], received.message.y_m - here.y_m[received.row]
         return Bests(received.row, received.sender, received.message.brightness, x, y)
-
-
-# --- Particles on wheels: to the target, and away from what is near.
 
 
 P = TypeVar("P", bound=Particle)
@@ -66,16 +67,13 @@ class ParticlesOnWheels(ParticleSwarm[P], Generic[P]):
     turn_gain_per_s: float = 3.0  # turn rate per angle to the wanted direction
 
     def head_for_target(self, robots: Robots, state: P) -> None:
-        """To the target, and away from what is near."""
+        """To the target, and away from near objects."""
         bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
         pull = np.where(np.hypot(state.target_x, state.target_y) < self.arrived_m, 0.0, 1.0)
         wanted = pull * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
         angle, push = wanted.angle_rad, np.minimum(wanted.length, 1.0)
         linear = self.speed_mps * push * np.maximum(np.cos(angle), 0.0)
         robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * push * angle)
-
-
-# --- The point-particle model of the search: particle swarm optimisation at the robots' speed and with their radio.
 
 
 class PsoModel(ParticlesByPlaces):
@@ -95,9 +93,6 @@ class PsoModel(ParticlesByPlaces):
         bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
         speed = np.minimum(self.speed_mps, away / robots.period_s)
         robots.drive(linear_mps=speed * np.cos(bearing), angular_radps=0.0, lateral_mps=speed * np.sin(bearing))
-
-
-# --- Particle swarm search by what a robot itself can sense: wheels, compass, and a radio that tells range and bearing.
 
 
 class BestVector(Message):
@@ -133,19 +128,16 @@ class PsoSearch(ParticlesOnWheels[WheeledParticle]):
         state.right_m[:] = wheels.right_m
         return forward * along(robots.compass.heading_rad)
 
-    def tell(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
         """The own best, as a vector from here."""
         robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
 
-    def told(self, robots: Robots) -> Bests:
+    def received_bests(self, robots: Robots) -> Bests:
         """Bests of those that were received, seen from here."""
         received = robots.radio.received(BestVector)
         place = received.range_m * along(received.bearing_rad + robots.compass.heading_rad[received.row])
         place += Vectors(received.message.x_m, received.message.y_m)
         return Bests(received.row, received.sender, received.message.brightness, place.x, place.y)
-
-
-# --- Particle swarm search by global positions, for a body with `positioning`.
 
 
 class PsoSearchPositioned(ParticlesByPlaces, ParticlesOnWheels[PositionedParticle]):
