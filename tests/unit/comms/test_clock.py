@@ -76,7 +76,7 @@ def test_a_precise_clock_learns_how_late_its_sleeps_end_and_ends_them_on_time() 
     inner.late_ns = 0
     for _ in range(100):
         clock.sleep_until(inner.time_ns + 10_000_000)
-    assert clock._wakes_late_ns < 10_000  # it does not wait awake for long where sleeps end on time
+    assert clock._wake_latency_ns < 10_000  # it does not wait awake for long where sleeps end on time
 
 
 def test_a_precise_clock_does_not_sleep_for_what_is_near_or_past_nor_wait_awake_for_a_machine_that_is_busy() -> None:
@@ -86,7 +86,7 @@ def test_a_precise_clock_does_not_sleep_for_what_is_near_or_past_nor_wait_awake_
     clock.sleep_until(inner.time_ns + 20_000)
     assert not inner.slept_until
     clock.sleep_until(inner.time_ns + 10_000_000)
-    assert clock._wakes_late_ns <= 500_000
+    assert clock._wake_latency_ns <= 500_000
 
 
 class DatedClock(FakeClock):

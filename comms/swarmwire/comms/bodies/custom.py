@@ -23,9 +23,9 @@ class CustomSensorSpec(RangedSensorSpec):
     """A sensor with a custom class; other keys of its table are parameters of that class. Readings: its fields."""
 
     kind: str = parameter(
-        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+        help='"file.py:Class" beside the body file, "package.module:Class", or the name of an entry point'
     )
-    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    params: dict[str, Any] = parameter(help="keys of the class, as in the body file; agents do not get them")
     fields: dict[str, int] = parameter(help="the class's fields and their widths; 0: a number per robot")
 
 
@@ -63,9 +63,9 @@ class CustomActuatorSpec:
     """An actuator with a custom class; agents set it by `robot.actuate(name, …)`."""
 
     kind: str = parameter(
-        help='"file.py:Class" beside the sheet, "package.module:Class", or the name of an entry point'
+        help='"file.py:Class" beside the body file, "package.module:Class", or the name of an entry point'
     )
-    params: dict[str, Any] = parameter(help="keys of the class, as the sheet gives them; agents are not told")
+    params: dict[str, Any] = parameter(help="keys of the class, as in the body file; agents do not get them")
     width: int = parameter(0, help="how many numbers it takes; 0: not known yet")
 
 

@@ -52,7 +52,9 @@ class CameraSpec(SensorSpec):
     aperture_deg: float = parameter(
         help="angle between straight down and the farthest that it sees", unit="deg", above=0, below=90
     )
-    most_blobs: int = parameter(32, help="blobs told at most: the nearest ones", at_least=1, at_most=1000)
+    most_blobs: int = parameter(
+        32, help="largest number of blobs in a reading: the nearest ones", at_least=1, at_most=1000
+    )
     noise_relative: float = parameter(
         0.0, help="standard deviation of the error of a distance, as a share of it", at_least=0, at_most=1
     )

@@ -32,7 +32,7 @@ class RobotSettingsBits(IntFlag):
 
     NONE = 0
     CALIBRATE = 1  # of the proximity sensors: takes a second, with nothing near
-    AVOID = 2  # the robot bends what it is told away from obstacles
+    AVOID = 2  # the robot steers commands away from obstacles
     SET_STEPS = 4  # the two numbers are what the step counters are to show, not speeds
 
 

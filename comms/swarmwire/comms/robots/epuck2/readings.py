@@ -17,7 +17,7 @@ from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S
 
 PROXIMITY_FULL = 4095  # 12 bits
 AMBIENT_DARK = 4000  # what the proximity sensors tell of ambient light in the dark
-GROUND_BLACK, GROUND_WHITE = 0, 1000  # of robots whose ground sensors nobody has measured
+GROUND_BLACK, GROUND_WHITE = 0, 1000  # of robots with uncalibrated ground sensors
 SEES_NOTHING_MM = 8190  # what the time-of-flight sensor tells then
 DISTANCE_AHEAD_M = 0.035  # of the body's centre: where the time-of-flight sensor sits
 PER_G = 800  # of the accelerometer
@@ -33,7 +33,7 @@ Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width)
 
 
 def proximity(raw: AnyArray) -> FloatArray:
-    """What the sheet's response curve answers, 0 to 1."""
+    """The value of the spec's response curve, 0 to 1."""
     return np.minimum(raw / PROXIMITY_FULL, 1.0)
 
 
@@ -58,12 +58,12 @@ def shade(raw: AnyArray, black: float, white: float) -> FloatArray:
 
 
 def to_shade(value: FloatArray) -> AnyArray:
-    """The inverse of `shade`, of sensors that nobody has measured."""
+    """The inverse of `shade`, of uncalibrated sensors."""
     return _whole(GROUND_BLACK + value * (GROUND_WHITE - GROUND_BLACK), GROUND_BLACK, GROUND_WHITE)
 
 
 def distance_m(raw: AnyArray, spec: ScanSpec) -> FloatArray:
-    """The distance from where the sheet has the scanner; inf beyond its range."""
+    """The distance from the scanner of the spec; inf beyond its range."""
     range_m = raw / 1000.0 + (DISTANCE_AHEAD_M - spec.at_m)
     return np.where(range_m > spec.range_m, np.inf, np.maximum(range_m, spec.range_min_m))
 

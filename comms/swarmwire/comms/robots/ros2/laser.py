@@ -71,7 +71,7 @@ def returns_m(message: Any) -> FloatArray:
 
 
 def laser_scan(messages: Messages, spec: ScanSpec, range_m: FloatArray, stamp_ns: int) -> Any:
-    """The message of a reading (rays,) of the sheet's scanner, all of whose rays were taken at once."""
+    """The message of a reading (rays,) of the spec's scanner, all of whose rays were taken at once."""
     first_rad = float(np.deg2rad(spec.first_deg))
     return messages.make(
         LASER_SCAN,
@@ -145,7 +145,7 @@ class LaserAsScan:
         self._unseen = np.empty(0, np.bool_)
 
     def range_m(self, message: Any) -> FloatArray:
-        """The reading (rays,), from the sheet's `range_min_m` to its range, inf where nothing is within it.
+        """The reading (rays,), from the spec's `range_min_m` to its range, inf where nothing is within it.
 
         BadFrame if the message's rays cannot lie as it says.
         """

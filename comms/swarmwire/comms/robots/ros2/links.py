@@ -43,7 +43,7 @@ def open_router(endpoint: str) -> tuple[zenoh.Session, str]:
 
 
 def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
-    """A client of the router at `endpoint`, tried for `connect_s`; zenoh.ZError if nobody answers."""
+    """A client of the router at `endpoint`, tried for `connect_s`; zenoh.ZError if there is no answer."""
     connect = {
         "endpoints": [endpoint],
         "timeout_ms": round(connect_s * 1000),
