@@ -1,4 +1,4 @@
-"""The books of the medium: packets and receivers counted between two reports."""
+"""Packet counters of the medium, and the liveness history that decides the intended receivers of broadcasts."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -13,12 +13,12 @@ from swarmwire.comms.truth import PacketCounts
 
 
 class PacketCounters:
-    """Counts by arena. Over a run, `end` of the medium included, the fates add up to the intended receivers.
+    """Counts by arena. Over a run, with `end` of the medium, the fates add up to the intended receivers.
 
-    - `sent`, `intended`: when a packet is handed to the medium, refused packets included.
-    - `fates`: when a fate becomes final, once for each intended receiver.
-    - `in_range`: with the fate, for receivers that range and walls did not keep off; also those that a packet refused
-      for a full queue would have had. Never those of packets too large or in flight at the end.
+    - `sent`, `intended`: counted when a packet is sent, refused packets included.
+    - `fates`: counted when a fate becomes final, once for each intended receiver.
+    - `in_range`: counted with the fate, for receivers that range and walls allow; also for those that a packet refused
+      by a full queue would have had. Never for packets too large or in flight at the end.
     """
 
     def __init__(self, arenas: int, robots: int) -> None:
@@ -26,7 +26,7 @@ class PacketCounters:
         self._open()
 
     def take_up(self, packets: Transmissions) -> None:
-        """Count packets that were handed to the medium."""
+        """Count packets that were sent."""
         arena = packets.sender // self._robots
         np.add.at(self._sent, arena, 1)
         np.add.at(self._intended, arena, packets.intended)
@@ -37,20 +37,20 @@ class PacketCounters:
         _settle(*columns, until_ns, self._robots, self._fates, self._in_range)
 
     def strand(self, links: Links, queued: Transmissions) -> None:
-        """Count what the end of the run leaves under way or queued."""
+        """Count the links under way and the queued packets at the end of the run as IN_FLIGHT."""
         np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receivers)
         np.add.at(self._fates[:, Fate.IN_FLIGHT], queued.sender // self._robots, queued.intended)
 
     def close(self, arenas: BoolArray | None = None) -> PacketCounts:
-        """What was counted since the last report; of these arenas (arenas,) alone if they are given."""
-        tally = PacketCounts(self._sent, self._intended, self._in_range, self._fates)
+        """The counts since the last call; those of `arenas` (arenas,) alone if given."""
+        counts = PacketCounts(self._sent, self._intended, self._in_range, self._fates)
         self._open()
         if arenas is None:
-            return tally
-        others = tally.of(~arenas)
+            return counts
+        others = counts.of(~arenas)
         self._sent, self._intended = others.sent, others.intended
         self._in_range, self._fates = others.in_range, others.fates
-        return tally.of(arenas)
+        return counts.of(arenas)
 
     def _open(self) -> None:
         self._sent, self._intended, self._in_range = (np.zeros(self._arenas, np.int64) for _ in range(3))
@@ -66,38 +66,38 @@ def _settle(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fa
             in_range_out[arena] += in_range[i]
 
 
-# --- Who was alive when a packet was sent: those are the receivers that a broadcast intends.
-
-
 class LivenessHistory:
-    """Robots alive by epoch; an epoch begins whenever a robot dies or is revived."""
+    """Robots alive by epoch; an epoch begins whenever a robot dies or is revived.
+
+    A broadcast intends the robots that were alive when it was sent.
+    """
 
     def __init__(self, rows: int) -> None:
         self.epoch = 0
         self._alive: dict[int, BoolArray] = {0: np.ones(rows, np.bool_)}
 
     def now(self, alive: BoolArray) -> None:
-        """These robots (rows,) are alive from now on."""
+        """The robots `alive` (rows,) are alive from now on."""
         if not np.array_equal(alive, self._alive[self.epoch]):
             self.epoch += 1
             self._alive[self.epoch] = alive.copy()
 
     @property
     def any_dead(self) -> bool:
-        """Whether anybody was dead in an epoch that matters."""
+        """Whether any robot was dead in a kept epoch."""
         return not all(alive.all() for alive in self._alive.values())
 
     def intended(self, epoch: IntArray, receiver: IntArray) -> BoolArray:
-        """Which robot rows `receiver` were alive in the epochs given, (k,)."""
-        found = np.ones(len(receiver), np.bool_)
-        for one, alive in self._alive.items():
+        """Whether each robot row `receiver` was alive in its `epoch`, (k,)."""
+        is_intended = np.ones(len(receiver), np.bool_)
+        for number, alive in self._alive.items():
             if not alive.all():
-                of_epoch = epoch == one
-                found[of_epoch] = alive[receiver[of_epoch]]
-        return found
+                in_epoch = epoch == number
+                is_intended[in_epoch] = alive[receiver[in_epoch]]
+        return is_intended
 
     def forget(self, queued: IntArray) -> None:
-        """Drop the epochs in which none of the packets still queued was sent."""
+        """Drop the epochs of no queued packet; `queued` holds the epochs of queued packets."""
         if len(self._alive) > 1:
             needed = {self.epoch, *np.unique(queued).tolist()}
-            self._alive = {one: alive for one, alive in self._alive.items() if one in needed}
+            self._alive = {number: alive for number, alive in self._alive.items() if number in needed}

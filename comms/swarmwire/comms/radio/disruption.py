@@ -1,4 +1,4 @@
-"""Jammers: what sends noise, where, how strong, and when."""
+"""Active effects on the medium: dead robots, radios that are off, partitions, gain changes and jammers."""
 
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -11,11 +11,11 @@ NO_ROBOTS = -1
 
 
 class Jammers(NamedTuple):
-    """A row per jammer and arena: on for `on_ns` of each period, which begins at its phase, and off for the rest."""
+    """Noise sources, a row per jammer and arena: on for `on_ns` of each period, which starts at its phase."""
 
     arena: IntArray  # (k,)
-    carrier: IntArray  # (k,) robot row with which it moves, or NO_ROBOT
-    x_m: FloatArray  # (k,) where it stands, if nobody carries it
+    carrier: IntArray  # (k,) robot row that carries it, or NO_ROBOT
+    x_m: FloatArray  # (k,) its place, if no robot carries it
     y_m: FloatArray  # (k,)
     power_dbm: FloatArray  # (k,) radiated
     on_ns: IntArray  # (k,)
@@ -35,21 +35,21 @@ class Jammers(NamedTuple):
         return Jammers._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
 
     def places(self, pose: FloatArray) -> FloatArray:
-        """Where each is while robots stand at `pose` (rows, 3): x and y in m, (k, 2)."""
-        own = np.stack([self.x_m, self.y_m], axis=1)
-        return np.where((self.carrier == NO_ROBOTS)[:, None], own, pose[self.carrier, :2])
+        """Place of each jammer with robots at `pose` (rows, 3): x and y in m, (k, 2)."""
+        fixed = np.stack([self.x_m, self.y_m], axis=1)
+        return np.where((self.carrier == NO_ROBOTS)[:, None], fixed, pose[self.carrier, :2])
 
     def is_on(self, at_ns: int) -> BoolArray:
-        """Which are on at a time, and from it on, (k,)."""
+        """Whether each jammer is on from `at_ns` on, (k,)."""
         return (at_ns - self.phase_ns) % self.period_ns < self.on_ns
 
     @property
     def duty(self) -> FloatArray:
-        """The share of time for which each is on, (k,)."""
+        """Duty cycle: the share of time for which each jammer is on, (k,)."""
         return self.on_ns / self.period_ns
 
     def toggles(self, from_ns: int, until_ns: int) -> tuple[IntArray, IntArray]:
-        """When jammers go on or off from `from_ns` on and before `until_ns`, and which, in the order (time, row)."""
+        """Switching times in [`from_ns`, `until_ns`) and the jammers that switch, in the order (time, row)."""
         at_ns, which = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for row in np.flatnonzero(self.on_ns < self.period_ns).tolist():
             period_ns = self.period_ns[row]
@@ -63,11 +63,8 @@ class Jammers(NamedTuple):
         return times_ns[order], rows[order]
 
 
-# --- What keeps robots from sending and hearing, whatever the medium would do.
-
-
-# What becomes of the packets that a radio should send while it is off: DROP, they end at the usual pace; NEWEST, the
-# newest waits until it is on again; ALL, they wait in its queue.
+# Outage queue policies, for packets that a radio is to send while it is off: DROP, they end at the usual pace; NEWEST,
+# the newest waits until the radio is on again; ALL, they wait in its queue.
 BACKLOGS = ("drop", "newest", "all")
 DROP, NEWEST, ALL = range(3)
 
@@ -78,57 +75,57 @@ class Disruption:
 
     alive: BoolArray  # (rows,)
     radio_on: BoolArray  # (rows,)
-    backlog: IntArray  # (rows,) DROP, NEWEST or ALL: for when the radio is off
-    sides: IntArray  # (partitions, rows) each robot's set in each partition, from 1; 0: in none
-    one_way: IntArray  # (partitions, rows) the same, of those in which only the second does not hear the first
-    send_gain_db: FloatArray  # (rows,) added to the strength of all that a robot sends
-    receive_gain_db: FloatArray  # (rows,) added to the strength of all that a robot hears
+    backlog: IntArray  # (rows,) DROP, NEWEST or ALL: policy while the radio is off
+    sides: IntArray  # (partitions, rows) set of each robot in each partition, from 1; 0: in none
+    one_way: IntArray  # (partitions, rows) as `sides`; only set 2 does not receive from set 1
+    send_gain_db: FloatArray  # (rows,) added to the power of all that a robot sends
+    receive_gain_db: FloatArray  # (rows,) added to the power of all that a robot receives
     jammers: Jammers
 
     @classmethod
     def none(cls, rows: int) -> "Disruption":
-        """All are alive, with radios on, and no one is kept from anyone."""
-        nobody = np.empty((0, rows), np.int64)
+        """No disruption: all robots alive, all radios on, no partitions."""
+        no_sets = np.empty((0, rows), np.int64)
         return cls(
             alive=np.ones(rows, np.bool_),
             radio_on=np.ones(rows, np.bool_),
             backlog=np.full(rows, DROP),
-            sides=nobody,
-            one_way=nobody,
+            sides=no_sets,
+            one_way=no_sets,
             send_gain_db=np.zeros(rows),
             receive_gain_db=np.zeros(rows),
             jammers=Jammers.none(),
         )
 
     def become(self, other: "Disruption") -> None:
-        """Take over all that holds in another; the arrays are shared."""
+        """Copy all fields of `other`; the arrays are shared."""
         for of in fields(self):
             setattr(self, of.name, getattr(other, of.name))
 
     @property
     def anything(self) -> bool:
-        """Whether anybody is kept from anything."""
+        """Whether any robot is dead, any radio off, or any partition active."""
         return len(self.sides) + len(self.one_way) > 0 or self.anyone_out
 
     @property
     def anyone_out(self) -> bool:
-        """Whether anybody is dead, or a radio off."""
+        """Whether any robot is dead or any radio off."""
         return not (self.alive.all() and self.radio_on.all())
 
     @property
     def backlog_now(self) -> IntArray:
-        """What waits at each radio until it is on again, (rows,): NEWEST or ALL; DROP where nothing does."""
+        """Policy at each radio that is off, (rows,): NEWEST or ALL; DROP where nothing is held."""
         return np.where(self.radio_on | ~self.alive, DROP, self.backlog)
 
     def apart(self, sender: IntArray, receiver: IntArray) -> BoolArray:
-        """From which senders some partition keeps which receivers, pairs of robot rows, (k,)."""
-        found = np.zeros(len(sender), np.bool_)
+        """Whether a partition separates each sender from its receiver, robot rows, (k,)."""
+        separated = np.zeros(len(sender), np.bool_)
         for side in self.sides:
-            found |= (side[sender] != side[receiver]) & (side[sender] > 0) & (side[receiver] > 0)
+            separated |= (side[sender] != side[receiver]) & (side[sender] > 0) & (side[receiver] > 0)
         for side in self.one_way:
-            found |= (side[sender] == 1) & (side[receiver] == 2)
-        return found
+            separated |= (side[sender] == 1) & (side[receiver] == 2)
+        return separated
 
     def joined(self, a: IntArray, b: IntArray) -> BoolArray:
-        """Which pairs of robot rows have radios that are on, and no partition between them either way, (k,)."""
+        """Whether both radios of each pair of robot rows are on, and no partition separates them either way, (k,)."""
         return self.radio_on[a] & self.radio_on[b] & ~self.apart(a, b) & ~self.apart(b, a)

@@ -1,4 +1,4 @@
-"""What becomes of packets at their receivers, as a table: the one thing that all stages of the channel work on."""
+"""The table of links, on which all stages of the channel work: fates of packets at their receivers."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -16,22 +16,23 @@ RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
 
 class Links(NamedTuple):
-    """A row per packet and receiver that it might reach, and one row per packet for the rest of its intended receivers.
+    """A row per packet and possible receiver, and one row per packet for the rest of its intended receivers.
 
-    That last row (receiver THE_REST) only counts: out of range by subtraction, or the fate that the sender's radio gave
-    to all. Stages never see it. Fate RECEIVED means, until the chain has ended, "nothing has stopped it so far".
+    The row for the rest (receiver THE_REST) only counts: receivers out of range by subtraction, or all receivers with
+    the fate at the sender's radio. Stages never see it. Until the chain has ended, fate RECEIVED means "still under
+    way".
     """
 
     packet: IntArray  # (k,) row in the table of transmissions
     sender: IntArray  # (k,) robot row
     receiver: IntArray  # (k,) robot row, or THE_REST
     sequence: IntArray  # (k,) of the packet
-    receivers: IntArray  # (k,) how many intended receivers the row stands for
-    in_range: IntArray  # (k,) how many of them were in range after path loss and walls
+    receivers: IntArray  # (k,) number of intended receivers of the row
+    in_range: IntArray  # (k,) number of them in range after path loss and walls
     fate: IntArray  # (k,) a Fate
-    final_at_ns: IntArray  # (k,) when the fate becomes final
+    final_at_ns: IntArray  # (k,) time at which the fate becomes final
     rssi_dbm: FloatArray  # (k,) strength at the receiver; NaN where there is none
-    given: FloatArray  # (k, columns) what the receiver learns, in the order of the radio's `measures.columns`
+    given: FloatArray  # (k, columns) measurements of the receiver, in the order of the radio's `measures.columns`
 
     @classmethod
     def under_way(
@@ -43,7 +44,7 @@ class Links(NamedTuple):
         final_at_ns: IntArray,
         columns: int,
     ) -> "Links":
-        """Links that nothing has stopped so far, as the first stage gets them."""
+        """Links still under way, as input of the first stage."""
         k = len(packet)
         one, zero = np.ones(k, np.int64), np.full(k, RECEIVED, np.int64)
         given, rssi_dbm = np.zeros((k, columns)), np.full(k, np.nan)
@@ -53,10 +54,10 @@ class Links(NamedTuple):
     def with_the_rest(
         cls, packets: Transmissions, packet: IntArray, receiver: IntArray, in_range: IntArray, columns: int
     ) -> "Links":
-        """Links of packets that go on air, which nothing has stopped so far, then the row of each packet for the rest.
+        """Links still under way of packets that go on air, then the row of each packet for the rest.
 
-        `packet` and `receiver` are those of the links; `in_range` (packets,) are the receivers that a packet would have
-        reached that never goes on air, else 0.
+        `packet` and `receiver` are columns of the links. `in_range` (packets,) is the number of receivers in range of a
+        packet that never goes on air, else 0.
         """
         sender, sequence, off_air_at_ns = packets.sender, packets.sequence, packets.off_air_at_ns
         numbers = _with_the_rest(
@@ -76,7 +77,7 @@ class Links(NamedTuple):
         return Links._make(column.take(index, axis=0) for column in self)
 
     def first(self, rows: int) -> "Links":
-        """The first so many rows; what is changed in them changes here."""
+        """The first `rows` rows, as views."""
         return Links._make(column[:rows] for column in self)
 
     def followed_by(self, later: "Links") -> "Links":
@@ -88,7 +89,7 @@ class Links(NamedTuple):
 
 @njit(cache=True)
 def _with_the_rest(packet, receiver, sender, sequence, off_air_at_ns, intended, fate, in_range):
-    """The columns of `Links` that are whole numbers, in their order, (8, links + packets)."""
+    """The integer columns of `Links` in their order, (8, links + packets)."""
     links, packets = len(packet), len(sender)
     table = np.empty((8, links + packets), np.int64)
     others = intended.copy()

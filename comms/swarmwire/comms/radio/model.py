@@ -1,4 +1,4 @@
-"""A way through the medium: what the medium asks of it, whatever the radio's model."""
+"""The interface of a radio model: the unit disk and the PHY implement it."""
 
 from abc import ABC, abstractmethod
 
@@ -16,49 +16,49 @@ Decided = tuple[Transmissions, Links]
 class RadioModel(ABC):
     """From the senders' radios to the receivers.
 
-    What `pass_time` and `disrupt` return are packets and what becomes of them at their receivers (`packet` is the row
-    in those packets); a fate may become final later than the time that has passed.
+    `pass_time` and `disrupt` return packets and their links with fates (`packet` is the row in those packets). A fate
+    may become final later than the time that has passed.
     """
 
     @property
     @abstractmethod
     def queued(self) -> Transmissions:
-        """Packets that still wait, or are under way."""
+        """Packets that wait or are on air."""
 
     @abstractmethod
     def hold(self, pose: FloatArray) -> None:
-        """Robots stand at `pose` (rows, 3) from now on, under the disruption that holds; the array stays as it is."""
+        """Robots are at `pose` (rows, 3) from now on, under the active disruption; the array must not change."""
 
     @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:
-        """The radio has other numbers from `at_ns` on; what waits or is on air stays so."""
+        """Use the parameters of `radio` from `at_ns` on; packets that wait or are on air stay."""
 
     @abstractmethod
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Queue packets that robots hand over at `sent_at_ns` (rows,); they as the radios take them up.
+        """Queue packets that robots send at `sent_at_ns` (rows,); returns them as admitted.
 
-        `others_alive` (rows,) are whom a broadcast intends.
+        `others_alive` (rows,) is the number of intended receivers of a robot's broadcast.
         """
 
     @abstractmethod
-    def pass_time(self, until_ns: int, lives: LivenessHistory) -> Decided:
+    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
         """Let time pass to just before `until_ns`."""
 
     @abstractmethod
-    def disrupt(self, at_ns: int, coming: Disruption, lives: LivenessHistory) -> Decided:
-        """Robots that are dead from now on lose their queues, radios that are off what they receive.
+    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
+        """Apply a disruption: dead robots lose their queues, radios that are off lose their receptions.
 
-        Called while anybody is dead or off, and once when nobody is any more: queues that waited go on air.
+        Called while any robot is dead or any radio off, and once when none is any more: held queues then go on air.
         """
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
-        """What senders have learned since the last call, those `alive` (rows,); nothing without acknowledgements."""
+        """Transmit statuses since the last call, of senders `alive` (rows,); none without acknowledgements."""
         return NO_TX_STATUSES
 
     @abstractmethod
     def drain(self) -> Transmissions:
-        """Take out all that is queued or under way: the run is over. `intended` are the receivers not told of yet."""
+        """End of the run: take out all packets queued or on air; `intended` counts receivers without a fate."""
 
     @abstractmethod
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Pairs of robot rows a < b joined in the radio graph, sorted, (e, 2)."""
+        """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""

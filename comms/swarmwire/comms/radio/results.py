@@ -1,7 +1,7 @@
-"""The order in which robots get what they received.
+"""Results of the medium: received packets in delivery order, and records of links whose fate became final.
 
-Rows are indexed by unsigned numbers throughout: of signed ones compiled code asks each time whether they count from
-the end, which takes three times as long.
+Kernels index rows by unsigned integers: compiled code checks signed ones for counting from the end, which takes three
+times as long.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -21,14 +21,14 @@ from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRe
 
 @njit(cache=True)
 def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
-    """The rows of `index` (k,), at least one, by (receiver, received_at, sender), ties as they stand, (k,)."""
+    """The rows of `index` (k,), at least one, sorted by (receiver, received_at, sender); stable, (k,)."""
     order = index.view(np.uint64)
     for k in range(1, len(order)):
-        if sender[order[k]] < sender[order[k - 1]]:  # seldom: packets of a tick stand by sender
+        if sender[order[k]] < sender[order[k - 1]]:  # seldom: packets of a tick are sorted by sender
             order = _counting_sort(order, sender, rows)
             break
-    # Roughly by time, then by receiver: next to nothing is left to move.
-    order = _counting_sort(order, *_parts_of_time(order, received_at_ns))
+    # Roughly by time, then by receiver: the insertion sort then moves almost nothing.
+    order = _counting_sort(order, *_time_parts(order, received_at_ns))
     order = _counting_sort(order, receiver, rows)
     _insertion_sort(order, receiver, received_at_ns)
     return order.view(np.int64)
@@ -36,7 +36,7 @@ def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, s
 
 @njit(cache=True)
 def _counting_sort(order, key, keys):
-    """`order` by key[row], 0 to keys - 1, ties as they stand."""
+    """`order` sorted by key[row], 0 to keys - 1; stable."""
     start = np.zeros(keys + 1, np.int64)
     places = key.view(np.uint64)
     for row in order:
@@ -46,14 +46,14 @@ def _counting_sort(order, key, keys):
     out = np.empty_like(order)
     for row in order:
         place = np.uint64(start[places[row]])
-        start[places[row]] += 1  # before `out` is written, or the processor waits to see whether that changed it
+        start[places[row]] += 1  # before the write to `out`, which the processor would otherwise wait for
         out[place] = row
     return out
 
 
 @njit(cache=True)
-def _parts_of_time(order, at_ns):
-    """Into which of equal parts of time each row falls, about as many as rows, and how many parts there are."""
+def _time_parts(order, at_ns):
+    """The part of time of each row, for about as many equal parts as rows; and the number of parts."""
     first_ns = last_ns = at_ns[order[0]]
     for row in order:
         first_ns, last_ns = min(first_ns, at_ns[row]), max(last_ns, at_ns[row])
@@ -68,31 +68,28 @@ def _parts_of_time(order, at_ns):
 
 @njit(cache=True)
 def _insertion_sort(order, receiver, at_ns):
-    """Rows that stand by receiver, by time within each; in place, ties as they stand."""
+    """Sort rows that are grouped by receiver by time within each group; in place, stable."""
     for k in range(1, len(order)):
-        moved, place = order[k], k
-        while place > 0 and receiver[order[place - 1]] == receiver[moved] and at_ns[order[place - 1]] > at_ns[moved]:
+        value, place = order[k], k
+        while place > 0 and receiver[order[place - 1]] == receiver[value] and at_ns[order[place - 1]] > at_ns[value]:
             order[place] = order[place - 1]
             place -= 1
-        order[place] = moved
-
-
-# --- What the medium tells after time has passed: packets received, and links whose fate became final.
+        order[place] = value
 
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """What became final while time passed."""
+    """Results of one `advance`: received packets, final records, counts and transmit statuses."""
 
     received: ReceivedPackets
     finished: ReceptionRecords
     departed: TransmissionRecords
     tally: PacketCounts
-    tx_status: TxStatuses  # of packets whose senders ask and are alive
+    tx_status: TxStatuses  # of packets with a requested status, of senders that are alive
 
 
 class FinalFates(NamedTuple):
-    """What became final in a part of a tick."""
+    """Results that became final in a part of a tick."""
 
     received: ReceivedPackets
     finished: ReceptionRecords
@@ -101,18 +98,18 @@ class FinalFates(NamedTuple):
 
     @property
     def anything(self) -> bool:
-        """Whether anything did."""
+        """Whether there are any results."""
         return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.tx_status))
 
     def of(self, arenas: BoolArray, robots: int) -> "FinalFates":
-        """What concerns these arenas (arenas,) of so many robots each."""
+        """The results of arenas `arenas` (arenas,), of `robots` robots each."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
         return FinalFates(received, self.finished.of(arenas), self.departed.of(arenas), tx_status)
 
 
 def joined(parts: list[FinalFates]) -> FinalFates:
-    """What became final in all parts, one or more."""
+    """The results of all parts, one or more."""
     if len(parts) == 1:
         return parts[0]
     received, finished, departed, tx_status = (list(of) for of in zip(*parts, strict=True))
@@ -125,23 +122,23 @@ def joined(parts: list[FinalFates]) -> FinalFates:
 
 
 class Parted(NamedTuple):
-    """Rows of links by what is to be told of them, rising; one may be in several."""
+    """Rows of links by kind of result, rising; a row may have several kinds."""
 
     received: IntArray
-    finished: IntArray  # final, but for receivers out of range
-    departed: IntArray  # final, of packets that left their sender's radio: each has one row for the rest
+    finished: IntArray  # final, without receivers out of range
+    departed: IntArray  # final rows for the rest: one for each packet that left its sender's radio
     open: IntArray  # not final yet
 
 
 @njit(cache=True)
 def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int) -> Parted:
-    """The rows of links of which something is final by `until_ns`, and the others."""
+    """The rows of links that are final by `until_ns` by kind of result, and the open ones."""
     k = len(fate)
     received, finished = np.empty(k, np.int64), np.empty(k, np.int64)
     departed, still_open = np.empty(k, np.int64), np.empty(k, np.int64)
     h, f, d, o = 0, 0, 0, 0
     for row in range(k):
-        # Written first and kept if it counts, so that there is no branch to guess.
+        # Branchless: write first, then advance if it counts.
         received[h], finished[f], departed[d], still_open[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
         h += final & (fate[row] == RECEIVED)
@@ -154,7 +151,7 @@ def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: 
 def received(
     index: IntArray, links: Links, packets: Transmissions, measures: tuple[str, ...], robots: int, rows: int
 ) -> ReceivedPackets:
-    """The links `index` were received; sorted by (receiver, received_at, sender, sequence)."""
+    """Received packets of the links `index`, sorted by (receiver, received_at, sender, sequence)."""
     if not len(index):
         return ReceivedPackets.none(measures)
     index = by_receiver(index, links.receiver, links.final_at_ns, links.sender, rows)
@@ -173,49 +170,49 @@ def received(
 def finished(
     index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool
 ) -> ReceptionRecords:
-    """The fates of the links `index` are final, those of packets that never went on air among them."""
+    """Reception records of the links `index`, with those of packets that never went on air."""
     arena, size_bytes = packets.sender // robots, packets.payloads.sizes
-    of_link = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
+    link_columns = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
     times = packets.sent_at_ns, packets.on_air_at_ns
-    of_packet = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
-    *told, payload = _finished(index, of_link, of_packet, robots)
+    packet_columns = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
+    *columns, payload = _finished(index, link_columns, packet_columns, robots)
     rssi_dbm = links.rssi_dbm.take(index) if has_strength else None
-    return ReceptionRecords(*told, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
+    return ReceptionRecords(*columns, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
 
 
 @njit(cache=True)
-def _finished(index, of_link, of_packet, robots):
-    """The columns of `Finished` that are whole numbers, in their order, then that of payloads, (13, k)."""
-    packet, receiver, receivers, final_at_ns, fate = of_link
-    arena, sender, to, sequence, sent_at_ns, on_air_at_ns, size_bytes, tag = of_packet
-    told = np.empty((13, len(index)), np.int64)
+def _finished(index, link_columns, packet_columns, robots):
+    """The integer columns of `ReceptionRecords` in their order, then that of payloads, (13, k)."""
+    packet, receiver, receivers, final_at_ns, fate = link_columns
+    arena, sender, to, sequence, sent_at_ns, on_air_at_ns, size_bytes, tag = packet_columns
+    columns = np.empty((13, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
         p = np.uint64(packet[row])
         first_row = arena[p] * robots
-        told[0, k], told[1, k] = arena[p], sender[p] - first_row
-        told[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
-        told[3, k], told[4, k], told[5, k] = receivers[row], to[p], sequence[p]
-        told[6, k], told[7, k], told[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
-        told[9, k], told[10, k], told[11, k], told[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
-    return told
+        columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
+        columns[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
+        columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
+        columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
+        columns[9, k], columns[10, k], columns[11, k], columns[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
+    return columns
 
 
 def nothing_final(
     links: Links, packets: Transmissions, has_strength: bool
 ) -> tuple[ReceptionRecords, TransmissionRecords]:
-    """The tables of none, for a medium with these kinds of links and packets."""
+    """Empty records, for a medium with these kinds of links and packets."""
     none = np.empty(0, np.int64)
     return finished(none, links, packets, 1, has_strength), departed(none, links, packets, 1)
 
 
 def in_arena(row: IntArray, robots: int) -> IntArray:
-    """Indices within their arena of robot rows; numpy divides several at a time, but finds remainders one by one."""
+    """Indices of robot rows in their arena; numpy vectorizes division, but not the remainder."""
     return row - row // robots * robots
 
 
 def departed(index: IntArray, links: Links, packets: Transmissions, robots: int) -> TransmissionRecords:
-    """The packets of the links `index` left their sender's radio."""
+    """Transmission records of the packets of the links `index`, which left their sender's radio."""
     packet, row = links.packet.take(index), links.sender.take(index)
     arena = row // robots
     return TransmissionRecords(
@@ -233,13 +230,13 @@ def departed(index: IntArray, links: Links, packets: Transmissions, robots: int)
 
 @njit(cache=True)
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
-    """Which of `rows` rows are referred to, rising, and `index` renumbered to refer to these only."""
+    """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
     place, kept = np.full(rows, -1), np.empty(rows, np.int64)
-    for one in index:
-        place[one] = 0
-    found = 0
+    for row in index:
+        place[row] = 0
+    count = 0
     for row in range(rows):
         if place[row] == 0:
-            kept[found], place[row] = row, found
-            found += 1
-    return kept[:found], place[index]
+            kept[count], place[row] = row, count
+            count += 1
+    return kept[:count], place[index]

@@ -1,4 +1,4 @@
-"""When in its period a robot hands its packets to its radio."""
+"""Send times: the offset within its period at which a robot sends its packets."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -18,9 +18,9 @@ class SendTimes:
     """`sent_at = tick start + phase + jitter`, in integer ns.
 
     "uniform": phase keyed by robot, uniform over the period in which it acts; jitter keyed by robot and tick, uniform
-    over a fifth of it. Without them all robots would send at once, and a medium with contention would lose everything,
-    every time.
-    "tick": neither. A number: that offset in s from the tick's start, the same for all.
+    over a fifth of it. Without them all robots would send at once, and a medium with contention would lose every
+    packet.
+    "tick": no offset. A number: that offset in s from the tick's start, the same for all.
     """
 
     def __init__(self, send_offset: str | float, keys: KeyArray, act_every_ticks: IntArray, rate_hz: int) -> None:
@@ -37,7 +37,7 @@ class SendTimes:
         self._phase_ns = np.full(len(keys) * robots, to_ns(offset_s), np.int64)
 
     def at(self, tick_start_ns: int, tick: int) -> IntArray:
-        """When each robot sends in this tick, in ns, (rows,)."""
+        """Send time of each robot in this tick, in ns, (rows,)."""
         sent_at_ns = self._phase_ns + tick_start_ns
         if self._uniform:
             sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._period_ns // JITTER_SHARE)
@@ -45,10 +45,12 @@ class SendTimes:
 
 
 @njit(cache=True)
-def keyed_ns(keys, tick, what_for, width_ns):
-    """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, what_for)."""
+def keyed_ns(keys, tick, draw_purpose, width_ns):
+    """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, draw_purpose)."""
     robots = len(width_ns)
-    drawn = np.empty(len(keys) * robots, np.int64)
-    for row in range(len(drawn)):
-        drawn[row] = np.int64(uniform(keys[row // robots], row % robots, tick, 0, what_for) * width_ns[row % robots])
-    return drawn
+    draws = np.empty(len(keys) * robots, np.int64)
+    for row in range(len(draws)):
+        draws[row] = np.int64(
+            uniform(keys[row // robots], row % robots, tick, 0, draw_purpose) * width_ns[row % robots]
+        )
+    return draws

@@ -1,6 +1,7 @@
-"""Airtime: how long a frame occupies the medium, in whole ns. Octets may be a number or an array of integers.
+"""Timing of the standards: airtime of a frame, and channel access (IFS, CCA, backoff, contention window).
 
-Which octets count is stated with each standard; headers of higher layers are the caller's to add.
+Times are whole ns. Octets may be a number or an array of integers. Each standard states the octets that count; callers
+add the headers of higher layers.
 """
 
 from dataclasses import dataclass
@@ -54,56 +55,52 @@ def ieee80211g_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
     return ieee80211a_ns(psdu_octets, rate_bps) + 6 * US
 
 
-# --- Access timing: what the standards prescribe for the wait before a frame goes on air. All times in ns.
-
-
 @dataclass(frozen=True, slots=True)
 class UnslottedCsma:
     """Unslotted CSMA/CA of IEEE 802.15.4 at 2.4 GHz, with the standard's defaults (2006: 6.4.2, 7.4.2, 7.5.1.4).
 
-    A sender waits U{0 .. 2^BE - 1} backoff periods, then listens for `cca_ns`; if the medium is busy BE grows by one,
-    and after more than `most_backoffs` busy times the frame fails. Sent `turnaround_ns` after the medium was found
-    free.
+    A sender waits U{0 .. 2^BE - 1} backoff periods, then assesses the channel for `cca_ns`. If it is busy, BE grows by
+    one; after more than `max_backoffs` busy CCAs the frame fails. A frame starts `turnaround_ns` after an idle CCA.
     """
 
     symbol_ns: int = 16 * US
     backoff_ns: int = 320 * US  # aUnitBackoffPeriod, 20 symbols
     cca_ns: int = 128 * US  # 8 symbols
-    busy_above_sensitivity_db: float = 10.0  # energy that counts as busy (6.9.9)
+    cca_ed_above_sensitivity_db: float = 10.0  # CCA-ED threshold (6.9.9)
     turnaround_ns: int = 192 * US  # aTurnaroundTime, 12 symbols
-    short_space_ns: int = 192 * US  # SIFS, 12 symbols: after frames of up to `short_frame_octets`
-    long_space_ns: int = 640 * US  # LIFS, 40 symbols
-    short_frame_octets: int = 18  # aMaxSIFSFrameSize
-    acknowledgement_wait_ns: int = 864 * US  # macAckWaitDuration, 54 symbols
-    least_exponent: int = 3  # macMinBE
-    most_exponent: int = 5  # macMaxBE
-    most_backoffs: int = 4  # macMaxCSMABackoffs
-    most_retries: int = 3  # macMaxFrameRetries, of unicast frames
+    sifs_ns: int = 192 * US  # SIFS, 12 symbols: after frames of up to `max_sifs_frame_octets`
+    lifs_ns: int = 640 * US  # LIFS, 40 symbols
+    max_sifs_frame_octets: int = 18  # aMaxSIFSFrameSize
+    ack_wait_ns: int = 864 * US  # macAckWaitDuration, 54 symbols
+    min_be: int = 3  # macMinBE
+    max_be: int = 5  # macMaxBE
+    max_backoffs: int = 4  # macMaxCSMABackoffs
+    max_retries: int = 3  # macMaxFrameRetries, of unicast frames
 
-    def space_ns(self, psdu_octets: IntArray) -> IntArray:
-        """The silence that follows frames of so many octets, (k,)."""
-        return np.where(psdu_octets <= self.short_frame_octets, self.short_space_ns, self.long_space_ns)
+    def ifs_ns(self, psdu_octets: IntArray) -> IntArray:
+        """The interframe space after frames of `psdu_octets` octets, (k,)."""
+        return np.where(psdu_octets <= self.max_sifs_frame_octets, self.sifs_ns, self.lifs_ns)
 
 
 @dataclass(frozen=True, slots=True)
 class Dcf:
     """The distributed coordination function of IEEE 802.11 (2007: 9.2, and 15 to 19 for the numbers).
 
-    A sender waits until the medium was free for DIFS, then U{0 .. CW} slots of free air. A broadcast goes out at a
-    basic rate, without acknowledgement and retries, so its CW stays at the least.
+    A sender waits until the medium was idle for DIFS, then U{0 .. CW} idle slots. A broadcast is sent at a basic rate,
+    without acknowledgement and retries, so its CW stays at CWmin.
     """
 
-    short_space_ns: int  # SIFS
+    sifs_ns: int  # SIFS
     slot_ns: int
-    least_window: int  # CWmin, slots
-    most_window: int = 1023  # CWmax, slots
-    most_retries: int = 7  # of short unicast frames
-    busy_energy_dbm: float = -62.0  # anything else
+    cw_min: int  # CWmin, slots
+    cw_max: int = 1023  # CWmax, slots
+    max_retries: int = 7  # of short unicast frames
+    cca_ed_dbm: float = -62.0  # CCA-ED threshold, for energy that is no frame
 
     @property
     def difs_ns(self) -> int:
         """SIFS + 2 slots."""
-        return self.short_space_ns + 2 * self.slot_ns
+        return self.sifs_ns + 2 * self.slot_ns
 
 
 IEEE_802_15_4 = UnslottedCsma()

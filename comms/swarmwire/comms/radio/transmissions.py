@@ -1,4 +1,4 @@
-"""Packets at or beyond their sender's radio, as a table."""
+"""The table of packets at or beyond their sender's radio, and the admission of sent packets to the queues."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -14,20 +14,20 @@ from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, Payloads, SentPack
 class Transmissions(NamedTuple):
     """A row per packet, those of one sender in the order in which it sent them.
 
-    A packet that its sender's radio refused never goes on air: its three times are then all `sent_at_ns`.
+    A packet refused by its sender's radio never goes on air: all three of its times are `sent_at_ns`.
     """
 
     sender: IntArray  # (k,) robot row
     to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
-    sequence: IntArray  # (k,) packets that the sender had sent before this one, refused ones too
-    intended: IntArray  # (k,) receivers that it is meant for
-    epoch: IntArray  # (k,) of `Lives` when it was sent: a broadcast is meant for those alive then
+    sequence: IntArray  # (k,) number of packets that the sender sent before, refused ones included
+    intended: IntArray  # (k,) number of intended receivers
+    epoch: IntArray  # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots alive then
     tag: IntArray  # (k,) topic
-    sent_at_ns: IntArray  # (k,) handed to the sender's radio
-    on_air_at_ns: IntArray  # (k,) the first bit
-    off_air_at_ns: IntArray  # (k,) the end of the last bit
-    fate: IntArray  # (k,) RECEIVED: accepted, to be decided for each receiver; else the fate for all of them
-    tx_status_id: IntArray  # (k,) under which the sender is told what became of it, or UNTOLD
+    sent_at_ns: IntArray  # (k,) arrival at the sender's radio
+    on_air_at_ns: IntArray  # (k,) start of the first bit
+    off_air_at_ns: IntArray  # (k,) end of the last bit
+    fate: IntArray  # (k,) RECEIVED: accepted, fate decided per receiver; else the fate at all of them
+    tx_status_id: IntArray  # (k,) ID of the transmit status for the sender, or NOT_MEASURED
     payloads: Payloads  # (k,)
 
     @classmethod
@@ -40,12 +40,12 @@ class Transmissions(NamedTuple):
 
     def select(self, index: IntArray) -> "Transmissions":
         """The packets of `index`, in its order."""
-        if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # then it is all of them, in order
+        if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # all of them, in order
             return self
-        return Transmissions._make([*_taken(self[:-1], index), self.payloads.rows(index)])
+        return Transmissions._make([*_take(self[:-1], index), self.payloads.rows(index)])
 
     def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
-        """Those of the packets `which` (k,), and the others."""
+        """The packets `which` (k,), and the others."""
         if which.all():
             return self, Transmissions.none()
         if not which.any():
@@ -61,7 +61,7 @@ class Transmissions(NamedTuple):
 
 
 @njit(cache=True)
-def _taken(columns, index):
+def _take(columns, index):
     """The rows of `index` of all columns, (columns, k)."""
     out = np.empty((len(columns), len(index)), np.int64)
     for c in range(len(columns)):
@@ -71,24 +71,21 @@ def _taken(columns, index):
     return out
 
 
-# --- Intake: what agents sent becomes numbered packets at their radios.
-
-
 class Admission:
-    """Counts the packets that each radio was handed."""
+    """Numbers sent packets and turns them into transmissions; counts the packets of each radio."""
 
     def __init__(self, rows: int) -> None:
         self._sent_before = np.zeros(rows, np.int64)
 
     def take(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """The packets, sorted by sender, as if each were on air at once, for no time; those to NOWHERE only count.
+        """The packets sorted by sender, with all times at `sent_at_ns`; packets to NOWHERE only take a number.
 
-        `sent_at_ns` (rows,) is when each robot sends, `others_alive` (rows,) whom a robot's broadcast intends: those of
-        the epoch.
+        `sent_at_ns` (rows,) is the send time of each robot, `others_alive` (rows,) the number of intended receivers of
+        its broadcasts in this epoch.
         """
-        if (sent.sender[1:] < sent.sender[:-1]).any():  # nothing may depend on how the backend was divided
+        if (sent.sender[1:] < sent.sender[:-1]).any():  # results must not depend on how the backend was divided
             sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        sequence = _numbers(sent.sender.copy(), self._sent_before)
+        sequence = _sequence_numbers(sent.sender.copy(), self._sent_before)
         somewhere = sent.to != NOWHERE
         if not somewhere.all():
             sent, sequence = sent.select(np.flatnonzero(somewhere)), sequence[somewhere]
@@ -110,8 +107,8 @@ class Admission:
 
 
 @njit(cache=True)
-def _numbers(sender, sent_before):
-    """The sequence number of each packet, (k,); `sent_before` (rows,) counts on."""
+def _sequence_numbers(sender, sent_before):
+    """The sequence number of each packet, (k,); increments `sent_before` (rows,)."""
     sequence = np.empty(len(sender), np.int64)
     for p in range(len(sender)):
         sequence[p] = sent_before[sender[p]]

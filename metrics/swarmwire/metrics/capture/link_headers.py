@@ -130,7 +130,7 @@ def _answer_us(radio: Radio) -> int:
         return 0
     dcf = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}[radio.frame]
     answer_ns = int(airtime_ns(radio, np.array([acknowledgement_bytes(radio)]))[0])
-    return -(-(dcf.short_space_ns + answer_ns) // 1000)
+    return -(-(dcf.sifs_ns + answer_ns) // 1000)
 
 
 def _ipv4(frame: Frame, data_bytes: int) -> bytes:

@@ -68,7 +68,7 @@ def test_a_hundred_octets_over_udp_take_the_stated_time():
     b_ns, a_ns = ieee80211b_ns(octets, 1_000_000, short_preamble=False), ieee80211a_ns(octets, 6_000_000)
     assert (b_ns, a_ns, ieee80211g_ns(octets, 6_000_000)) == (1504 * US, 244 * US, 250 * US)
     for airtime_ns, dcf, stated_us in ((b_ns, IEEE_802_11B, 1864), (a_ns, IEEE_802_11A, 345.5)):
-        assert airtime_ns + dcf.difs_ns + dcf.least_window * dcf.slot_ns / 2 == stated_us * US
+        assert airtime_ns + dcf.difs_ns + dcf.cw_min * dcf.slot_ns / 2 == stated_us * US
 
 
 @given(OCTETS, st.integers(1, 10**10))
@@ -123,11 +123,11 @@ def test_802_15_4_counts_its_waits_in_symbols():
     """62 500 a second. For an acknowledgement: backoff, turnaround, 10 of the header and 12 of the frame."""
     timing = IEEE_802_15_4
     assert timing.symbol_ns * 62_500 == 10**9
-    stated = {"backoff_ns": 20, "cca_ns": 8, "turnaround_ns": 12, "short_space_ns": 12, "long_space_ns": 40}
+    stated = {"backoff_ns": 20, "cca_ns": 8, "turnaround_ns": 12, "sifs_ns": 12, "lifs_ns": 40}
     for name, symbols in stated.items():
         assert getattr(timing, name) == symbols * timing.symbol_ns, name
-    assert timing.acknowledgement_wait_ns == (20 + 12 + 10 + 12) * timing.symbol_ns
-    assert timing.space_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
+    assert timing.ack_wait_ns == (20 + 12 + 10 + 12) * timing.symbol_ns
+    assert timing.ifs_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_802_15_4_counts_its_waits_in_symbols():
 )
 def test_802_11_waits_for_difs_and_its_window(dcf, difs_us: int, window: int):
     assert dcf.difs_ns == difs_us * US
-    assert (dcf.least_window, dcf.most_window) == (window, 1023)
+    assert (dcf.cw_min, dcf.cw_max) == (window, 1023)
 
 
 # Keys are fixed; Kolmogorov-Smirnov tests have a false-alarm rate of 1 in 1000.

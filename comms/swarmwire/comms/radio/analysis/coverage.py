@@ -1,6 +1,6 @@
-"""Coverage: how strong a radio is from one place to another, and what of lone packets gets through; no robots needed.
+"""Coverage of a radio between places, without robots: mean power and delivery of lone packets, as map or by distance.
 
-All of it is the medium's own propagation and reception. Other robots neither disturb nor stand in between.
+Propagation and reception are those of the medium. Other robots neither interfere nor stand in between.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -136,9 +136,6 @@ def _gains_db(law, key):
         x, y = 0.73 * i, 0.41 * i
         out_db[i] = to_db(fading_gain(law, key, 2 * i, 2 * i + 1, x, y, x + 1.0 + 0.013 * i, y))
     return out_db
-
-
-# --- Surveys of an arena's coverage: as a map from one place, and by distance over all places and directions.
 
 
 CANDIDATES, MAX_LINKS, MIN_LINKS = 20_000, 2000, 50  # links drawn for each distance

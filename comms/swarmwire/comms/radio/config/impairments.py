@@ -1,4 +1,7 @@
-"""What a scenario says of bursts. No kernels here: a scenario is read without a compiler."""
+"""Scenario tables of impairments and measurements: bursts, delays, and what a receiver measures.
+
+No kernels here: a scenario is read without a compiler.
+"""
 
 import math
 from dataclasses import dataclass
@@ -7,13 +10,13 @@ from typing import ClassVar
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 
-MAX_S = 1e6  # of a spell, on average
+MAX_S = 1e6  # mean sojourn time
 STEPS = ("p", "r", "interval_s")
 
 
 @dataclass(frozen=True)
 class BurstsTable:
-    """How a scenario writes bursts: by how long spells last, by the mean loss, or by steps p and r between packets.
+    """Bursts as a scenario writes them: by sojourn times, by mean loss, or by steps p and r between packets.
 
     The steps are those of netem's `gemodel p r 1-h 1-k`, whose 1-h and 1-k are the losses.
     """
@@ -58,13 +61,13 @@ class BurstsTable:
         return bursts_from_steps(**steps, **losses)
 
     def _given(self, *names: str) -> dict[str, float]:
-        """What is said of these."""
+        """The values of these keys that are set."""
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
 class Bursts:
-    """How long bad and good spells last, and what they lose."""
+    """Mean sojourn times in the bad and the good state, and the loss in each."""
 
     written_as: ClassVar[type[BurstsTable]] = BurstsTable
 
@@ -113,9 +116,6 @@ def bursts_from_steps(p: float, r: float, loss_bad: float, loss_good: float, int
     return Bursts(relaxation_s * (p + r) / r, relaxation_s * (p + r) / p, loss_bad, loss_good)
 
 
-# --- What a scenario says of delays. No kernels here: a scenario is read without a compiler.
-
-
 DISTRIBUTIONS = ("uniform", "normal", "lognormal", "pareto")
 
 
@@ -136,9 +136,6 @@ def refuse_negative(delays: Delays, where: str, key: str) -> None:
     most_s = delays.mean_s / math.sqrt(3.0)
     if delays.distribution == "uniform" and delays.deviation_s > most_s:
         raise BadInput(where, f"{key}.deviation_s", f"expected at most {most_s:g} s for this mean")
-
-
-# --- What a scenario says of what receivers learn. No kernels here: a scenario is read without a compiler.
 
 
 @dataclass(frozen=True)
@@ -164,7 +161,7 @@ class RssiMeasure:
 
 @dataclass(frozen=True)
 class Measures:
-    """What a receiver learns with a packet, taken when the packet went on air."""
+    """Measurements of a receiver with each packet, of the time when the packet went on air."""
 
     range: RangeMeasure | None = parameter(None, help="the distance to the sender")
     bearing: BearingMeasure | None = parameter(None, help="the direction to the sender")

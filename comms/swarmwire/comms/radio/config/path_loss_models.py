@@ -1,4 +1,4 @@
-"""Loss curves: straight lines over log10 of distance, the form that all models of path loss share."""
+"""Path loss models as scenario tables, and the loss curve that they share: straight lines over log10 of distance."""
 
 import math
 from dataclasses import dataclass
@@ -28,9 +28,6 @@ def straight(loss_db_at_1_m: float, slope_db: float, absorption_db_per_m: float 
     return LossCurve(loss_db_at_1_m, slope_db, math.inf, loss_db_at_1_m, slope_db, absorption_db_per_m)
 
 
-# --- Friis: free space between two antennas, without ground and obstacles.
-
-
 def loss_at_1_m_db(frequency_hz: float) -> float:
     """Free-space loss over 1 m in dB: 20 log10(4 pi f / c)."""
     return 20.0 * math.log10(4.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS)
@@ -43,9 +40,6 @@ class Friis:
     def curve(self, frequency_hz: float) -> LossCurve:
         """The loss at this frequency."""
         return straight(loss_at_1_m_db(frequency_hz), 20.0)
-
-
-# --- Log-distance: loss grows by a constant factor per decade of distance, as measured in one kind of place.
 
 
 @dataclass(frozen=True)
@@ -66,9 +60,6 @@ class LogDistance:
         """The loss at this frequency, which counts only where no reference loss is given."""
         reference_db = loss_at_1_m_db(frequency_hz) if self.reference_loss_db is None else self.reference_loss_db
         return straight(reference_db, 10.0 * self.exponent, self.absorption_db_per_m)
-
-
-# --- Two-ray ground: the direct ray and the one that the ground reflects cancel each other far away.
 
 
 @dataclass(frozen=True)
@@ -94,9 +85,6 @@ class TwoRay:
         """The loss at this frequency."""
         ground_db = -20.0 * math.log10(self.sender_height_m * self.receiver_height_m)
         return LossCurve(loss_at_1_m_db(frequency_hz), 20.0, self.crossover_m(frequency_hz), ground_db, 40.0)
-
-
-# --- ITU-R P.1238, site-general: indoor loss by kind of building, obstacles on the way included.
 
 
 # Kind of building: distance coefficient N; floor penetration in dB for one floor, and for each further one.

@@ -1,4 +1,7 @@
-"""What a scenario says of propagation beyond path loss. No kernels here: a scenario is read without a compiler."""
+"""Scenario tables of the PHY: antennas, propagation beyond path loss, reception, noise and channel access.
+
+No kernels here: a scenario is read without a compiler.
+"""
 
 import math
 from collections.abc import Iterable
@@ -83,9 +86,6 @@ class Fading:
     )
 
 
-# --- Antennas: the power and gain of each robot.
-
-
 @dataclass(frozen=True, slots=True)
 class Antennas:
     """What robots have of their own, by index in the arena; NaN where they have what `[radio.antenna]` says."""
@@ -118,9 +118,6 @@ class Antennas:
 
 def _or(own: FloatArray, otherwise: float) -> FloatArray:
     return np.where(np.isnan(own), otherwise, own)
-
-
-# --- What a scenario says of reception. No kernels here: a scenario is read without a compiler.
 
 
 RATES_BPS = {"802.11b": DSSS_RATES_BPS, "802.11ag": tuple(OFDM_BITS_PER_SYMBOL)}
@@ -193,9 +190,6 @@ def refuse_unfit(reception: Reception, bit_rate_bps: int, where: str, key: str) 
         raise BadInput(where, f"{key}.model", f"{reception.model} has the bit rates {listed}; got {bit_rate_bps} bit/s")
 
 
-# --- Thermal noise: what a receiver hears while nobody sends.
-
-
 BOLTZMANN_J_PER_K = 1.380649e-23  # exact, SI 2019
 ROOM_K = 290.0  # the temperature at which noise figures are defined (IEEE)
 
@@ -224,15 +218,12 @@ class Noise:
         return noise_dbm(self.bandwidth_hz, self.figure_db)
 
 
-# --- What a scenario says of access to the medium. No kernels here: a scenario is read without a compiler.
-
-
 METHODS = ("none", "aloha", "csma-802154", "dcf")
 
 
 @dataclass(frozen=True)
 class Access:
-    """When a radio may send, and whether frames that overlap disturb one another."""
+    """Channel access: when a radio may send, and whether overlapping frames interfere."""
 
     method: str = parameter(
         "none",

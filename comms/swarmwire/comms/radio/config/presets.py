@@ -1,4 +1,7 @@
-"""A preset: a kind of radio as a table of a scenario's `[radio]`, with the source of its figures."""
+"""Presets: kinds of radio as tables of a scenario's `[radio]`, each with the source of its figures.
+
+A preset fills in keys that the scenario leaves out; the scenario wins key by key, also within tables.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -15,7 +18,7 @@ class Preset(NamedTuple):
     otherwise: str = ""  # where it is other than what it is named after
 
 
-# --- Success tables of modulations that have no receiver of their own here, as a scenario writes them.
+# Success tables of modulations that have no receiver of their own here, as a scenario writes them.
 
 
 STEP_DB = 0.5
@@ -42,7 +45,7 @@ def _table(least_db: float, most_db: float, bits: int, success: Callable[[float]
     return {"sinr_db": sinr_db, "success": found, "frame_bits": bits}
 
 
-# --- Presets that reach to a fixed distance: textbooks' models, and the range and bearing of simulated robots.
+# Presets that reach to a fixed distance: textbooks' models, and the range and bearing of simulated robots.
 
 
 DISKS: dict[str, Preset] = {
@@ -95,7 +98,7 @@ DISKS: dict[str, Preset] = {
 }
 
 
-# --- Presets with the figures of other simulators' radios, for scenarios that come from there.
+# Presets with the figures of other simulators' radios, for scenarios that come from there.
 
 
 _GAZEBO: dict[str, Any] = {
@@ -140,7 +143,7 @@ SIMULATORS: dict[str, Preset] = {
 }
 
 
-# --- Presets of radio standards, with the timing that they prescribe.
+# Presets of radio standards, with the timing that they prescribe.
 
 
 _IEEE_802_15_4: dict[str, Any] = {
@@ -221,9 +224,9 @@ STANDARDS: dict[str, Preset] = {
 }
 
 
-# --- Presets of what is no radio: infrared light, and sound in water.
+# Presets of other media: infrared light, and sound in water.
 #
-# Sound is told in dBm of acoustic power: a level in dB re 1 uPa, less 140.8 dB, is the power through a sphere of 1 m.
+# Sound is in dBm of acoustic power: a level in dB re 1 uPa, less 140.8 dB, is the power through a sphere of 1 m.
 
 
 OTHER_MEDIA: dict[str, Preset] = {
@@ -268,11 +271,6 @@ OTHER_MEDIA: dict[str, Preset] = {
         "they were sent, whatever the distance: only what is received is late",
     ),
 }
-
-
-# --- Presets: kinds of radio as tables of a scenario's `[radio]`, each with the source of its figures.
-#
-# A preset gives values where the scenario gives none; what the scenario says wins, key by key, within tables, too.
 
 
 PATH_LOSS = ("log_distance", "two_ray", "itu_indoor")

@@ -1,4 +1,7 @@
-"""What a scenario says of measured links. No kernels here: a scenario is read without a compiler."""
+"""The scenario table `[radio]` and its checks, and the airtime of frames of a radio.
+
+No kernels here: a scenario is read without a compiler.
+"""
 
 from dataclasses import dataclass, field
 
@@ -41,9 +44,6 @@ class Trace:
         help="what links without a value yet are: none, out of range; or as the model has them",
         choices=("none", "model"),
     )
-
-
-# --- What a scenario says of its radio.
 
 
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
@@ -189,9 +189,6 @@ class Radio:
         return self.access or Access()
 
 
-# --- Frames: how long packets occupy the medium, by the way in which the radio frames them.
-
-
 # Octets of an acknowledgement: preamble, delimiter, length and PSDU of IEEE 802.15.4; the PSDU of IEEE 802.11.
 SHORT_ACKNOWLEDGEMENT, LONG_ACKNOWLEDGEMENT = 11, 14
 
@@ -212,7 +209,7 @@ def acknowledgement_bytes(radio: Radio) -> int:
     return SHORT_ACKNOWLEDGEMENT if radio.frame == "plain" else LONG_ACKNOWLEDGEMENT
 
 
-# --- Checks of a radio that need more than one key: contradictions are refused with the key that makes them.
+# Checks that need more than one key: errors name the key that contradicts another.
 
 
 OF_SIGNALS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")

@@ -1,4 +1,8 @@
-"""Unslotted CSMA/CA of IEEE 802.15.4: wait at random, listen, and send if the medium is free, else wait longer."""
+"""Unslotted CSMA/CA of IEEE 802.15.4: random backoff, clear channel assessment (CCA), turnaround, then the frame.
+
+After a busy CCA the backoff exponent BE grows, up to macMaxBE. More than macMaxCSMABackoffs busy CCAs (NB) end the
+attempt as a channel access failure.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -8,53 +12,54 @@ from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.phy import reception
-from swarmwire.comms.radio.phy.event_queue import LISTENED, SEND, TIMER, schedule
-from swarmwire.comms.radio.phy.state import BACKING_OFF, LISTENING, SILENT, TURNING
+from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, TIMER, schedule
+from swarmwire.comms.radio.phy.state import BACKING_OFF, SENSING, SILENT, TURNAROUND
 
 BACKOFF = purpose("csma backoff")
 
 
 @kernel()
-def want(rules, state, queue, r, now_ns):
-    """The robot wants to send the packet that it serves."""
-    me = state.robot[r]
-    me.busy_times, me.exponent = 0, rules.least_exponent
-    _back_off(rules, state, queue, r, now_ns)
+def request_access(params, state, events, r, now_ns):
+    """Start channel access for the packet being served: NB = 0, BE = macMinBE."""
+    radio = state.robot[r]
+    radio.nb, radio.exponent = 0, params.min_be
+    _back_off(params, state, events, r, now_ns)
 
 
 @kernel()
-def listen(rules, state, queue, r, now_ns):
-    """The backoff is over."""
-    state.robot[r].stage = LISTENING
+def start_cca(params, state, events, r, now_ns):
+    """The backoff has ended: assess the channel for `cca_ns`."""
+    state.robot[r].stage = SENSING
     state.reception[r].peak_mw = 0.0
-    schedule(queue, LISTENED, r, now_ns + rules.listen_ns)
+    schedule(events, CCA_END, r, now_ns + params.cca_ns)
 
 
 @kernel()
-def gives_up(rules, state, queue, r, now_ns):
-    """The radio has listened: it sends, or backs off anew, or gives up (True), if the medium was busy too often.
+def end_cca(params, state, events, r, now_ns):
+    """The CCA has ended: turn around to send, or back off again. True on channel access failure.
 
-    As in ns-3, it is busy if a frame began meanwhile or is on air at the end; one that ended meanwhile does not count.
+    As in ns-3, the channel is busy if a frame began during the CCA or is on air at its end; a frame that ended during
+    the CCA does not count.
     """
-    me, it = state.robot[r], state.reception[r]
-    if max(it.peak_mw, it.power_mw) + it.jam_mw < rules.busy_mw and me.on_air == SILENT:
-        me.stage = TURNING
-        reception.turn_away(state, r)
-        schedule(queue, SEND, r, now_ns + rules.turnaround_ns)
+    radio, rx = state.robot[r], state.reception[r]
+    if max(rx.peak_mw, rx.power_mw) + rx.jam_mw < params.cca_ed_mw and radio.on_air == SILENT:
+        radio.stage = TURNAROUND
+        reception.stop_receiving(state, r)
+        schedule(events, SEND, r, now_ns + params.turnaround_ns)
         return False
-    me.busy_times += 1
-    me.exponent = min(me.exponent + 1, rules.most_exponent)
-    if me.busy_times > rules.most_backoffs:
+    radio.nb += 1
+    radio.exponent = min(radio.exponent + 1, params.max_be)
+    if radio.nb > params.max_backoffs:
         return True
-    _back_off(rules, state, queue, r, now_ns)
+    _back_off(params, state, events, r, now_ns)
     return False
 
 
 @kernel()
-def _back_off(rules, state, queue, r, now_ns):
-    """Wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and busy times)."""
-    me = state.robot[r]
-    me.stage = BACKING_OFF
-    sequence, attempt = state.packet[me.packet].sequence, 16 * me.attempt + me.busy_times
-    u = uniform(state.keys[r // rules.robots], r % rules.robots, sequence, attempt, BACKOFF)
-    schedule(queue, TIMER, r, now_ns + np.int64(u * 2**me.exponent) * rules.backoff_ns)
+def _back_off(params, state, events, r, now_ns):
+    """Wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and NB)."""
+    radio = state.robot[r]
+    radio.stage = BACKING_OFF
+    sequence, attempt = state.packet[radio.packet].sequence, 16 * radio.attempt + radio.nb
+    u = uniform(state.keys[r // params.robots], r % params.robots, sequence, attempt, BACKOFF)
+    schedule(events, TIMER, r, now_ns + np.int64(u * 2**radio.exponent) * params.backoff_ns)

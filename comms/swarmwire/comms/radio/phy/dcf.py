@@ -1,8 +1,8 @@
-"""DCF of IEEE 802.11: who wants to send waits until the medium was free for DIFS, then for its slots of free air.
+"""DCF of IEEE 802.11: a station sends after the medium was idle for DIFS and for its backoff slots.
 
-A robot that finds the medium free sends after DIFS, as in ns-3; the standard lets it do so at once. Each frame on air
-is followed by new slots; those that are left when the medium becomes busy count on when it is free again. After a frame
-that was not understood the medium counts as free only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
+A station that finds the medium idle sends after DIFS, as in ns-3; the standard lets it send at once. Each frame is
+followed by a new backoff. Remaining slots freeze while the medium is busy and count on when it is idle again. After a
+frame that was not decoded the medium counts as idle only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -22,62 +22,62 @@ SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")
 
 
 @kernel()
-def want(rules, state, queue, r, now_ns):
-    """The robot wants to send the packet that it serves."""
-    me = state.robot[r]
-    me.stage = BACKING_OFF
+def request_access(params, state, events, r, now_ns):
+    """Start channel access for the packet being served."""
+    radio = state.robot[r]
+    radio.stage = BACKING_OFF
     if state.reception[r].is_busy:
-        _wait_if_none_left(rules, state, r)
+        _draw_backoff_if_none(params, state, r)
         return
-    counted_ns = me.free_from_ns + me.slots * rules.slot_ns
-    schedule(queue, SEND, r, max(now_ns, counted_ns) + rules.difs_ns)
+    counted_ns = radio.free_from_ns + radio.backoff_slots * params.slot_ns
+    schedule(events, SEND, r, max(now_ns, counted_ns) + params.difs_ns)
 
 
 @kernel(inline="always")
-def sense(rules, state, queue, r, now_ns):
-    """What is on air at the robot may have changed; nothing to other methods."""
-    if rules.method == DCF:
-        it = state.reception[r]
-        is_busy = it.is_deaf or it.locked_to != NO_ROBOT or it.power_mw + it.jam_mw >= rules.busy_mw
-        if is_busy != (it.is_busy != 0):
-            _change(rules, state, queue, r, now_ns)
+def sense(params, state, events, r, now_ns):
+    """Update carrier sense after a change of the power at the robot; does nothing under other access methods."""
+    if params.method == DCF:
+        rx = state.reception[r]
+        is_busy = rx.is_deaf or rx.locked_to != NO_ROBOT or rx.power_mw + rx.jam_mw >= params.cca_ed_mw
+        if is_busy != (rx.is_busy != 0):
+            _change(params, state, events, r, now_ns)
 
 
 @kernel()
-def _change(rules, state, queue, r, now_ns):
-    """The medium at the robot has become busy, or free."""
-    me, reception = state.robot[r], state.reception[r]
+def _change(params, state, events, r, now_ns):
+    """Toggle carrier sense: freeze the backoff of a busy medium, or resume it."""
+    radio, reception = state.robot[r], state.reception[r]
     reception.is_busy = not reception.is_busy
     if reception.is_busy:
-        counted = (now_ns - me.free_from_ns - rules.difs_ns) // rules.slot_ns
-        me.slots = max(me.slots - max(counted, 0), 0)
-        # Who sends at this very moment cannot have received the other.
-        if me.stage == BACKING_OFF and due_ns(queue, SEND, r) > now_ns:
-            cancel(queue, SEND, r)
+        counted = (now_ns - radio.free_from_ns - params.difs_ns) // params.slot_ns
+        radio.backoff_slots = max(radio.backoff_slots - max(counted, 0), 0)
+        # A robot that sends at this very moment cannot have sensed the other frame.
+        if radio.stage == BACKING_OFF and due_ns(events, SEND, r) > now_ns:
+            cancel(events, SEND, r)
     else:
-        me.free_from_ns = max(now_ns, me.trust_from_ns)
-        if me.stage == BACKING_OFF:
-            schedule(queue, SEND, r, me.free_from_ns + rules.difs_ns + me.slots * rules.slot_ns)
+        radio.free_from_ns = max(now_ns, radio.eifs_until_ns)
+        if radio.stage == BACKING_OFF:
+            schedule(events, SEND, r, radio.free_from_ns + params.difs_ns + radio.backoff_slots * params.slot_ns)
 
 
 @kernel()
-def wait_after(rules, state, r):
-    """The robot's frame is off air: new slots, keyed by (robot, sequence, attempt)."""
-    me = state.robot[r]
-    me.slots = _slots(rules, state, r, SLOTS)
+def draw_backoff(params, state, r):
+    """Draw the backoff that follows the robot's frame, keyed by (robot, sequence, attempt)."""
+    radio = state.robot[r]
+    radio.backoff_slots = _backoff_slots(params, state, r, SLOTS)
 
 
 @kernel()
-def _wait_if_none_left(rules, state, r):
-    me = state.robot[r]
-    if me.slots == 0:
-        me.slots = _slots(rules, state, r, SLOTS_BEFORE)
+def _draw_backoff_if_none(params, state, r):
+    radio = state.robot[r]
+    if radio.backoff_slots == 0:
+        radio.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
 
 
 @kernel()
-def _slots(rules, state, r, what_for):
-    me = state.robot[r]
-    packet = state.packet[me.packet]
-    window = min((rules.least_window + 1) * 2**me.exponent, rules.most_window + 1)
-    u = uniform(state.keys[r // rules.robots], r % rules.robots, packet.sequence, me.attempt, what_for)
+def _backoff_slots(params, state, r, draw_purpose):
+    radio = state.robot[r]
+    packet = state.packet[radio.packet]
+    window = min((params.cw_min + 1) * 2**radio.exponent, params.cw_max + 1)
+    u = uniform(state.keys[r // params.robots], r % params.robots, packet.sequence, radio.attempt, draw_purpose)
     return np.int64(u * window)

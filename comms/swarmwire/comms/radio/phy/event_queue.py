@@ -1,4 +1,7 @@
-"""What is due, and when: at most one event of each kind for each robot, in the order (time, kind, robot row)."""
+"""The event queue of the PHY: a binary heap ordered by (time, kind, robot row).
+
+It holds at most one event of each kind for each robot.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -9,26 +12,26 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.kernels import kernel
 
-# In the order in which events of one moment happen: a frame that ends makes room for one that starts.
-OFF_AIR, LISTENED, TIMER, SEND, ANSWER, ENTER = range(6)
+# Kinds, in the order of events at equal times: a frame ends before another starts.
+OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)
 KINDS = 6
 ABSENT = -1
 
 
 class EventQueue(NamedTuple):
-    """A binary heap with places, so that events can be moved and taken back.
+    """A binary heap with the heap index of each event, so that events can be rescheduled and cancelled.
 
-    Event e is that of kind e // rows and robot row e % rows.
+    Event e has kind e // rows and robot row e % rows.
     """
 
-    at_ns: IntArray  # (KINDS x rows,) when each event is due, if it is
+    at_ns: IntArray  # (KINDS x rows,) time of each scheduled event
     heap: IntArray  # (KINDS x rows,) events, the next one first
-    place: IntArray  # (KINDS x rows,) where in the heap each event is, or ABSENT
+    place: IntArray  # (KINDS x rows,) heap index of each event, or ABSENT
     size: IntArray  # (1,)
 
 
 def event_queue(rows: int) -> EventQueue:
-    """A queue for so many robots, in which nothing is due."""
+    """Return an empty queue for `rows` robots."""
     events = KINDS * rows
     return EventQueue(
         np.zeros(events, np.int64), np.zeros(events, np.int64), np.full(events, ABSENT), np.zeros(1, np.int64)
@@ -37,7 +40,7 @@ def event_queue(rows: int) -> EventQueue:
 
 @kernel()
 def schedule(queue, kind, row, at_ns):
-    """The robot's event of this kind is due at `at_ns`, whenever it was due before."""
+    """Schedule the robot's event of this kind at `at_ns`, in place of its earlier time."""
     event = kind * (len(queue.at_ns) // KINDS) + row
     place = queue.place[event]
     queue.at_ns[event] = at_ns
@@ -50,7 +53,7 @@ def schedule(queue, kind, row, at_ns):
 
 @kernel()
 def cancel(queue, kind, row):
-    """The robot's event of this kind is not due any more, if it was."""
+    """Cancel the robot's event of this kind, if it is scheduled."""
     event = kind * (len(queue.at_ns) // KINDS) + row
     place = queue.place[event]
     if place == ABSENT:
@@ -65,7 +68,7 @@ def cancel(queue, kind, row):
 
 @kernel()
 def due_ns(queue, kind, row):
-    """When the robot's event of this kind is due, in ns; -1 if it is not."""
+    """Time of the robot's event of this kind in ns; -1 if it is not scheduled."""
     event = kind * (len(queue.at_ns) // KINDS) + row
     return queue.at_ns[event] if queue.place[event] != ABSENT else -1
 

@@ -1,4 +1,8 @@
-"""The jammers under the poses held."""
+"""Jamming: the power of jammers at each robot, and its changes over time.
+
+The power of a jammer adds to the robot's noise and to the power that its radio senses. Powers hold for the current
+poses; within a tick only the on/off state of a jammer changes.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -13,15 +17,15 @@ from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.propagation import PropagationParams
-from swarmwire.comms.radio.phy.reception import count_chunk
-from swarmwire.comms.radio.phy.state import Jam
+from swarmwire.comms.radio.phy.reception import end_chunk
+from swarmwire.comms.radio.phy.state import JammerSchedule
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import loss_between_db
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
 class JammerTable:
-    """What jammers do to robots, and when."""
+    """The power of each jammer at each robot under the current poses."""
 
     def __init__(self, context: ChannelContext) -> None:
         self._context, self._jammers = context, Jammers.none()
@@ -32,24 +36,24 @@ class JammerTable:
         """Whether there are jammers."""
         return len(self._jammers.arena) > 0
 
-    def move(self, pose: FloatArray, around: PropagationParams) -> None:
-        """Robots stand at `pose` (rows, 3) from now on, and jammers are those of the disruption that holds."""
+    def move(self, pose: FloatArray, propagation: PropagationParams) -> None:
+        """Recompute the powers for robots at `pose` (rows, 3) and the jammers of the active disruption."""
         self._jammers = self._context.disruption.jammers
         if not self.anything:
             self._power_mw = np.empty((0, self._context.robots))
             return
-        self._power_mw = powers_of(self._jammers, pose, self._context.robots, self._context.obstacles, around)
+        self._power_mw = powers_of(self._jammers, pose, self._context.robots, self._context.obstacles, propagation)
 
-    def between(self, from_ns: int, until_ns: int) -> Jam:
-        """The jammers as they are just before `from_ns`, and when they go on or off from then to before `until_ns`."""
+    def between(self, from_ns: int, until_ns: int) -> JammerSchedule:
+        """The state of jammers just before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""
         at_ns, which = self._jammers.toggles(from_ns, until_ns)
         is_on = self._jammers.is_on(from_ns - 1)
-        return Jam(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))
+        return JammerSchedule(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))
 
-    def by_robot(self, least_mw: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """By robot row (rows,): the power in mW of jammers that never pause, that of all, and the clear share of time.
+    def by_robot(self, min_mw: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Per robot row (rows,): power in mW of continuous jammers, of all jammers, and the share of clear time.
 
-        Clear is when none of the others is on; less than `least_mw` of one does not count.
+        Clear is the time in which no pulsed jammer of at least `min_mw` is on.
         """
         shape = len(self._context.keys), self._context.robots
         steady_mw, all_mw, clear = np.zeros(shape), np.zeros(shape), np.ones(shape)
@@ -59,75 +63,71 @@ class JammerTable:
             if duty == 1.0:
                 steady_mw[arena] += power_mw
             else:
-                clear[arena, power_mw >= least_mw] *= 1.0 - duty
+                clear[arena, power_mw >= min_mw] *= 1.0 - duty
         return steady_mw.ravel(), all_mw.ravel(), clear.ravel()
 
 
-# --- Jamming: the power of jammers at each robot, and how it comes and goes.
-#
-# It adds to the robot's noise, and to what its radio senses. Powers are those under the poses held; within a tick only
-# whether a jammer is on changes.
-
-
 def powers_of(
-    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, around: PropagationParams
+    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, propagation: PropagationParams
 ) -> FloatArray:
     """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    return _powers(jammers, jammers.places(pose), x, y, robots, obstacles, around)
+    return _powers(jammers, jammers.places(pose), x, y, robots, obstacles, propagation)
 
 
 @njit(cache=True)
-def _powers(jammers, place, x, y, robots, obstacles, around):
+def _powers(jammers, place, x, y, robots, obstacles, propagation):
     power_mw = np.zeros((len(place), robots))
-    amplitude_db = around.amplitude_db if around.shadows else 0.0
-    crossing_db, inside_db_per_m = (around.crossing_db, around.inside_db_per_m) if around.walls else (0.0, 0.0)
+    amplitude_db = propagation.amplitude_db if propagation.shadows else 0.0
+    crossing_db, inside_db_per_m = (
+        (propagation.crossing_db, propagation.inside_db_per_m) if propagation.walls else (0.0, 0.0)
+    )
     for j in range(len(place)):
         arena, jx, jy = jammers.arena[j], place[j, 0], place[j, 1]
-        curve, waves = around.curve, around.field[arena]
+        curve, waves = propagation.curve, propagation.field[arena]
         for i in range(robots):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
-            if around.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
+            if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
                 continue
             rx, ry = x[r], y[r]
             apart_m = math.hypot(rx - jx, ry - jy)
             loss = loss_between_db(
                 curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, apart_m, jx, jy, rx, ry
             )
-            power_mw[j, i] = from_db(jammers.power_dbm[j] + around.receive_dbi[r] - loss)
+            power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw
 
 
 @kernel(from_python=True)
-def refresh(rules, state, queue, now_ns):
-    """Jammers, what they do, or the radio's rules have changed: every robot's noise is what it should be."""
+def refresh(params, state, events, now_ns):
+    """Recompute the noise of all robots after a change of jammers, their power or the PHY parameters."""
     for arena in range(len(state.keys)):
-        _refresh_arena(rules, state, queue, arena, now_ns)
+        _refresh_arena(params, state, events, arena, now_ns)
 
 
 @kernel()
-def toggle(rules, state, queue):
-    """The next jammer that goes on or off does."""
+def toggle(params, state, events):
+    """Switch the next jammer of the schedule on or off."""
     jam = state.jam
-    at = jam.next[0]
+    i = jam.next[0]
     jam.next[0] += 1
-    which = jam.which[at]
+    which = jam.which[i]
     jam.is_on[which] = not jam.is_on[which]
-    _refresh_arena(rules, state, queue, jam.arena[which], jam.at_ns[at])
+    _refresh_arena(params, state, events, jam.arena[which], jam.at_ns[i])
 
 
 @kernel()
-def _refresh_arena(rules, state, queue, arena, now_ns):
+def _refresh_arena(params, state, events, arena, now_ns):
     jam = state.jam
-    for i in range(rules.robots):
-        r = arena * rules.robots + i
-        jam_mw = 0.0  # added up anew each time, so that no rounding piles up
+    for i in range(params.robots):
+        r = arena * params.robots + i
+        jam_mw = 0.0  # summed anew each time, so that no rounding error accumulates
         for j in range(len(jam.arena)):
             if jam.arena[j] == arena and jam.is_on[j]:
                 jam_mw += jam.power_mw[j, i]
-        it = state.reception[r]
-        count_chunk(rules, state.robot, it, now_ns)
-        it.jam_mw = jam_mw
-        dcf.sense(rules, state, queue, r, now_ns)
+        rx = state.reception[r]
+        end_chunk(params, state.robot, rx, now_ns)
+        rx.jam_mw = jam_mw
+        dcf.sense(params, state, events, r, now_ns)

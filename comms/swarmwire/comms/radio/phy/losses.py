@@ -1,6 +1,7 @@
-"""Losses: what takes a frame that was received right, beside noise and interference.
+"""Losses of the PHY beyond noise and interference: fixed loss, measured delivery ratios and bursts.
 
-A further loss is a field of `Losses`, its line in each of the functions below, and, for the unit disk, a stage.
+They apply to frames that were received without errors. To add a loss, add a field to `Losses`, a line to each function
+below and, for the unit disk, a stage. `MeasuredLinks` replaces modelled link strengths by those of a trace.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +21,7 @@ from swarmwire.comms.radio.stages.losses import LOSS, TRACE
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 
-ANSWER_LOSS, ANSWER_TRACE = purpose("fixed loss of an acknowledgement"), purpose("trace of an acknowledgement")
+ACK_LOSS, ACK_TRACE = purpose("fixed loss of an acknowledgement"), purpose("trace of an acknowledgement")
 RECEIVED, LOST, BURST = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.BURST)
 
 
@@ -35,7 +36,7 @@ NOT_TRACED = Traced(np.empty(0, np.int64), np.empty(0))
 
 
 class Losses(NamedTuple):
-    """What losses there are, in numbers."""
+    """Parameters of the losses."""
 
     loss: float  # the same everywhere
     traced: Traced
@@ -44,36 +45,36 @@ class Losses(NamedTuple):
 
 
 def losses_of(radio: Radio, traced: Traced, bursts: BurstStates) -> Losses:
-    """Those of the radio; `bursts` has room for the links that may be used."""
+    """The losses of a radio; `bursts` has room for the links that may be used."""
     return Losses(radio.loss, traced, radio.bursts is not None, bursts.bursting)
 
 
 def passing_share(radio: Radio) -> float:
-    """The share of packets that none of them takes in the long run, on links that were not measured."""
+    """Long-run share of packets that survive all losses, on links without measurements."""
     return (1.0 - radio.loss) * (1.0 - (radio.bursts.loss if radio.bursts else 0.0))
 
 
 @kernel()
-def takes_none(losses):
-    """Whether there is nothing that could take a frame."""
+def has_no_loss(losses):
+    """Whether no loss is configured."""
     return losses.loss == 0.0 and len(losses.traced.link) == 0 and not losses.has_bursts
 
 
 @kernel()
-def taken_by(losses, key, robots, link, s, r, sequence, attempt, is_answer, at_ns):
-    """The fate that a loss gives to a frame from s to r, indices in the arena, or RECEIVED.
+def loss_fate(losses, key, robots, link, s, r, sequence, attempt, is_ack, at_ns):
+    """The fate of a frame from s to r (indices in the arena): LOST, BURST, or RECEIVED if no loss applies.
 
-    Draws are keyed by (sender, receiver, sequence), and attempt; an acknowledgement has draws of its own, and no burst
-    takes it. `link` is that of the robot rows, as `BurstStates` counts them; the frame went on air at `at_ns`.
+    Draws are keyed by (sender, receiver, sequence) and attempt. Acknowledgements have separate draws, and bursts do not
+    affect them. `link` is the link number of the robot rows as in `BurstStates`; `at_ns` is the time on air.
     """
-    fixed_loss, trace = (ANSWER_LOSS, ANSWER_TRACE) if is_answer else (LOSS, TRACE)
+    fixed_loss, trace = (ACK_LOSS, ACK_TRACE) if is_ack else (LOSS, TRACE)
     if losses.loss > 0.0 and uniform(key, s, r, sequence, fixed_loss + attempt) < losses.loss:
         return LOST
     if len(losses.traced.link) > 0:
         ratio = _ratio(losses.traced, s * robots + r)
         if ratio < 1.0 and uniform(key, s, r, sequence, trace + attempt) >= ratio:
             return LOST
-    if losses.has_bursts and not is_answer and takes(losses.bursts, link, key, s, r, sequence, attempt, at_ns):
+    if losses.has_bursts and not is_ack and takes(losses.bursts, link, key, s, r, sequence, attempt, at_ns):
         return BURST
     return RECEIVED
 
@@ -91,19 +92,19 @@ def _ratio(traced, link):
     return traced.ratio[low] if low < len(traced.link) and traced.link[low] == link else 1.0
 
 
-# --- Measured links of signals: their strengths stand in for the model's, each direction with its own.
-
-
 class MeasuredLinks:
-    """What a radio's trace says of the links of all arenas, which are measured alike, at one moment."""
+    """Measured strength and delivery ratio of each directed link at one time; the same in all arenas.
+
+    Measured strengths replace the modelled ones, separately for each direction.
+    """
 
     def __init__(
         self, traces: LinkTraces, others: str, robots: int, arenas: int, send_dbm: FloatArray, receive_dbi: FloatArray
     ) -> None:
         """`others` is the radio's `trace.others`; `robots` stand in each arena.
 
-        `send_dbm` and `receive_dbi` (robots,) are what the antennas had when links were measured: what events change of
-        them then counts on top.
+        `send_dbm` and `receive_dbi` (robots,) are the antenna values during the measurement: gains that events change
+        count on top.
         """
         self._send_dbm, self._receive_dbi = send_dbm, receive_dbi
         self._traces, self._others_end = traces, others == "none"
@@ -113,15 +114,15 @@ class MeasuredLinks:
 
     @classmethod
     def of(cls, context: ChannelContext) -> "MeasuredLinks | None":
-        """Those of the radio's trace; None without one."""
+        """The links of the radio's trace; None without a trace."""
         if context.traces is None or context.radio.trace is None:
             return None
         antennas, antenna = context.antennas, context.radio.antenna_or_default
-        own = antennas.send_dbm(antenna), antennas.receive_dbi(antenna)
-        return cls(context.traces, context.radio.trace.others, context.robots, len(context.keys), *own)
+        antenna_values = antennas.send_dbm(antenna), antennas.receive_dbi(antenna)
+        return cls(context.traces, context.radio.trace.others, context.robots, len(context.keys), *antenna_values)
 
     def move_to(self, now_ns: int) -> None:
-        """It is this time from now on."""
+        """Look up the values at `now_ns`."""
         sender, receiver = np.divmod(self._link, self._robots)
         at_ns = np.full(len(sender), now_ns)
         unknown = np.full(len(sender), np.nan)
@@ -133,15 +134,15 @@ class MeasuredLinks:
     @property
     def traced(self) -> Traced:
         """The links with a delivery ratio."""
-        has = ~np.isnan(self._ratio)
-        return Traced(self._link[has], self._ratio[has])
+        measured = ~np.isnan(self._ratio)
+        return Traced(self._link[measured], self._ratio[measured])
 
     def ratio(self, sender: IntArray, receiver: IntArray) -> FloatArray:
-        """The delivery ratio of links between robot rows, (k,); 1 where none is known."""
+        """Delivery ratio of links between robot rows, (k,); 1 where none was measured."""
         return np.nan_to_num(self._of(self._ratio, np.nan, sender, receiver), nan=1.0)
 
     def with_unlisted(self, a: IntArray, b: IntArray, loss_db: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Pairs of robot rows a < b (k,), and after them those of known strength that are not among them: loss inf."""
+        """Pairs of robot rows a < b (k,), then missing pairs of measured strength, with loss inf."""
         rows = self._robots * self._arenas
         one, other = np.divmod(self._link[~np.isnan(self._rssi_dbm)], self._robots)
         first = self._robots * np.arange(self._arenas)[:, None]
@@ -151,7 +152,7 @@ class MeasuredLinks:
         return a, b, np.concatenate([loss_db, np.full(len(more_a), np.inf)])
 
     def loss_db(self, sender: IntArray, receiver: IntArray, modelled_db: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """The loss of links between robot rows, (k,), and whether it was measured; `modelled_db` is the model's."""
+        """Loss of links between robot rows, (k,), and whether it was measured; else `modelled_db`."""
         budget_db = self._send_dbm[sender % self._robots] + self._receive_dbi[receiver % self._robots]
         rssi_dbm = self._of(self._rssi_dbm, np.nan, sender, receiver)
         is_measured = ~np.isnan(rssi_dbm)
@@ -161,7 +162,7 @@ class MeasuredLinks:
         return loss, is_measured
 
     def _of(self, values, missing, sender: IntArray, receiver: IntArray):
-        """Those of the links between robot rows, or what stands for links that were never measured."""
+        """Values of the links between robot rows, (k,); `missing` for links that were never measured."""
         robots = self._robots
         link = sender % robots * robots + receiver % robots
         if not len(self._link):

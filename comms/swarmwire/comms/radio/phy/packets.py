@@ -1,4 +1,7 @@
-"""What senders learn of their packets, where radios acknowledge."""
+"""Packets of the PHY that are not done, and the transmit statuses that senders get where radios acknowledge.
+
+`PacketTable` keeps the packets beside the rows of dtype PACKET that events work on.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -16,41 +19,38 @@ from swarmwire.comms.packets import (
     TxStatuses,
 )
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
-from swarmwire.comms.radio.phy.state import NOT_LEARNED, PACKET, Table
+from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import NO_ROBOT
 
 
-def learned(packet: Table, tx_status_id: IntArray) -> TxStatuses:
-    """Of packets that are done, what senders learn who ask; those that died before are not there to learn it."""
-    died = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NOT_LEARNED)
-    asked = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~died
-    index = np.flatnonzero(asked)
+def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
+    """Transmit statuses of packets that are done, where requested; senders that died get none."""
+    is_dead = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NO_RESULT)
+    is_reported = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~is_dead
+    index = np.flatnonzero(is_reported)
     if not len(index):
         return NO_TX_STATUSES
     return TxStatuses(packet["sender"][index], tx_status_id[index], packet["result"][index])
 
 
-def sent_in_vain(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
-    """Of packets to robots that are not there, what senders learn who ask: nobody answers."""
+def statuses_to_nowhere(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
+    """Transmit statuses of packets to NOWHERE, where requested: no acknowledgement comes."""
     index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_ids != NOT_MEASURED))
     if not len(index):
         return NO_TX_STATUSES
     return TxStatuses(
-        sent.sender[index], sent.tx_status_ids[index], result_at_first(sent.payloads.sizes[index], max_payload_bytes)
+        sent.sender[index], sent.tx_status_ids[index], initial_result(sent.payloads.sizes[index], max_payload_bytes)
     )
 
 
-def result_at_first(size_bytes: IntArray, max_payload_bytes: int) -> IntArray:
-    """The results of packets (k,) until something better, or worse, comes of them."""
+def initial_result(size_bytes: IntArray, max_payload_bytes: int) -> IntArray:
+    """Results of packets (k,) before any attempt."""
     return np.where(size_bytes > max_payload_bytes, int(TxResult.TOO_LARGE), int(TxResult.NO_ACKNOWLEDGEMENT))
 
 
-# --- Packets that wait at their radios or are under way, and their rows in the table that events work on.
-
-
-HEADER_BYTES = 6  # of IEEE 802.15.4 before its PSDU
+HEADER_BYTES = 6  # IEEE 802.15.4 preamble, delimiter and length, before the PSDU
 
 
 class PacketTable:
@@ -68,18 +68,18 @@ class PacketTable:
         return len(self.table)
 
     def add(self, taken: Transmissions, radio: Radio, robots: int) -> None:
-        """Radios took up these packets; `robots` stand in each arena."""
+        """Append packets that radios admitted; each arena has `robots` robots."""
         self.queued = self.queued.followed_by(taken)
         self.table = np.concatenate([self.table, packet_rows(taken, radio, robots)])
 
     def by_sender(self, rows: int) -> tuple[IntArray, IntArray]:
-        """Packets in order of `rows` senders and of sending, and where each robot's start in that, (rows + 1,)."""
+        """Packet indices sorted by sender, then by order of sending; and each robot's first one, (rows + 1,)."""
         sender = self.table["sender"]
         order = np.argsort(sender, kind="stable")
         return order, np.searchsorted(sender[order], np.arange(rows + 1))
 
     def forget_done(self) -> None:
-        """Packets that are done are gone; those whose one receiver received them are meant for nobody any more."""
+        """Drop packets that are done; packets with a recorded reception have no intended receivers left."""
         settled = self.table["is_settled"] > 0
         kept = np.flatnonzero(self.table["is_done"] == 0)
         self.table["is_departed"] |= settled
@@ -87,13 +87,13 @@ class PacketTable:
         self.queued, self.table = queued.select(kept), self.table[kept]
 
     def drain(self) -> Transmissions:
-        """Take out all of them."""
+        """Take out all packets."""
         packets, self.queued, self.table = self.queued, Transmissions.none(), np.zeros(0, PACKET)
         return packets
 
 
 def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
-    """Rows of dtype PACKET for packets that wait at their radios, (k,)."""
+    """Rows of dtype PACKET for packets that wait at their radios, (k,); `robots` per arena."""
     frame_bytes = taken.payloads.sizes + radio.overhead_bytes
     packet: Table = np.zeros(len(taken.sender), PACKET)
     packet["sender"], packet["sequence"] = taken.sender, taken.sequence
@@ -101,7 +101,7 @@ def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
     packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
     packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
     packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)
-    packet["result"] = result_at_first(taken.payloads.sizes, radio.max_payload_bytes)
+    packet["result"] = initial_result(taken.payloads.sizes, radio.max_payload_bytes)
     if radio.access_or_default.method == "csma-802154":
-        packet["pause_ns"] = IEEE_802_15_4.space_ns(frame_bytes - HEADER_BYTES)
+        packet["pause_ns"] = IEEE_802_15_4.ifs_ns(frame_bytes - HEADER_BYTES)
     return packet

@@ -1,8 +1,8 @@
-"""The table of links: who is near enough to whom to hear or to disturb, and how strong.
+"""Pairs of robots near enough to receive or to interfere, and the loss and fading gain between them.
 
-Power = transmit power + both antennas - path loss - shadowing - walls - bodies, and fading on top. All but the sender's
-power and event-made differences is the same both ways and depends on poses alone, so that each pair is computed once.
-A pair is left out if path loss alone, or all but fading, leaves it below the cut-off: it neither hears nor disturbs.
+Power = transmit power + both antenna gains - path loss - shadowing - walls - bodies, and fading on top. All but the
+sender's power and the gains set by events is the same in both directions and depends on poses alone, so each pair is
+computed once. A pair is left out if path loss alone, or everything but fading, leaves it below the cut-off.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -32,10 +32,10 @@ class Pairs(NamedTuple):
 
     a: IntArray  # (k,)
     b: IntArray  # (k,)
-    loss_db: FloatArray  # (k,) from a to b, without antennas and fading
-    back_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
-    gain: FloatArray  # (k,) of fading, a ratio
-    blocked: IntArray  # (k,) 1 where an obstacle stands in a needed line of sight
+    loss_db: FloatArray  # (k,) from a to b, without antenna gains and fading
+    reverse_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
+    gain: FloatArray  # (k,) power gain of fading, a ratio
+    blocked: IntArray  # (k,) 1 where an obstacle blocks a required line of sight
 
 
 def pairs_of(
@@ -44,96 +44,102 @@ def pairs_of(
     keys,
     running: BoolArray,
     obstacles: Obstacles,
-    around: PropagationParams,
+    propagation: PropagationParams,
     measured: MeasuredLinks | None = None,
 ) -> Pairs:
-    """All pairs above the cut-off of robots that stand at `pose` (rows, 3), and those of measured strength.
+    """All pairs above the cut-off of robots at `pose` (rows, 3), and all pairs of measured strength.
 
     Arenas that are not `running` (arenas,) are left out.
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
-    cells = robot_index.build(x, y, len(keys), size_m, around.reach_m * CELL_SLACK, running)
-    a, b, loss = _near(x, y, robots, cells, around)
-    if around.shadows:
-        _add_shadows(loss, x, y, robots, cells.order, around.field, around.amplitude_db, a, b)
-    if around.walls:
-        _add_walls(loss, x, y, robots, obstacles, around.crossing_db, around.inside_db_per_m, a, b)
-    if around.bodies:
-        _add_bodies(loss, x, y, robots, cells, around.radius_m, around.most_radius_m, around.body_db, a, b)
-    kept = int(_above(around.least_dbm, around.send_dbm, around.receive_dbi, a, b, loss))
+    cells = robot_index.build(x, y, len(keys), size_m, propagation.reach_m * CELL_SLACK, running)
+    a, b, loss = _near(x, y, robots, cells, propagation)
+    if propagation.shadows:
+        _add_shadows(loss, x, y, robots, cells.order, propagation.field, propagation.amplitude_db, a, b)
+    if propagation.walls:
+        _add_walls(loss, x, y, robots, obstacles, propagation.crossing_db, propagation.inside_db_per_m, a, b)
+    if propagation.bodies:
+        _add_bodies(
+            loss, x, y, robots, cells, propagation.radius_m, propagation.max_radius_m, propagation.body_db, a, b
+        )
+    kept = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
     a, b, loss = a[:kept], b[:kept], loss[:kept]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
-    if around.fades:
-        _fade(gain, x, y, robots, keys, cells.order, around.scatter, around.law, a, b)
-    if around.line_of_sight:
+    if propagation.fades:
+        _fade(gain, x, y, robots, keys, cells.order, propagation.scatter, propagation.fading_model, a, b)
+    if propagation.line_of_sight:
         _find_blocked(blocked, x, y, robots, obstacles, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
     return pairs if measured is None else _measured(pairs, measured)
 
 
 def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
-    """The pairs with what was measured in place of the model, each way; what blocked them was measured, too."""
+    """The pairs with measured losses in place of modelled ones, per direction; these include any blocking."""
     a, b, blocked = pairs.a, pairs.b, pairs.blocked > 0
-    there_db, is_there = measured.loss_db(a, b, pairs.loss_db)
-    back_db, is_back = measured.loss_db(b, a, pairs.loss_db)
-    there_db[blocked & is_back & ~is_there] = np.inf
-    back_db[blocked & is_there & ~is_back] = np.inf
-    still_blocked = np.where(is_there | is_back, 0, pairs.blocked)
-    return pairs._replace(loss_db=there_db, back_db=back_db, blocked=still_blocked)
+    forward_db, forward_measured = measured.loss_db(a, b, pairs.loss_db)
+    reverse_db, reverse_measured = measured.loss_db(b, a, pairs.loss_db)
+    forward_db[blocked & reverse_measured & ~forward_measured] = np.inf
+    reverse_db[blocked & forward_measured & ~reverse_measured] = np.inf
+    still_blocked = np.where(forward_measured | reverse_measured, 0, pairs.blocked)
+    return pairs._replace(loss_db=forward_db, reverse_db=reverse_db, blocked=still_blocked)
 
 
 @njit(cache=True)
-def _near(x, y, robots, cells, around):
-    """Pairs above the cut-off by path loss alone, but for what shadowing may add, and this loss in dB."""
+def _near(x, y, robots, cells, propagation):
+    """Pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
     ahead = np.empty((len(cells.order), 2, 2), np.uint64)
-    most = _look_ahead(ahead, x, y, robots, cells)
-    a, b, loss = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    near, metres2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
-    there_x, there_y = x[cells.order], y[cells.order]
-    found = _join(a, b, loss, cells.order, there_x, there_y, ahead, around, near, metres2)
-    return a[:found], b[:found], loss[:found]
+    capacity = _look_ahead(ahead, x, y, robots, cells)
+    a, b, loss = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
+    near, square_distance_m2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
+    sorted_x, sorted_y = x[cells.order], y[cells.order]
+    count = _join(a, b, loss, cells.order, sorted_x, sorted_y, ahead, propagation, near, square_distance_m2)
+    return a[:count], b[:count], loss[:count]
 
 
 @kernel()
 def _look_ahead(ahead, x, y, robots, cells):
-    """Whom the robot at each place in the grid's order makes pairs with, and how many pairs there are at most.
+    """Find the candidate partners of the robot at each place in grid order; return the number of candidate pairs.
 
-    What comes later in its own row of cells (j = 0), and the row above (j = 1): from ahead[place, j, 0] on to before
-    ahead[place, j, 1].
+    Candidates are later robots in the same row of cells (j = 0) and robots in the row above (j = 1):
+    ahead[place, j, 0] up to, without, ahead[place, j, 1].
     """
-    most = 0
+    capacity = 0
     for at in range(len(cells.order)):
         s = cells.order[at]
         for j in range(2):
             first, stop = strip(x[s], y[s], s // robots, cells, j)
             first = at + 1 if j == 0 else first
             ahead[at, j, 0], ahead[at, j, 1] = first, stop
-            most += stop - first
-    return most
+            capacity += stop - first
+    return capacity
 
 
 @kernel()
-def _join(a, b, loss, order, x, y, ahead, around, near, metres2):
-    """Put in the pairs, and say how many; `x` and `y` are in the grid's order."""
-    found, square_m2, curve = np.uint64(0), around.reach_m * around.reach_m, around.curve
-    send_dbm, receive_dbi, least_dbm = around.send_dbm, around.receive_dbi, around.least_dbm - around.spread_db
+def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2):
+    """Fill in the pairs and return their number; `x` and `y` are in grid order."""
+    count, square_m2, curve = np.uint64(0), propagation.reach_m * propagation.reach_m, propagation.curve
+    send_dbm, receive_dbi, min_dbm = (
+        propagation.send_dbm,
+        propagation.receive_dbi,
+        propagation.min_dbm - propagation.spread_db,
+    )
     for at in range(np.uint64(len(x))):
-        few, s = np.uint64(0), order[at]
+        candidates, s = np.uint64(0), order[at]
         for j in range(2):
             for k in range(ahead[at, j, 0], ahead[at, j, 1]):
                 dx, dy = x[k] - x[at], y[k] - y[at]
-                # Written first and kept if it counts: a branch would be guessed wrong too often.
-                near[few], metres2[few] = k, dx * dx + dy * dy
-                few += np.uint64(metres2[few] <= square_m2)
-        for k in range(few):
+                # Branchless: write first, then advance if it counts; a branch would be mispredicted too often.
+                near[candidates], square_distance_m2[candidates] = k, dx * dx + dy * dy
+                candidates += np.uint64(square_distance_m2[candidates] <= square_m2)
+        for k in range(candidates):
             r = order[near[k]]
-            a[found], b[found], loss[found] = min(s, r), max(s, r), loss_db(curve, math.sqrt(metres2[k]))
-            # Who is near enough must not depend on other robots' antennas, of which `reach_m` knows the best.
-            found += np.uint64(_best_dbm(send_dbm, receive_dbi, s, r) - loss[found] >= least_dbm)
-    return found
+            a[count], b[count], loss[count] = min(s, r), max(s, r), loss_db(curve, math.sqrt(square_distance_m2[k]))
+            # Membership must not depend on the antennas of other robots, the best of which are in `reach_m`.
+            count += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[count] >= min_dbm)
+    return count
 
 
 @njit(cache=True)
@@ -161,46 +167,46 @@ def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b
 
 
 @njit(cache=True)
-def _add_bodies(loss, x, y, robots, cells, radius_m, most_radius_m, body_db, a, b):
+def _add_bodies(loss, x, y, robots, cells, radius_m, max_radius_m, body_db, a, b):
     for i in range(len(a)):
-        loss[i] += body_db * bodies_between(x, y, radius_m, most_radius_m, cells, robots, a[i], b[i])
+        loss[i] += body_db * bodies_between(x, y, radius_m, max_radius_m, cells, robots, a[i], b[i])
 
 
 @kernel(from_python=True)
-def _above(least_dbm, send_dbm, receive_dbi, a, b, loss):
-    """Put pairs in which either hears the other with so much power before the others, and say how many there are."""
+def _above(min_dbm, send_dbm, receive_dbi, a, b, loss):
+    """Move pairs of at least `min_dbm` in either direction to the front and return their number."""
     kept = np.uint64(0)
     for i in range(len(a)):
         s, r = a[i], b[i]
         a[kept], b[kept], loss[kept] = s, r, loss[i]
-        kept += np.uint64(_best_dbm(send_dbm, receive_dbi, s, r) - loss[i] >= least_dbm)
+        kept += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[i] >= min_dbm)
     return kept
 
 
 @kernel()
-def _best_dbm(send_dbm, receive_dbi, s, r):
-    """The power with which the better of both would hear the other, without losses."""
+def _max_dbm(send_dbm, receive_dbi, s, r):
+    """Power in the better direction, before losses."""
     s, r = np.uint64(s), np.uint64(r)
     return max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s])
 
 
 @njit(cache=True)
-def _fade(gain, x, y, robots, keys, rows, scatter, law, a, b):
+def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
     at, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:
         fading.arriving(scatter[r // robots], x[r], y[r], at[r])
         number[r] = fading.own_number(keys[r // robots], r % robots)
     parts = np.empty((2, SUMS), np.float32)
-    _gains(gain, x, y, at, number, law, a, b, parts[0], parts[1])
+    _gains(gain, x, y, at, number, fading_model, a, b, parts[0], parts[1])
 
 
 @kernel()
-def _gains(gain, x, y, at, number, law, a, b, real, imaginary):
+def _gains(gain, x, y, at, number, fading_model, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
         h = fading.scattered(fading.signs_of(number[s], number[r]), at, s, r, real, imaginary)
         dx, dy = x[r] - x[s], y[r] - y[s]
-        gain[i] = gain_of(law, h, math.sqrt(dx * dx + dy * dy))
+        gain[i] = gain_of(fading_model, h, math.sqrt(dx * dx + dy * dy))
 
 
 @njit(cache=True)

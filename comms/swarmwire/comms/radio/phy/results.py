@@ -1,4 +1,4 @@
-"""What the run of events tells: which packets ended, where, and how."""
+"""The result buffer of the PHY: fates of packets, at the sender's radio or at each receiver."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -9,124 +9,131 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.phy.event_queue import ANSWER, schedule
-from swarmwire.comms.radio.phy.state import HELD, NOTHING
+from swarmwire.comms.radio.phy.event_queue import SEND_ACK, schedule
+from swarmwire.comms.radio.phy.state import HELD, IDLE
 from swarmwire.comms.truth import NO_ROBOT
 
 
 class ResultBuffer(NamedTuple):
-    """What the run of events tells, (capacity,) each: a row per packet and receiver, or per packet never on air."""
+    """Result rows as columns, (capacity,) each: one per packet and receiver, or per packet never on air."""
 
     packet: IntArray
-    receiver: IntArray  # robot row or NOBODY
+    receiver: IntArray  # robot row or NO_ROBOT
     fate: IntArray
     in_range: IntArray
     final_at_ns: IntArray
     hold: IntArray
     on_air_at_ns: IntArray
     power_mw: FloatArray  # at the receiver
-    count: IntArray  # (1,) rows told
+    count: IntArray  # (1,) rows in use
 
 
-def room_for(capacity: int) -> ResultBuffer:
-    """Room for so many rows."""
+def result_buffer(capacity: int) -> ResultBuffer:
+    """An empty buffer of `capacity` rows."""
     columns = (np.empty(capacity, np.int64) for _ in range(7))
     return ResultBuffer._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])
 
 
-def taken_out(room: ResultBuffer) -> ResultBuffer:
-    """The rows that were told, out of `room`, which is empty again."""
-    count = int(room.count[0])
-    rows = ResultBuffer._make([*(column[:count].copy() for column in room[:-1]), room.count.copy()])
-    room.count[0] = 0
+def take_rows(buffer: ResultBuffer) -> ResultBuffer:
+    """Copy the rows out of `buffer` and empty it."""
+    count = int(buffer.count[0])
+    rows = ResultBuffer._make([*(column[:count].copy() for column in buffer[:-1]), buffer.count.copy()])
+    buffer.count[0] = 0
     return rows
-
-
-# --- Telling: what became of a packet, at its sender's radio or at each receiver.
 
 
 RECEIVED, BLOCKED, BLACKOUT = int(Fate.RECEIVED), int(Fate.BLOCKED), int(Fate.BLACKOUT)
 
 
 @kernel()
-def refuse(state, told, index, fate, now_ns):
-    """A packet ends at its sender's radio."""
+def record_at_sender(state, buffer, index, fate, now_ns):
+    """Record the fate of a packet that ends at its sender's radio."""
     packet = state.packet[index]
     packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
-    _tell(state, told, index, NO_ROBOT, fate, 0, now_ns, 0, 0.0)
+    _record(state, buffer, index, NO_ROBOT, fate, 0, now_ns, 0, 0.0)
 
 
 @kernel()
-def give_up_older(state, told, r, newest, now_ns):
-    """What waits at the robot's radio before the packet at place `newest` of its order ends: the radio is off."""
-    me = state.robot[r]
-    if me.stage == HELD:
-        if me.attempt == 0:
-            refuse(state, told, me.packet, BLACKOUT, now_ns)
+def drop_older(state, buffer, r, newest, now_ns):
+    """End packets that wait before the one at place `newest` of the order, since the radio is off: BLACKOUT."""
+    radio = state.robot[r]
+    if radio.stage == HELD:
+        if radio.attempt == 0:
+            record_at_sender(state, buffer, radio.packet, BLACKOUT, now_ns)
         else:
-            settle(state, told, r, now_ns)
-        me.stage, me.packet = NOTHING, NO_ROBOT
-    for at in range(me.next, newest):
+            record_last_attempt(state, buffer, r, now_ns)
+        radio.stage, radio.packet = IDLE, NO_ROBOT
+    for at in range(radio.next, newest):
         if not state.packet[state.order[at]].is_done:
-            refuse(state, told, state.order[at], BLACKOUT, now_ns)
-    me.waiting = 0
+            record_at_sender(state, buffer, state.order[at], BLACKOUT, now_ns)
+    radio.waiting = 0
 
 
 @kernel()
-def report(rules, state, queue, told, r, now_ns):
-    """Tell what became of a frame: at each robot in range, and at those out of range that received it."""
-    me = state.robot[r]
-    packet = state.packet[me.packet]
-    me.last_fate, me.last_in_range, me.last_mw = NO_ROBOT, 0, 0.0
-    link, to, hold, index = state.link, packet.to, me.hold, me.packet
+def record_frame(params, state, events, buffer, r, now_ns):
+    """Record a frame's fate at each robot in range, and at robots out of range that received it."""
+    radio = state.robot[r]
+    packet = state.packet[radio.packet]
+    radio.last_fate, radio.last_in_range, radio.last_mw = NO_ROBOT, 0, 0.0
+    link, to, hold, index = state.link, packet.to, radio.hold, radio.packet
     if to == NO_ROBOT:
-        _tell_all(state, told, r, now_ns)
+        _record_broadcast(state, buffer, r, now_ns)
         return
-    for i in range(me.first_link, me.weak_link):
-        receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].now), link[i].power_mw
-        if to != receiver or not (link[i].is_listed or fate == RECEIVED):
+    for i in range(radio.first_link, radio.weak_link):
+        receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].frame_fate), link[i].power_mw
+        if to != receiver or not (link[i].above_sensitivity or fate == RECEIVED):
             continue
         in_range = 0 if fate == BLOCKED else 1
-        me.last_fate, me.last_in_range, me.last_mw = fate, in_range, power_mw
+        radio.last_fate, radio.last_in_range, radio.last_mw = fate, in_range, power_mw
         if fate == RECEIVED:
             if not packet.is_settled:
                 packet.is_settled = 1
-                _tell(state, told, index, receiver, RECEIVED, 1, now_ns, hold, power_mw)
-            if rules.acknowledged:
-                state.robot[receiver].answers_to = r
-                schedule(queue, ANSWER, receiver, now_ns + rules.short_space_ns)
+                _record(state, buffer, index, receiver, RECEIVED, 1, now_ns, hold, power_mw)
+            if params.acknowledged:
+                state.robot[receiver].ack_to = r
+                schedule(events, SEND_ACK, receiver, now_ns + params.sifs_ns)
 
 
 @kernel()
-def _tell_all(state, told, r, now_ns):
-    me, link = state.robot[r], state.link
-    on_air_at_ns, at = state.packet[me.packet].on_air_at_ns, np.uint64(told.count[0])
-    for i in range(np.uint64(me.first_link), np.uint64(me.weak_link)):
-        one = link[i]
-        fate = one.now
-        # Written first and kept if it counts: a branch would be guessed wrong too often.
-        told.packet[at], told.receiver[at], told.fate[at] = me.packet, one.receiver, fate
-        told.in_range[at], told.final_at_ns[at], told.hold[at] = fate != BLOCKED, now_ns, me.hold
-        told.on_air_at_ns[at], told.power_mw[at] = on_air_at_ns, one.power_mw
-        at += np.uint64(one.is_listed | (fate == RECEIVED))
-    told.count[0] = at
+def _record_broadcast(state, buffer, r, now_ns):
+    radio, link = state.robot[r], state.link
+    on_air_at_ns, at = state.packet[radio.packet].on_air_at_ns, np.uint64(buffer.count[0])
+    for i in range(np.uint64(radio.first_link), np.uint64(radio.weak_link)):
+        row = link[i]
+        fate = row.frame_fate
+        # Branchless: write first, then advance if it counts; a branch would be mispredicted too often.
+        buffer.packet[at], buffer.receiver[at], buffer.fate[at] = radio.packet, row.receiver, fate
+        buffer.in_range[at], buffer.final_at_ns[at], buffer.hold[at] = fate != BLOCKED, now_ns, radio.hold
+        buffer.on_air_at_ns[at], buffer.power_mw[at] = on_air_at_ns, row.power_mw
+        at += np.uint64(row.above_sensitivity | (fate == RECEIVED))
+    buffer.count[0] = at
 
 
 @kernel()
-def settle(state, told, r, now_ns):
-    """An addressed packet is given up: its fate is that of the last attempt, if nothing else was told."""
-    me = state.robot[r]
-    packet = state.packet[me.packet]
+def record_last_attempt(state, buffer, r, now_ns):
+    """End a unicast packet with the fate of its last attempt, unless its reception is recorded already."""
+    radio = state.robot[r]
+    packet = state.packet[radio.packet]
     packet.is_done = 1
-    if not packet.is_settled and me.last_fate != NO_ROBOT:
+    if not packet.is_settled and radio.last_fate != NO_ROBOT:
         packet.is_settled = 1
-        _tell(state, told, me.packet, packet.to, me.last_fate, me.last_in_range, now_ns, me.hold, me.last_mw)
+        _record(
+            state,
+            buffer,
+            radio.packet,
+            packet.to,
+            radio.last_fate,
+            radio.last_in_range,
+            now_ns,
+            radio.hold,
+            radio.last_mw,
+        )
 
 
 @kernel()
-def _tell(state, told, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
-    at = told.count[0]
-    told.packet[at], told.receiver[at], told.fate[at], told.in_range[at] = packet, receiver, fate, in_range
-    told.final_at_ns[at], told.hold[at], told.power_mw[at] = final_at_ns, hold, power_mw
-    told.on_air_at_ns[at] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
-    told.count[0] += 1
+def _record(state, buffer, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
+    at = buffer.count[0]
+    buffer.packet[at], buffer.receiver[at], buffer.fate[at], buffer.in_range[at] = packet, receiver, fate, in_range
+    buffer.final_at_ns[at], buffer.hold[at], buffer.power_mw[at] = final_at_ns, hold, power_mw
+    buffer.on_air_at_ns[at] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
+    buffer.count[0] += 1

@@ -1,4 +1,7 @@
-"""The tables that the run of events works on: robots, links, packets."""
+"""Tables of the PHY's event simulation: robots, receptions, packets and links.
+
+Rows are numpy records. Comments state the meaning of each field.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,21 +13,21 @@ from numpy.typing import NDArray
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.truth import NO_ROBOT
 
-# What a robot's radio does with the packet at the head of its queue; from BACKING_OFF on there is one.
-NOTHING, PAUSING, BACKING_OFF, LISTENING, TURNING, SENDING, AWAITING, HELD = range(8)
-# What becomes of packets of a radio that is off, beside the fates: they wait for it.
+# Stage of a robot's radio; from BACKING_OFF on it serves a packet.
+IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, HELD = range(8)
+# Outage policies beside the fates: packets of a radio that is off wait for it.
 KEPT_ALL, KEPT_NEWEST = -1, -2
-# What a robot has on air.
+# The kind of frame that a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
-RECEIVING = 255  # of a link, beside the fates: the frame on air may still be received
+RECEIVING = 255  # a link's `frame_fate` while the frame is being received
 LONG_AGO_NS = -(10**15)
-NOT_LEARNED = -1  # the result of a packet whose sender died while it was on air
+NO_RESULT = -1  # result of a packet whose sender died while it was on air
 
 _I, _F = np.int64, np.float64
 
 
 def _rows(fields: list[tuple[str, type]]) -> np.dtype[np.void]:
-    """Rows whose fields are attributes, as they are in compiled code, also where the compiler is off."""
+    """A record type: fields are attributes, as in compiled code, also with the compiler off."""
     return np.dtype((np.record, np.dtype(fields, align=True)))
 
 
@@ -32,128 +35,128 @@ ROBOT = _rows(
     [
         # The queue: places in the order of packets by sender.
         ("next", _I),  # the first packet that is not served yet
-        ("entry", _I),  # the first that its radio was not handed yet
+        ("entry", _I),  # the first that has not entered the queue yet
         ("stop", _I),
-        ("waiting", _I),  # packets handed over, not served yet
+        ("waiting", _I),  # packets in the queue, not served yet
         # Access.
         ("stage", _I),
         ("packet", _I),  # being served, from BACKING_OFF on
-        ("attempt", _I),  # of this packet, from 0
-        ("busy_times", _I),  # CSMA: NB
-        ("exponent", _I),  # CSMA: BE; DCF: how often the window was doubled
-        ("slots", _I),  # DCF: left to wait, counted from `free_from_ns` + DIFS while the medium is free
-        ("free_from_ns", _I),  # DCF
-        ("trust_from_ns", _I),  # DCF: after a frame that was not understood the medium counts as free only from here
+        ("attempt", _I),  # attempt number of this packet, from 0
+        ("nb", _I),  # CSMA: NB, number of busy CCAs
+        ("exponent", _I),  # CSMA: BE; DCF: number of window doublings
+        ("backoff_slots", _I),  # DCF: remaining slots, counted from `free_from_ns` + DIFS while the medium is idle
+        ("free_from_ns", _I),  # DCF: start of the idle period
+        ("eifs_until_ns", _I),  # DCF: after a frame that was not decoded the medium counts as idle only from here
         # The frame on air.
         ("on_air", _I),
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
-        ("first_link", _I),  # those that may be told of
-        ("weak_link", _I),  # and, from here on, those that only disturb
+        ("first_link", _I),  # strong links: their fates are recorded
+        ("weak_link", _I),  # from here on interference only
         ("stop_link", _I),
-        ("hold", _I),  # of the poses held when it went on air
+        ("hold", _I),  # number of the poses when it went on air
         # Acknowledgements.
-        ("answers_to", _I),  # sender row
-        ("last_fate", _I),  # of the latest attempt at an addressed packet
+        ("ack_to", _I),  # sender row of the frame to acknowledge
+        ("last_fate", _I),  # of the latest attempt at a unicast packet
         ("last_in_range", _I),
         ("last_mw", _F),
     ]
 )
-# What every frame on air changes at every robot near, and so in one line of the processor's cache.
+# State that every frame changes at every robot nearby; small enough for one cache line.
 RECEPTION = _rows(
     [
-        ("power_mw", _F),  # all frames on air here
-        ("peak_mw", _F),  # CSMA: most of `power_mw` while it listens
+        ("power_mw", _F),  # sum of all frames on air here
+        ("peak_mw", _F),  # CSMA: maximum of `power_mw` during the CCA
         ("signal_mw", _F),  # the frame being received; inf if there is none
-        ("log_success", _F),  # of its chunks so far
+        ("log_success", _F),  # sum over its chunks so far
         ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
-        ("locked_to", np.int32),  # sender row of the frame being received, or NOBODY
-        ("link", np.int32),  # and its link
-        ("signals", np.int32),  # frames on air here
-        ("jam_mw", np.float32),  # all that is no frame
-        ("jam_log", np.float32),  # what that has taken from `log_success`
+        ("locked_to", np.int32),  # sender row of the frame being received, or NO_ROBOT
+        ("link", np.int32),  # link row of that frame
+        ("signals", np.int32),  # number of frames on air here
+        ("jam_mw", np.float32),  # power of jammers
+        ("jam_log", np.float32),  # the part of `log_success` due to jammers
         ("is_deaf", np.int8),  # it sends, or is about to
-        ("is_busy", np.int8),  # DCF: as it was when last looked at
+        ("is_busy", np.int8),  # DCF: latest result of carrier sense
     ]
 )
 PACKET = _rows(
     [
         ("sender", _I),
-        ("to", _I),  # robot row, or NOBODY: a broadcast
+        ("to", _I),  # robot row, or NO_ROBOT: a broadcast
         ("sequence", _I),
         ("sent_at_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
-        ("pause_ns", _I),  # silence of its sender after it
-        ("refused", _I),  # 0, or the fate that its size gives it
+        ("pause_ns", _I),  # interframe space after it
+        ("refused", _I),  # 0, or TOO_LARGE
         ("is_entered", _I),
-        ("is_settled", _I),  # its one receiver received it
+        ("is_settled", _I),  # the fate at its one receiver is recorded
         ("is_done", _I),
-        ("is_departed", _I),  # it was reported before, and is not done yet
+        ("is_departed", _I),  # it left the sender in earlier results, and is not done yet
         ("on_air_at_ns", _I),  # of the latest attempt
-        ("fate", _I),  # that it had at the sender's radio, or RECEIVED: it was on air
-        ("result", _I),  # TxResult, once it is done: what its sender knows
+        ("fate", _I),  # at the sender's radio; RECEIVED: it was on air
+        ("result", _I),  # TxResult for its sender, valid once it is done
     ]
 )
-# Links by sender: to robots that may be told of a frame, and then to those that it only disturbs. In few bytes, since
-# each frame goes over its links three times, and the next frame over others.
+# Links by sender: strong links, then links of interference only. Rows are small, since each frame passes over its links
+# three times, and the next frame over others.
 LINK = _rows(
     [
         ("power_mw", _F),  # at the receiver, with fading
         ("receiver", np.int32),  # robot row
-        ("is_listed", np.bool_),  # mean power reaches the sensitivity
-        ("fate", np.uint8),  # RECEIVED: open; else what ends every packet here
-        ("now", np.uint8),  # of the frame on air: RECEIVING or a fate
+        ("above_sensitivity", np.bool_),  # mean power reaches the sensitivity
+        ("fate", np.uint8),  # RECEIVED: open; else the drop reason of every packet
+        ("frame_fate", np.uint8),  # fate of the frame on air, or RECEIVING
     ]
 )
 Table = NDArray[np.void]
 
 
 class LinkPlaces(NamedTuple):
-    """Where in a table of links each robot's are, (rows,) each."""
+    """Rows of each robot's links in the link table, (rows,) each."""
 
     first: IntArray
-    weak: IntArray  # the first that it only disturbs
+    weak: IntArray  # the first link of interference only
     stop: IntArray
 
 
-class Jam(NamedTuple):
-    """Jammers under the poses held, and when they go on or off until the next."""
+class JammerSchedule(NamedTuple):
+    """Jammers under the current poses, and their switching times until the next poses."""
 
     arena: IntArray  # (k,)
     power_mw: FloatArray  # (k, robots) at each robot of the arena
     is_on: BoolArray  # (k,)
     at_ns: IntArray  # (n,) rising
-    which: IntArray  # (n,) the jammer that goes on if it is off, or off
-    next: IntArray  # (1,) the first of them that has not come yet
+    which: IntArray  # (n,) the jammer that switches
+    next: IntArray  # (1,) index of the next switching time
 
 
 class PhyState(NamedTuple):
-    """All that events read and change."""
+    """Everything that events read and change."""
 
     keys: KeyArray
     robot: Table
     reception: Table
     link: Table
-    places: LinkPlaces  # under the poses held
-    hold: int  # which poses these are
+    places: LinkPlaces  # under the current poses
+    hold: int  # number of the current poses
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
-    off: IntArray  # (rows,) RECEIVED: the radio is on; else the fate of what it should send, or KEPT_ALL or KEPT_NEWEST
-    jam: Jam
+    off: IntArray  # (rows,) RECEIVED: radio on; else the fate of packets to send, KEPT_ALL or KEPT_NEWEST
+    jam: JammerSchedule
 
 
-def robots_at_rest(rows: int) -> Table:
-    """A table of dtype ROBOT: nobody has a packet, and the medium has been free for long."""
+def idle_robots(rows: int) -> Table:
+    """A table of dtype ROBOT: no packets, and a medium that has been idle for long."""
     robot: Table = np.zeros(rows, ROBOT)
-    robot["packet"] = robot["answers_to"] = NO_ROBOT
+    robot["packet"] = robot["ack_to"] = NO_ROBOT
     robot["free_from_ns"] = LONG_AGO_NS
     return robot
 
 
-def receptions_of_nothing(rows: int) -> Table:
-    """A table of dtype RECEPTION: nothing is on air."""
+def idle_receptions(rows: int) -> Table:
+    """A table of dtype RECEPTION: no frame is on air."""
     reception: Table = np.zeros(rows, RECEPTION)
     reception["locked_to"], reception["signal_mw"] = NO_ROBOT, np.inf
     return reception

@@ -1,4 +1,7 @@
-"""The queue at each sender's radio: what is handed over waits, is taken up one by one, and ends with its robot."""
+"""Transmit queues of the PHY: first in, first out, one packet in service at a time.
+
+A radio that is off ends its packets, or holds them until it is on again; the queue of a dead robot ends.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,172 +13,170 @@ from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results
-from swarmwire.comms.radio.phy.event_queue import ANSWER, ENTER, LISTENED, SEND, TIMER, cancel, schedule
+from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, SEND, SEND_ACK, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
-    AWAITING,
+    AWAITING_ACK,
     BACKING_OFF,
     HELD,
+    IDLE,
     KEPT_ALL,
     KEPT_NEWEST,
-    NOT_LEARNED,
-    NOTHING,
-    PAUSING,
+    NO_RESULT,
     SENDING,
     SILENT,
-    TURNING,
+    SPACING,
+    TURNAROUND,
 )
 from swarmwire.comms.truth import NO_ROBOT
 
-QUEUE_FULL, FOUND_FULL = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
+QUEUE_FULL, QUEUE_FULL_RESULT = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")
 
 
 @kernel()
-def enter(rules, state, queue, told, r, now_ns):
-    """The robot's radio is handed what was sent by now: it waits, or is refused."""
-    me = state.robot[r]
-    while me.entry < me.stop and state.packet[state.order[me.entry]].sent_at_ns <= now_ns:
-        index = state.order[me.entry]
+def enter(params, state, events, buffer, r, now_ns):
+    """Admit packets sent by `now_ns` to the robot's queue, or end them there: too large, or queue full."""
+    radio = state.robot[r]
+    while radio.entry < radio.stop and state.packet[state.order[radio.entry]].sent_at_ns <= now_ns:
+        index = state.order[radio.entry]
         packet = state.packet[index]
         packet.is_entered = 1
-        me.entry += 1
+        radio.entry += 1
         if packet.refused:
-            results.refuse(state, told, index, packet.refused, now_ns)
-        elif state.off[r] != KEPT_NEWEST and _is_full(rules, state, r):
-            packet.result = FOUND_FULL
-            results.refuse(state, told, index, QUEUE_FULL, now_ns)
+            results.record_at_sender(state, buffer, index, packet.refused, now_ns)
+        elif state.off[r] != KEPT_NEWEST and _is_full(params, state, r):
+            packet.result = QUEUE_FULL_RESULT
+            results.record_at_sender(state, buffer, index, QUEUE_FULL, now_ns)
         else:
             if state.off[r] == KEPT_NEWEST:
-                results.give_up_older(state, told, r, me.entry - 1, now_ns)
-            me.waiting += 1
-            if me.stage == NOTHING:
-                serve(rules, state, queue, r, now_ns)
-    if me.entry < me.stop:
-        schedule(queue, ENTER, r, state.packet[state.order[me.entry]].sent_at_ns)
+                results.drop_older(state, buffer, r, radio.entry - 1, now_ns)
+            radio.waiting += 1
+            if radio.stage == IDLE:
+                serve(params, state, events, r, now_ns)
+    if radio.entry < radio.stop:
+        schedule(events, ENQUEUE, r, state.packet[state.order[radio.entry]].sent_at_ns)
 
 
 @kernel()
-def _is_full(rules, state, r):
-    """Whether no packet more may wait at the robot's radio."""
-    me = state.robot[r]
+def _is_full(params, state, r):
+    """Whether the robot's queue is full."""
+    radio = state.robot[r]
     if state.off[r] == KEPT_ALL:
-        return me.waiting + (me.stage == HELD) >= rules.queue_limit
-    return me.stage != NOTHING and me.waiting >= rules.queue_limit
+        return radio.waiting + (radio.stage == HELD) >= params.queue_limit
+    return radio.stage != IDLE and radio.waiting >= params.queue_limit
 
 
 @kernel()
-def serve(rules, state, queue, r, now_ns):
-    """The robot's radio is free: it takes up the next packet, if one waits."""
-    me = state.robot[r]
-    me.stage, me.packet = NOTHING, NO_ROBOT
-    while me.next < me.entry and state.packet[state.order[me.next]].is_done:
-        me.next += 1
-    if me.next == me.entry:
+def serve(params, state, events, r, now_ns):
+    """The robot's radio is free: serve the next packet, if there is one."""
+    radio = state.robot[r]
+    radio.stage, radio.packet = IDLE, NO_ROBOT
+    while radio.next < radio.entry and state.packet[state.order[radio.next]].is_done:
+        radio.next += 1
+    if radio.next == radio.entry:
         return
-    me.packet = state.order[me.next]
-    me.next += 1
-    me.waiting -= 1
-    me.attempt = me.exponent = 0
-    me.last_fate = NO_ROBOT
-    begin(rules, state, queue, r, now_ns)
+    radio.packet = state.order[radio.next]
+    radio.next += 1
+    radio.waiting -= 1
+    radio.attempt = radio.exponent = 0
+    radio.last_fate = NO_ROBOT
+    begin(params, state, events, r, now_ns)
 
 
 @kernel()
-def begin(rules, state, queue, r, now_ns):
-    """An attempt at the packet being served, unless the radio is off and keeps it back."""
-    me = state.robot[r]
+def begin(params, state, events, r, now_ns):
+    """Start an attempt at the packet being served, unless the radio is off and holds it."""
+    radio = state.robot[r]
     if state.off[r] <= KEPT_ALL:
-        me.stage = HELD
-    elif rules.method == CSMA:
-        csma.want(rules, state, queue, r, now_ns)
-    elif rules.method == dcf.DCF:
-        dcf.want(rules, state, queue, r, now_ns)
+        radio.stage = HELD
+    elif params.method == CSMA:
+        csma.request_access(params, state, events, r, now_ns)
+    elif params.method == dcf.DCF:
+        dcf.request_access(params, state, events, r, now_ns)
     else:
-        me.stage = BACKING_OFF
-        schedule(queue, SEND, r, now_ns)
+        radio.stage = BACKING_OFF
+        schedule(events, SEND, r, now_ns)
 
 
 @kernel()
-def pause(rules, state, queue, r, pause_ns, now_ns):
-    """A packet is over: silence, or new slots, then the next one."""
-    me = state.robot[r]
-    if rules.method == dcf.DCF:
-        me.exponent = 0
-        dcf.wait_after(rules, state, r)
+def pause(params, state, events, r, pause_ns, now_ns):
+    """A packet is finished: after the interframe space or a new backoff, serve the next one."""
+    radio = state.robot[r]
+    if params.method == dcf.DCF:
+        radio.exponent = 0
+        dcf.draw_backoff(params, state, r)
     if pause_ns == 0:
-        serve(rules, state, queue, r, now_ns)
+        serve(params, state, events, r, now_ns)
         return
-    me.stage, me.packet = PAUSING, NO_ROBOT
-    schedule(queue, TIMER, r, now_ns + pause_ns)
+    radio.stage, radio.packet = SPACING, NO_ROBOT
+    schedule(events, TIMER, r, now_ns + pause_ns)
 
 
 @kernel()
-def keep_newest(rules, state, queue, told, r, now_ns):
-    """If the robot's radio is off and keeps the newest packet alone: what waits before it ends."""
-    me = state.robot[r]
-    if state.off[r] == KEPT_NEWEST and me.waiting > 0:
-        results.give_up_older(state, told, r, me.entry - 1, now_ns)
-        me.waiting = 1
-        if me.stage == NOTHING:
-            serve(rules, state, queue, r, now_ns)
+def keep_newest(params, state, events, buffer, r, now_ns):
+    """Under KEPT_NEWEST, end all waiting packets but the newest."""
+    radio = state.robot[r]
+    if state.off[r] == KEPT_NEWEST and radio.waiting > 0:
+        results.drop_older(state, buffer, r, radio.entry - 1, now_ns)
+        radio.waiting = 1
+        if radio.stage == IDLE:
+            serve(params, state, events, r, now_ns)
 
 
 @kernel()
-def stop(state, queue, told, r, now_ns, fate):
-    """The robot died: its queue ends; what it has on air stays there."""
-    me = state.robot[r]
-    for kind in (TIMER, LISTENED, SEND, ANSWER, ENTER):
-        cancel(queue, kind, r)
-    sending = me.stage == SENDING
+def stop(state, events, buffer, r, now_ns, fate):
+    """The robot died: end its queue with `fate`; a frame on air continues."""
+    radio = state.robot[r]
+    for kind in (TIMER, CCA_END, SEND, SEND_ACK, ENQUEUE):
+        cancel(events, kind, r)
+    sending = radio.stage == SENDING
     if sending:
-        state.packet[me.packet].result = NOT_LEARNED
-    elif me.stage >= BACKING_OFF and (me.stage == AWAITING or me.attempt > 0):  # it was on air
-        results.settle(state, told, r, now_ns)
-    first = me.next - (me.stage >= BACKING_OFF)
-    for at in range(first, me.stop):
+        state.packet[radio.packet].result = NO_RESULT
+    elif radio.stage >= BACKING_OFF and (radio.stage == AWAITING_ACK or radio.attempt > 0):  # it was on air before
+        results.record_last_attempt(state, buffer, r, now_ns)
+    first = radio.next - (radio.stage >= BACKING_OFF)
+    for at in range(first, radio.stop):
         index = state.order[at]
         packet = state.packet[index]
-        if not packet.is_done and not (sending and index == me.packet):
-            results.refuse(state, told, index, packet.refused if packet.refused else fate, now_ns)
-    me.next = me.entry = me.stop
-    me.waiting = 0
+        if not packet.is_done and not (sending and index == radio.packet):
+            results.record_at_sender(state, buffer, index, packet.refused if packet.refused else fate, now_ns)
+    radio.next = radio.entry = radio.stop
+    radio.waiting = 0
     if not sending:
-        me.stage, me.packet = NOTHING, NO_ROBOT
-        state.reception[r].is_deaf = me.on_air != SILENT
+        radio.stage, radio.packet = IDLE, NO_ROBOT
+        state.reception[r].is_deaf = radio.on_air != SILENT
 
 
-# --- Backlog: what a radio that is off should send waits for it, or gives way to what is newer.
-
-
-def fate_of_sending(held: Disruption) -> IntArray:
-    """What becomes of what each robot should send, (rows,): RECEIVED if its radio is on."""
-    if not held.anyone_out:
-        return np.full(len(held.alive), int(Fate.RECEIVED))
-    off = np.select([held.backlog == ALL, held.backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
-    return np.where(held.alive, np.where(held.radio_on, int(Fate.RECEIVED), off), int(Fate.SENDER_DEAD))
+def sender_fates(disruption: Disruption) -> IntArray:
+    """Fate or outage policy of packets that each robot is to send, (rows,): RECEIVED if its radio is on."""
+    if not disruption.anyone_out:
+        return np.full(len(disruption.alive), int(Fate.RECEIVED))
+    backlog = disruption.backlog
+    off = np.select([backlog == ALL, backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
+    return np.where(disruption.alive, np.where(disruption.radio_on, int(Fate.RECEIVED), off), int(Fate.SENDER_DEAD))
 
 
 @kernel(from_python=True)
-def switch(rules, state, queue, told, now_ns):
-    """Radios are off or on from now on, as `state.off` says; after `line_up`.
+def switch(params, state, events, buffer, now_ns):
+    """Apply radios that went off or on, by `state.off`; call `order_queues` first.
 
-    A packet whose turn it was goes back to the start: what its radio had listened to is long past when it is on again.
+    A packet in channel access restarts its attempt: its CCA is outdated when the radio is on again.
     """
     for r in range(len(state.robot)):
-        me = state.robot[r]
+        radio = state.robot[r]
         if state.off[r] <= KEPT_ALL:
-            _hold_back(state, queue, r)
-            keep_newest(rules, state, queue, told, r, now_ns)
-        elif me.stage == HELD:
-            begin(rules, state, queue, r, now_ns)
+            _hold_back(state, events, r)
+            keep_newest(params, state, events, buffer, r, now_ns)
+        elif radio.stage == HELD:
+            begin(params, state, events, r, now_ns)
 
 
 @kernel()
-def _hold_back(state, queue, r):
-    me = state.robot[r]
-    if BACKING_OFF <= me.stage <= TURNING:
-        cancel(queue, TIMER, r)
-        cancel(queue, LISTENED, r)
-        cancel(queue, SEND, r)
-        me.stage = HELD
-        state.reception[r].is_deaf = me.on_air != SILENT
+def _hold_back(state, events, r):
+    radio = state.robot[r]
+    if BACKING_OFF <= radio.stage <= TURNAROUND:
+        cancel(events, TIMER, r)
+        cancel(events, CCA_END, r)
+        cancel(events, SEND, r)
+        radio.stage = HELD
+        state.reception[r].is_deaf = radio.on_air != SILENT

@@ -1,4 +1,21 @@
-"""The gamma distribution: its two tails, and its quantile."""
+"""Fast fading: the power gain g of a link, mean 1, by Rayleigh, Rice or Nakagami.
+
+The gain varies over fractions of a wavelength: waves arrive over many paths and add up or cancel. It is that of a sum
+of N plane waves in the positions of both robots of the link,
+
+    h = 1/sqrt(N) sum_n exp(2 pi i (u_n . x_a / lambda + v_n . x_b / lambda + phase_n)),     g = |h|^2,
+
+with unit vectors u_n and v_n all around either robot (Clarke, Bell Syst. Tech. J. 47, 1968; for two that move: Akki
+and Haber, IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both directions agree, and a packet's gain
+does not depend on earlier packets. While one end moves by s, h is correlated by J0(2 pi s / lambda), Jakes' spectrum;
+while both move, by the product.
+
+The directions are a lattice of N points over both circles, rotated by keyed amounts around either robot, and each wave
+has a keyed phase, all by the arena's key. In addition each unordered pair of robots gives each wave a sign, by keyed
+numbers of both, which makes pairs independent. So the waves at a robot are computed once for all its links. |h|^2 is
+exponential up to O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it never exceeds N
+(15 dB).
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -19,6 +36,13 @@ MAX_TERMS = 1000
 MAX_STEPS = 60
 PRECISION = 1e-16
 SMALLEST = 1e-300
+WAVES = 2 * SUMS  # unrolled in `scattered`
+GENERATOR = 19  # index of v over that of u: near the golden section of WAVES, and coprime to it
+SCALE = np.float64(1.0 / math.sqrt(WAVES))  # a plain float would keep float32 sums single without numba
+FADING = purpose("fading")
+TURN_U, TURN_V, PHASE, ROBOT_NUMBER = range(4)  # uses of the draws
+RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
+_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit(cache=True)
@@ -61,8 +85,8 @@ def gamma_tails(shape, x):
 def gamma_quantile(shape, below, above):
     """The x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
 
-    Both tails are given, so that neither end loses digits: the smaller one counts. Newton's steps with Halley's
-    correction (Press et al., Numerical Recipes, 3rd ed., 6.2.1), kept within what is known to hold the root.
+    Arguments are both tails, so that neither end loses digits: the smaller one counts. Newton's steps with Halley's
+    correction (Press et al., Numerical Recipes, 3rd ed., 6.2.1), kept within the bracket of the root.
     """
     if below <= 0.0:
         return 0.0
@@ -107,46 +131,18 @@ def _start(shape, below, above):
     return 1.0 - math.log(above / (1.0 - split))
 
 
-# --- Nakagami-m fading: power gains between Rayleigh's (m = 1), worse (m < 1) and none (m large), as measurements fit
-# it.
-#
-# g = Q(F(r)), with r Rayleigh's gain, F its distribution and Q the quantile of Gamma(m, 1/m): mean 1, variance 1/m, and
-# correlated in time as r is (M. Nakagami, 1960; by quantiles: Beaulieu and Cheng, IEEE Trans. Vehicular Techn. 54,
-# 2005).
-
-
 @njit(cache=True)
 def nakagami_gain(rayleigh_gain, m):
-    """The power gain of which Rayleigh's would be as rare; m >= 0.5. About 0.5 us; nothing to do for m = 1."""
+    """The Nakagami-m power gain with the same cumulative probability as a Rayleigh gain; m >= 0.5.
+
+    Rayleigh's is m = 1; fading is worse for m < 1 and vanishes for large m, as measurements fit it. g = Q(F(r)), with r
+    Rayleigh's gain, F its distribution and Q the quantile of Gamma(m, 1/m): mean 1, variance 1/m, and correlated in
+    time as r is (M. Nakagami, 1960; by quantiles: Beaulieu and Cheng, IEEE Trans. Vehicular Techn. 54, 2005). About
+    0.5 us; returns at once for m = 1.
+    """
     if m == 1.0:
         return rayleigh_gain
     return gamma_quantile(m, -math.expm1(-rayleigh_gain), math.exp(-rayleigh_gain)) / m
-
-
-# --- Scattering: waves that arrive over many paths add up or cancel, and a fraction of a wavelength decides.
-#
-# The power gain g of a link (E g = 1) is that of a sum of N plane waves in the positions of both its robots,
-#
-#     h = 1/sqrt(N) sum_n exp(2 pi i (u_n . x_a / lambda + v_n . x_b / lambda + phase_n)),     g = |h|^2,
-#
-# with unit vectors u_n and v_n all around either robot (Clarke, Bell Syst. Tech. J. 47, 1968; for two that move: Akki
-# and Haber, IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both directions agree, a packet's gain does
-# not depend on what was sent before, and while one end moves by s, h is correlated by J0(2 pi s / lambda), Jakes'
-# spectrum; while both move, by the product.
-#
-# The directions are a lattice of N points over both circles, which keyed amounts turn around either robot, and each
-# wave has a keyed phase, all by the arena's key. On top of that each unordered pair of robots gives each wave a sign,
-# by keyed numbers of both, which makes pairs independent. So the waves at a robot are worked out once for all its
-# links. |h|^2 is exponential but for O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's,
-# and it is never above N (15 dB).
-
-
-WAVES = 2 * SUMS  # as `scattered` adds them up
-GENERATOR = 19  # v's index is so many times u's: near the golden section of WAVES, and without common divisor
-SCALE = np.float64(1.0 / math.sqrt(WAVES))  # a plain float would leave sums of float32 what they are, but for numba
-FADING = purpose("fading")
-TURN_U, TURN_V, PHASE, OWN = range(4)  # what draws are for
-_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit(cache=True)
@@ -178,7 +174,7 @@ def arriving(waves, x, y, out):
 @njit(cache=True)
 def own_number(key, robot):
     """A robot's keyed number, 53 random bits."""
-    return np.uint64(uniform(key, robot, 0, OWN, FADING) * 2.0**53)
+    return np.uint64(uniform(key, robot, 0, ROBOT_NUMBER, FADING) * 2.0**53)
 
 
 @njit(cache=True)
@@ -194,8 +190,8 @@ def signs_of(number_a, number_b):
 def scattered(signs, at, a, b, real, imaginary):
     """Real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
 
-    `signs` are the pair's, `at` (rows, 4, WAVES) the waves arriving at robots, of which a and b are rows; `real` and
-    `imaginary` (SUMS,) are for use in here.
+    `signs` are those of the pair, `at` (rows, 4, WAVES) the waves arriving at robots, with rows a and b; `real` and
+    `imaginary` (SUMS,) are scratch space.
     """
     half, a, b = np.uint32(signs >> np.uint64(WAVES)), np.uint64(a), np.uint64(b)
     for n in range(SUMS):
@@ -224,14 +220,8 @@ def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
     return scattered(signs_of(own_number(key, a), own_number(key, b)), at, 0, 1, parts[0], parts[1])
 
 
-# --- Fast fading: the power gain g of a link, mean 1, by how its waves arrive. See `scattering` for what moves it.
-
-
-RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
-
-
 class FadingModel(NamedTuple):
-    """A distribution's numbers, as kernels take them."""
+    """Parameters of a fading distribution, as input of kernels."""
 
     distribution: int
     k: float
@@ -240,7 +230,7 @@ class FadingModel(NamedTuple):
 
 
 def fading_model(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingModel:
-    """The law at this frequency of waves with this speed."""
+    """The model at this frequency, for waves of this speed."""
     kind = FADINGS.index(fading.distribution)
     return FadingModel(kind, fading.k, fading.m, frequency_hz / speed_mps)
 
@@ -257,7 +247,7 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
 
 @kernel()
 def gain_of(law, h, distance_m):
-    """The gain by the law, of `scattered`'s h between robots so many m apart; a ratio, mean 1."""
+    """The gain of `scattered`'s h between robots `distance_m` apart; a ratio, mean 1."""
     real, imaginary = h
     if law.distribution == RICIAN:
         return rician_gain(real, imaginary, law.k, law.wave_number * distance_m)
@@ -267,7 +257,7 @@ def gain_of(law, h, distance_m):
 
 @njit(cache=True)
 def rician_gain(real, imaginary, k, path):
-    """Rice's gain: beside the scattered waves a direct one, with k >= 0 times their power.
+    """Rice's gain: a direct wave, with k >= 0 times the power of the scattered ones, adds to them.
 
     Its phase is its path's length in wavelengths. k = 0 is Rayleigh.
     """

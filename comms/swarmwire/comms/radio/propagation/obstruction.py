@@ -1,7 +1,7 @@
-"""Walls: what a straight line loses in the obstacles that it passes, per obstacle and per metre inside.
+"""Obstruction: loss of a link in walls, per obstacle and per metre inside, and the robots that stand in between.
 
-The multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. A radio
-that any obstacle stops is `line_of_sight`, not this.
+Walls follow the multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. A
+radio that any obstacle blocks uses `line_of_sight` instead.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,14 +17,14 @@ PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
 
 @njit(cache=True)
 def wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
-    """The loss in dB between two points in m; equal both ways to the last bit."""
+    """Loss in dB in walls between two points in m; equal both ways to the last bit."""
     crossed, inside_m = crossed_and_inside_m(obstacles, arena, ax, ay, bx, by)
     return crossed * crossing_db + inside_m * inside_db_per_m
 
 
 @njit(cache=True)
 def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
-    """How many obstacles of the arena the line between two points enters, and its length inside them in m.
+    """Number of obstacles of the arena that the line between two points enters, and its length inside them in m.
 
     A line that only touches an obstacle does not enter it; where two overlap, both count.
     """
@@ -52,7 +52,7 @@ def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
 
 @njit(cache=True)
 def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
-    """How much of a line of `length` from (px, py) along the unit vector (dx, dy) lies in a circle; all in m."""
+    """Length inside a circle of a line of `length` from (px, py) along the unit vector (dx, dy); all in m."""
     along = (cx - px) * dx + (cy - py) * dy
     apart = (cx - px) * dy - (cy - py) * dx
     half2 = radius * radius - apart * apart
@@ -80,19 +80,16 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
     return max(leave - enter, 0.0)
 
 
-# --- Bodies: robots that stand on the line between two others weaken their signal.
-
-
 @njit(cache=True)
-def bodies_between(x, y, radius_m, most_radius_m, cells, robots, a, b):
-    """How many robots, rows a and b apart, have their disc on the line between a and b; equal both ways.
+def bodies_between(x, y, radius_m, max_radius_m, cells, robots, a, b):
+    """Number of other robots with their disc on the line between rows a and b; equal both ways.
 
-    `x`, `y`, `radius_m` (rows,) in m; `most_radius_m` is the greatest radius; `cells` is a `grid.Grid` of x and y with
-    `robots` to each arena. The cost is that of the cells that the line's bounding box touches.
+    `x`, `y`, `radius_m` (rows,) in m; `max_radius_m` is the greatest radius; `cells` is an index of
+    `robot_index.build` with `robots` in each arena. The cost grows with the cells in the line's bounding box.
     """
     a, b = min(a, b), max(a, b)
-    left, bottom = min(x[a], x[b]) - most_radius_m, min(y[a], y[b]) - most_radius_m
-    right, top = max(x[a], x[b]) + most_radius_m, max(y[a], y[b]) + most_radius_m
+    left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
+    right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
     first_row = (a // robots) * cells.ny
     count = 0
     for j in range(

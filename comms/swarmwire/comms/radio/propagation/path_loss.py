@@ -1,8 +1,8 @@
-"""Path loss: what distance takes from a signal, in dB. Every model is a curve of straight lines over log10 of distance.
+"""Path loss and link budget: the loss of a signal over distance, in dB, and the received power.
 
-So one compiled function serves all models, and its inverse is exact, or found by bisection where something absorbs.
-A model is a frozen dataclass with a method `curve(frequency_hz)` in a file of its own: `friis`, `log_distance`,
-`two_ray`, `itu_indoor`.
+Every model is a curve of straight lines over log10 of distance. So one compiled function serves all models, and its
+inverse is exact, or found by bisection where the medium absorbs. The models are the frozen dataclasses with a method
+`curve(frequency_hz)` in `config/path_loss_models.py`.
 
 No model holds in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
 log-distance model, so that touching robots do not amplify each other.
@@ -23,7 +23,7 @@ HALVINGS = 60
 
 @njit(cache=True)
 def loss_db(curve, distance_m):
-    """The loss in dB over a distance in m."""
+    """Path loss in dB over a distance in m."""
     distance_m = max(distance_m, NEAREST_M)
     absorbed_db = curve.absorption_db_per_m * distance_m
     if distance_m <= curve.break_m:
@@ -33,7 +33,7 @@ def loss_db(curve, distance_m):
 
 @njit(cache=True)
 def reach_m(curve, most_loss_db):
-    """The greatest distance in m with at most this loss, to 1e-12 relative; 0 if even `NEAREST_M` has more."""
+    """The greatest distance in m with at most this loss, to 1e-12 relative; 0 if `NEAREST_M` has more."""
     if loss_db(curve, NEAREST_M) > most_loss_db:
         return 0.0
     reached_m = _reach_of_lines_m(curve, most_loss_db)
@@ -58,21 +58,16 @@ def _reach_of_lines_m(curve, most_loss_db):
     return max(far_m, curve.break_m)
 
 
-# --- The loss between two points: path loss, shadowing and walls together, without bodies and fading.
-#
-# The table of links takes the same three in stages over all pairs, since it leaves out who is too far before it goes
-# on.
-
-
 @njit(cache=True)
 def loss_between_db(
     curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
 ):
     """The loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
 
-    `waves` (3, n) are those of the arena's field; an `amplitude_db` of 0 means no shadows. Walls are the arena's
-    obstacles; `crossing_db` and `inside_db_per_m` of 0 mean none. Callers give the distance, since the last bit of a
-    run depends on how it was rounded.
+    Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field; an
+    `amplitude_db` of 0 means no shadowing. Walls are the arena's obstacles; `crossing_db` and `inside_db_per_m` of 0
+    mean none. Callers pass the distance, since the last bit of a run depends on its rounding. `phy/pairs.py` applies
+    the same three steps over all pairs, since it drops distant pairs after the first.
     """
     loss = loss_db(curve, distance_m)
     if amplitude_db > 0.0:
@@ -80,9 +75,6 @@ def loss_between_db(
     if crossing_db > 0.0 or inside_db_per_m > 0.0:
         loss += wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by)
     return loss
-
-
-# --- Link budget: from the sender's power to that at the receiver, each step a figure in dB.
 
 
 @njit(cache=True)

@@ -1,6 +1,21 @@
-"""Sine and cosine of phases in turns, by one polynomial: + - * only, so that compilers take several at a time.
+"""Shadowing: one Gaussian field per arena models the unknown surroundings, and a link integrates it along its path.
 
-Sums of plane waves need many per link; with the mathematical library's they would take ten times as long.
+The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8, 2009): a field p over the plane with E[p(x)
+p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d from a to b
+
+    X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
+
+Both directions agree, a robot that returns gets the same value, links through the same region are correlated, and the
+shadowing of touching robots vanishes. Var X tends to sigma^2 for links much longer than delta.
+
+p is a sum of plane waves, sqrt(sigma^2 / (delta N)) cos(2 pi (k . x + phase)), whose integral has a closed form. The
+covariance is exact if the wave vectors follow its spectrum: |k| with F(k) = 1 - 1/sqrt(1 + (2 pi delta k)^2) (the
+plane's Fourier transform of the exponential), and all directions equally likely. The N quantiles of |k| are stratified,
+and directions turn by the golden section from one to the next: with 128 waves each single arena then varies about as
+the model demands.
+
+Sine and cosine of phases in turns are one polynomial: + - * only, so that compilers vectorize them. Sums of plane waves
+need many per link; with those of the mathematical library they would take ten times as long.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -15,8 +30,13 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.phy import Shadowing
 
-SUMS = 16  # that `total` adds up: it is written out for so many
-# Taylor's series of sin(2 pi y) in y, up to y^21: for |y| <= 1/2 the next term is 1e-11.
+SUMS = 16  # terms of `total`, which is unrolled for this number
+WAVES = 8 * SUMS  # unrolled in `between_db`
+MIN_SQUARE_TURNS = np.float32(1e-30)  # so that touching robots do not divide by 0
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+SHADOWING = purpose("shadowing")
+QUANTILE, PHASE, TURN = 0, 1, 2  # uses of the draws of an arena
+# Taylor series of sin(2 pi y) in y, up to y^21: for |y| <= 1/2 the next term is 1e-11.
 _A, _B, _C, _D, _E, _F, _G, _H, _I, _J, _K = (
     (-1.0) ** n * (2.0 * math.pi) ** (2 * n + 1) / math.factorial(2 * n + 1) for n in range(11)
 )
@@ -43,34 +63,10 @@ def cosine(turns):
 
 @kernel(error_model="numpy")
 def total(s):
-    """The sum of SUMS numbers by halves, s[n] + s[n + 8] first: loops that end so leave sums of every 16th, n apart."""
+    """The sum of SUMS numbers by halves, s[n] + s[n + 8] first; s[n] holds partial sums of every 16th term."""
     even = ((s[0] + s[8]) + (s[4] + s[12])) + ((s[2] + s[10]) + (s[6] + s[14]))
     odd = ((s[1] + s[9]) + (s[5] + s[13])) + ((s[3] + s[11]) + (s[7] + s[15]))
     return even + odd
-
-
-# --- Shadowing: one Gaussian field per arena stands for all that is not modelled, and a link collects it along its way.
-#
-# The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8, 2009): a field p over the plane with E[p(x)
-# p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d from a to b
-#
-#     X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
-#
-# So both directions agree, who returns finds the same, links that share a region are correlated, and the shadowing of
-# touching robots vanishes. Var X tends to sigma^2 for links much longer than delta.
-#
-# p is a sum of plane waves, sqrt(sigma^2 / (delta N)) cos(2 pi (k . x + phase)), whose integral is known in closed
-# form. The covariance is exact if the wave vectors follow its spectrum, |k| with F(k) = 1 - 1/sqrt(1 + (2 pi delta
-# k)^2) (the plane's Fourier transform of the exponential) and all directions alike. The N quantiles of |k| are one to a
-# stratum, and directions turn by the golden section from one to the next: with 128 waves each single arena then varies
-# about as it should, too.
-
-
-WAVES = 8 * SUMS  # as `between_db` adds them up
-NEARLY_NO_TURN = np.float32(1e-30)  # so that touching robots do not divide by 0
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-SHADOWING = purpose("shadowing")
-QUANTILE, PHASE, TURN = 0, 1, 2  # what the draws of an arena are for
 
 
 def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
@@ -83,13 +79,13 @@ def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
 
 
 def amplitude_db(shadowing: Shadowing) -> float:
-    """The amplitude of each wave, in dB per sqrt(m)."""
+    """Amplitude of each wave, in dB per sqrt(m)."""
     return shadowing.deviation_db / math.sqrt(shadowing.correlation_m * WAVES)
 
 
 @njit(cache=True)
 def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
-    """X of the link between (ax, ay) and (bx, by) in m, in dB to be added to the loss; equal both ways to the last bit.
+    """Shadowing X in dB, added to the loss, between (ax, ay) and (bx, by) in m; equal both ways to the last bit.
 
     `waves` (3, WAVES) are those of one arena. For many links between few robots see `heights` and `between_db`.
     """
@@ -101,18 +97,18 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
 
 @njit(cache=True, error_model="numpy")
 def heights(waves, x, y, out):
-    """The sine of each wave at (x, y) in m: what a link's integral needs of its ends, into `out` (WAVES,)."""
+    """The sine of each wave at (x, y) in m, for the integral of a link that ends there, into `out` (WAVES,)."""
     for n in range(len(out)):
         out[n] = sine(waves[0, n] * x + waves[1, n] * y + waves[2, n])
 
 
 @kernel(error_model="numpy")
 def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
-    """X between robots a and b, rows of `height` (robots, WAVES), where b stands (dx, dy) m from a.
+    """Shadowing X in dB between robots a and b, rows of `height` (robots, WAVES), with b at (dx, dy) m from a.
 
     `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines
-    at both ends over that of its phases. `parts` (SUMS,) is for use in here. In single precision, if all arrays and
-    distances have it: 0.016 us.
+    at both ends over that of its phases. `parts` (SUMS,) is scratch space. 0.016 us in single precision, if all
+    arrays and distances have it.
     """
     link = field, np.uint64(arena), height, np.uint64(a), np.uint64(b), dx, dy
     for n in range(SUMS):
@@ -129,4 +125,4 @@ def _mean(link, wave):
     field, arena, height, a, b, dx, dy = link
     n = np.uint64(wave)
     turns = field[arena, 0, n] * dx + field[arena, 1, n] * dy
-    return (height[b, n] - height[a, n]) * turns / (turns * turns + NEARLY_NO_TURN)
+    return (height[b, n] - height[a, n]) * turns / (turns * turns + MIN_SQUARE_TURNS)

@@ -1,7 +1,7 @@
-"""Bursts: a link changes between a good and a bad state and loses a share of its packets in either.
+"""Burst loss: a link changes between a good and a bad state and loses a share of its packets in either.
 
 The chain of E. N. Gilbert (Bell Syst. Tech. J. 39, 1960) and E. O. Elliott (42, 1963) in continuous time, so that a
-burst lasts as long however often robots speak: good turns bad at rate a, bad turns good at rate b, and
+burst's duration does not depend on the packet rate: good turns bad at rate a, bad turns good at rate b, and
 
     P(bad at t + dt) = pi + (bad at t - pi) exp(-(a + b) dt),     pi = a / (a + b).
 """
@@ -21,8 +21,12 @@ from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.config.impairments import Bursts
 
-# Beyond this many relaxation times 1 / (a + b) the past counts for nothing: exp(-40) is lost in a draw's 53 bits.
+# Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
 FORGOTTEN = 40.0
+STATE, LOSS = purpose("burst state"), purpose("burst loss")
+NO_LINK = -1  # a free place of the table
+MIN_CAPACITY = 1024
+HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
 
 
 @njit(cache=True)
@@ -38,22 +42,13 @@ def bad_after(was_bad, dt_s, a, b, u):
     return u < share + ((1.0 if was_bad else 0.0) - share) * math.exp(-elapsed)
 
 
-# --- Burst states: which links were good or bad when they were last used, kept for as long as it matters.
-
-
-STATE, LOSS = purpose("burst state"), purpose("burst loss")
-NO_LINK = -1  # a free place of the table
-MIN_CAPACITY = 1024
-SCATTER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
-
-
 class Bursting(NamedTuple):
-    """Which links were good or bad, by place in a hash table, and the numbers by which they change."""
+    """The hash table of link states, and the parameters of the chain, as input of kernels."""
 
     link: IntArray  # (capacity,) sender x rows + receiver, or NO_LINK
-    at_ns: IntArray  # (capacity,) when it was last used
+    at_ns: IntArray  # (capacity,) time of its last use
     bad: BoolArray  # (capacity,)
-    added: IntArray  # (1,) links that kernels have added
+    added: IntArray  # (1,) number of links that kernels added
     a: float  # in 1/s: good turns bad
     b: float  # in 1/s: bad turns good
     loss_bad: float
@@ -63,9 +58,9 @@ class Bursting(NamedTuple):
 class BurstStates:
     """A sparse table of directed links: a hash by sender and receiver row, open addressing, at most half full.
 
-    Draws are keyed by (sender, receiver, sequence), so packets have the same fates however they are batched, as long as
-    those of a link come in the order of their time. A link that has been silent until its past no longer counts is
-    forgotten, which changes nothing.
+    Draws are keyed by (sender, receiver, sequence), so fates do not depend on batching, as long as packets of a link
+    come in the order of time. A link that was silent for so long that its past has no effect is dropped, which changes
+    nothing.
     """
 
     def __init__(self, bursts: Bursts, keys: KeyArray, robots: int) -> None:
@@ -74,17 +69,17 @@ class BurstStates:
         self._clear(MIN_CAPACITY)
 
     def __len__(self) -> int:
-        """How many links are kept."""
+        """Number of links in the table."""
         return self._kept
 
     def change(self, bursts: Bursts, now_ns: int) -> None:
-        """Links are good and bad by other numbers from `now_ns` on."""
-        # All that no longer counts is forgotten now: slower bursts must not find what chance has kept of the faster.
+        """Use these parameters from `now_ns` on."""
+        # Drop outdated states now: slower bursts must not depend on outdated states that happen to be kept.
         self._rebuild(now_ns, 0)
         self._bursts = bursts
 
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
-        """Which packets (k,) bursts take; rows of sender and receiver, times in ns that never fall for a link."""
+        """Whether each packet (k,) is lost; rows of sender and receiver, times in ns that never fall for a link."""
         if not len(sender):
             return np.zeros(0, np.bool_)
         self.make_room(int(at_ns.min()), len(sender))
@@ -94,19 +89,19 @@ class BurstStates:
         return ends
 
     def make_room(self, now_ns: int, links: int) -> None:
-        """So many links may be added at `now_ns` or later."""
+        """Make room for `links` more links at `now_ns` or later."""
         if 2 * (self._kept + links) > len(self._link):
             self._rebuild(now_ns, links)
 
     @property
     def bursting(self) -> Bursting:
-        """For kernels, which add at most as many links as there is room for; then call `count_added`."""
+        """The table for kernels, which add at most as many links as there is room for; then call `count_added`."""
         bursts, added = self._bursts, np.zeros(1, np.int64)
         a, b = 1.0 / bursts.good_s, 1.0 / bursts.bad_s
         return Bursting(self._link, self._at_ns, self._bad, added, a, b, bursts.loss_bad, bursts.loss_good)
 
     def count_added(self, bursting: Bursting) -> None:
-        """Kernels added links to the table."""
+        """Count the links that kernels added to the table."""
         self._kept += int(bursting.added[0])
 
     def _clear(self, capacity: int) -> None:
@@ -116,7 +111,7 @@ class BurstStates:
         self._kept = 0
 
     def _rebuild(self, now_ns: int, room: int) -> None:
-        """A table for what still counts at `now_ns` and `room` links more, with as much to spare."""
+        """Rebuild the table for states valid at `now_ns` and `room` more links, at most a quarter full."""
         relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
         # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
         silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
@@ -129,10 +124,10 @@ class BurstStates:
 
 @njit(cache=True)
 def _place(links, link):
-    """Where a link is, or where it belongs."""
+    """The place of a link in the table, or the free place for it."""
     mask = np.uint64(len(links) - 1)
     # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
-    at = ((np.uint64(link) * SCATTER) >> np.uint64(32)) & mask
+    at = ((np.uint64(link) * HASH_FACTOR) >> np.uint64(32)) & mask
     while links[at] != NO_LINK and links[at] != link:
         at = (at + np.uint64(1)) & mask
     return at
@@ -157,7 +152,7 @@ def _lost(bursting, keys, robots, rows, sender, receiver, sequence, at_ns):
 
 @kernel()
 def takes(bursting, link, key, s, r, sequence, attempt, at_ns):
-    """Whether a burst takes a packet from s to r, indices in the arena, at `at_ns`."""
+    """Whether a packet from s to r, indices in the arena, is lost at `at_ns`."""
     at = _place(bursting.link, link)
     silent_s = np.inf
     if bursting.link[at] == NO_LINK:

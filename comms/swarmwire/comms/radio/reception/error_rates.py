@@ -1,4 +1,8 @@
-"""From bits to frames: errors that strike each bit alike and on its own."""
+"""Error rates of modulations: from SINR to the probability that a number of bits is right.
+
+Bit errors are independent and equally likely. IEEE 802.15.4 (O-QPSK), 802.11b (DSSS, CCK), 802.11a/g (OFDM), measured
+tables and thresholds.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -21,7 +25,7 @@ def all_right(error_rate, bits):
     return math.exp(bits * math.log1p(-error_rate))
 
 
-# --- IEEE 802.15.4 at 2.4 GHz: O-QPSK, four bits to one of sixteen spread symbols (250 kbit/s).
+# IEEE 802.15.4 at 2.4 GHz: O-QPSK, four bits to one of sixteen spread symbols (250 kbit/s).
 
 
 # (-1)^k C(16, k) for k = 2 .. 16
@@ -42,11 +46,11 @@ def oqpsk_bit_errors(sinr):
 
 @njit(cache=True)
 def oqpsk_success(sinr, bits):
-    """The probability that so many bits arrive right; a frame's are those of the whole PPDU, 8 x (PSDU + 6)."""
+    """The probability that `bits` bits are right; a frame counts its whole PPDU, 8 x (PSDU + 6) bits."""
     return all_right(oqpsk_bit_errors(sinr), bits)
 
 
-# --- IEEE 802.11b: direct sequence at 1 and 2 Mbit/s, complementary codes (CCK) at 5.5 and 11, in 22 MHz.
+# IEEE 802.11b: direct sequence at 1 and 2 Mbit/s, complementary codes (CCK) at 5.5 and 11, in 22 MHz.
 #
 # Formulas as in ns-3 (G. Pei and T. R. Henderson, Validation of ns-3 802.11b PHY model, 2009). A CCK symbol is four
 # (5.5) or eight (11 Mbit/s) bits, chosen among biorthogonal codes (J. G. Proakis, Digital Communications, 4th ed.,
@@ -55,7 +59,7 @@ def oqpsk_success(sinr, bits):
 
 DBPSK_1, DQPSK_2, CCK_5_5, CCK_11 = range(4)
 SQRT2 = math.sqrt(2.0)
-# The integrand of CCK is a bell of variance 1/2 or less: 48 nodes over 6 to either side give 1e-12 of the greatest.
+# The CCK integrand is a bell of variance 1/2 or less: 48 nodes over 6 to either side are exact to 1e-12 of its peak.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 HALF_WIDTH = 6.0
 
@@ -77,10 +81,10 @@ def dqpsk_bit_errors(sinr):
 
 @njit(cache=True)
 def biorthogonal_errors(signal):
-    """How often one of 16 biorthogonal codes is mistaken; `signal` is the right one's correlation in units of noise.
+    """Error rate of one of 16 biorthogonal codes; `signal` is the right code's correlation in units of noise.
 
-    1 - integral_0^inf erf(y / sqrt 2)^7 phi(y - signal) dy, phi the standard normal density: computed as what is
-    missing, so that small rates keep their digits.
+    1 - integral_0^inf erf(y / sqrt 2)^7 phi(y - signal) dy, phi the standard normal density: computed as the
+    complement, so that small rates keep their digits.
     """
     low = max(0.5 * signal - HALF_WIDTH, 0.0)
     high = 0.5 * signal + HALF_WIDTH
@@ -95,9 +99,9 @@ def biorthogonal_errors(signal):
 
 @njit(cache=True)
 def dsss_success(rate, sinr, bits):
-    """The probability that so many bits arrive right at one of RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
+    """The probability that `bits` bits are right at one of DSSS_RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
 
-    At 5.5 Mbit/s four bits are one choice, at 11 eight are two of half the signal: so both count quarters of the bits.
+    At 5.5 Mbit/s four bits are one choice, at 11 eight bits are two choices of half the signal: a choice per four bits.
     """
     if rate == DBPSK_1:
         return all_right(dbpsk_bit_errors(sinr), bits)
@@ -107,7 +111,7 @@ def dsss_success(rate, sinr, bits):
     return all_right(biorthogonal_errors(signal), 0.25 * bits)
 
 
-# --- IEEE 802.11a/g: OFDM at 6 to 54 Mbit/s in 20 MHz, with convolutional codes.
+# IEEE 802.11a/g: OFDM at 6 to 54 Mbit/s in 20 MHz, with convolutional codes.
 #
 # The NIST model, as in ns-3 (G. Pei and T. R. Henderson, Validation of OFDM error rate model in ns-3, 2010): errors of
 # the raw bits by modulation, then the union bound over the weight spectrum of the code (K = 7, generators 133 and 171).
@@ -132,7 +136,7 @@ for _code, (_, _, _factor, _weights) in enumerate(SPECTRA):
 
 @njit(cache=True)
 def raw_bit_errors(points, sinr):
-    """The share of bits that are wrong before decoding, by the points of the constellation; s = SINR in 20 MHz.
+    """Bit error rate before decoding, by the points of the constellation; s = SINR in 20 MHz.
 
     BPSK 1/2 erfc(sqrt s), QPSK 1/2 erfc(sqrt(s / 2)), M-QAM with L = sqrt M
     (L - 1) / (L log2 L) erfc(sqrt(3 s / (2 (M - 1)))).
@@ -147,9 +151,9 @@ def raw_bit_errors(points, sinr):
 
 @njit(cache=True)
 def ofdm_bit_errors(rate, sinr):
-    """The bound after decoding, at one of RATES_BPS by index: sum of coefficient x D^exponent, at most 1.
+    """Upper bound of the bit error rate after decoding, at one of OFDM_RATES_BPS by index: at most 1.
 
-    D = sqrt(4 p (1 - p)), p the share of raw bits that are wrong.
+    The sum of coefficient x D^exponent, with D = sqrt(4 p (1 - p)) and p the bit error rate before decoding.
     """
     p = raw_bit_errors(_POINTS[rate], sinr)
     code = _CODE[rate]
@@ -163,16 +167,13 @@ def ofdm_bit_errors(rate, sinr):
 
 @njit(cache=True)
 def ofdm_success(rate, sinr, bits):
-    """The probability that so many bits of payload arrive right; 0.1 us."""
+    """The probability that `bits` bits of payload are right; 0.1 us."""
     return all_right(ofdm_bit_errors(rate, sinr), bits)
-
-
-# --- Success table: what was measured instead of a formula, frames received by SINR.
 
 
 @njit(cache=True)
 def table_success(sinr_db, success, frame_bits, sinr, bits):
-    """The probability that so many bits arrive right: success^(bits / frame_bits), so that chunks of a frame multiply.
+    """The probability that `bits` bits are right: success^(bits / frame_bits), so that chunks of a frame multiply.
 
     `sinr_db` and `success` (rows,) are the table's, `sinr` a ratio.
     """
@@ -191,10 +192,7 @@ def table_success(sinr_db, success, frame_bits, sinr, bits):
     return 1.0 if bits <= 0.0 else whole ** (bits / frame_bits)
 
 
-# --- Threshold: a frame is right if the signal stands so far above noise and interference.
-
-
 @njit(cache=True)
 def threshold_success(least_sinr, sinr):
-    """1 if SINR, a ratio, reaches the least, else 0; whatever the number of bits."""
+    """1 if SINR, a ratio, reaches `least_sinr`, else 0, for any number of bits."""
     return 1.0 if sinr >= least_sinr else 0.0

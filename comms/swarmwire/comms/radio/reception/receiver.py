@@ -1,4 +1,4 @@
-"""Reception: the probability that a chunk of a frame is right, by the model that the radio has.
+"""Receivers: the success probability of a chunk of a frame by error model, and the sensitivity derived from it.
 
 A frame is cut where its interference changes: its success is the product over its chunks of constant SINR.
 """
@@ -26,7 +26,7 @@ from swarmwire.comms.radio.timing import DSSS_RATES_BPS
 
 
 class Model(IntEnum):
-    """What turns SINR into success."""
+    """Error models, from SINR to success probability."""
 
     THRESHOLD = 0  # a fixed SINR
     TABLE = 1  # measured
@@ -36,7 +36,7 @@ class Model(IntEnum):
 
 
 class Receiver(NamedTuple):
-    """A model with its numbers, as kernels take it; made by one of the functions below."""
+    """An error model with its parameters, as input of kernels; made by one of the functions below."""
 
     model: int
     rate: int  # index among the rates of DSSS or OFDM
@@ -48,15 +48,17 @@ class Receiver(NamedTuple):
 
 _NO_ROWS = np.empty(0)
 _THRESHOLD, _TABLE, _OQPSK, _DSSS = int(Model.THRESHOLD), int(Model.TABLE), int(Model.OQPSK), int(Model.DSSS)
+MIN_DB, MAX_DB = -60.0, 100.0  # bounds of `sinr_for_db`
+HALVINGS = 60
 
 
 def by_threshold(least_sinr_db: float) -> Receiver:
-    """A frame is right if its SINR never falls below this."""
+    """A receiver by threshold: a frame is right if its SINR never falls below this."""
     return Receiver(_THRESHOLD, 0, from_db(least_sinr_db), 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def by_table(table: SuccessTable) -> Receiver:
-    """A measured receiver."""
+    """A receiver by measured success."""
     rows = np.array(table.sinr_db, np.float64), np.array(table.success, np.float64)
     return Receiver(_TABLE, 0, 0.0, float(table.frame_bits), *rows)
 
@@ -77,7 +79,7 @@ def ieee80211ag(rate_bps: int) -> Receiver:
 
 
 def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
-    """The receiver that a scenario asks for, which `refuse_unfit` has let pass."""
+    """The receiver of a scenario's `Reception`, after `refuse_unfit`."""
     if reception.model == "threshold":
         return by_threshold(reception.least_sinr_db)
     if reception.table is not None and reception.model == "table":
@@ -89,7 +91,7 @@ def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
 
 @njit(cache=True)
 def chunk_success(receiver, sinr, bits):
-    """The probability that so many bits (may be a fraction) arrive right at a constant SINR, a ratio of powers."""
+    """The probability that `bits` bits (may be a fraction) are right at a constant SINR, a ratio of powers."""
     if receiver.model == _THRESHOLD:
         return threshold_success(receiver.least_sinr, sinr)
     if receiver.model == _TABLE:
@@ -101,15 +103,8 @@ def chunk_success(receiver, sinr, bits):
     return ofdm_success(receiver.rate, sinr, bits)
 
 
-# --- Sensitivity: the least power at which frames get through, derived from the receiver's model and its noise.
-
-
-MIN_DB, MAX_DB = -60.0, 100.0
-HALVINGS = 60
-
-
 def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
-    """The SINR in dB from which a frame of so many bits is right with probability `success`; by bisection.
+    """The SINR in dB from which a frame of `bits` bits is right with probability `success`; by bisection.
 
     `MIN_DB` if it is so everywhere, `MAX_DB` if nowhere.
     """
@@ -124,7 +119,7 @@ def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
 
 
 def sensitivity_dbm(receiver: Receiver, noise_dbm: float, success: float, bits: int) -> float:
-    """The power in dBm at which, without interference, a frame of so many bits is right with probability `success`.
+    """The power in dBm at which a frame of `bits` bits is right with probability `success`, without interference.
 
     Data sheets of IEEE 802.15.4 state it for 99 % of frames with a PSDU of 20 octets, of 802.11b for 92 % of 1024, of
     802.11a/g for 90 % of 1000.

@@ -1,4 +1,7 @@
-"""Line of sight: obstacles block the signal."""
+"""Stages that block links: line of sight, bodies of robots, and disruption.
+
+Disruption ends links to dead robots, to radios that are off, and across partitions.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -43,7 +46,7 @@ class LineOfSight(Stage):
 
 @njit(cache=True)
 def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
-    """Which of the links under way an obstacle blocks, (k,)."""
+    """Whether an obstacle blocks each link under way, (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     wraps = wrap_m[0] > 0.0
     for i in range(len(ends)):
@@ -59,22 +62,22 @@ def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     return ends
 
 
-# --- Bodies block: robots between two others stop the signal of a unit disk, as with infrared.
-
-
 class BodiesBlock(Stage):
-    """A link is blocked if the disc of a third robot, dead or alive, covers a point of the line between the centres."""
+    """A link is blocked if the disc of a third robot, dead or alive, covers a point of the line between the centres.
+
+    For the unit disk only, as with infrared.
+    """
 
     name = "bodies_block"
     keys = ("bodies_block",)
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio says so and there are bodies."""
+        """The stage, where `bodies_block` is set and robots have bodies."""
         return BodiesBlock(context) if context.radio.bodies_block and context.radius_m.any() else None
 
     def __init__(self, context: ChannelContext) -> None:
-        assert context.radio.range_m is not None  # `RadioMedium` has refused a unit disk without
+        assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
         self._running, self._robots, self._size_m = context.running, context.robots, context.size_m
         self._radius_m, self._range_m = context.radius_m, context.radio.range_m
 
@@ -96,26 +99,23 @@ class BodiesBlock(Stage):
 
 @njit(cache=True)
 def behind_bodies(x, y, radius_m, cells, robots, sender, receiver, fate):
-    """Which of the links under way have a robot between their ends, (k,); equal both ways.
+    """Whether a robot is between the ends of each link under way, (k,); equal both ways.
 
-    `x`, `y`, `radius_m` (rows,) in m; `cells` is a `grid.Grid` of x and y with `robots` to each arena.
+    `x`, `y`, `radius_m` (rows,) in m; `cells` is an index of `robot_index.build` with `robots` in each arena.
     """
     ends = np.zeros(len(sender), np.bool_)
-    most_radius_m = radius_m.max()
+    max_radius_m = radius_m.max()
     for i in range(len(ends)):
         if fate[i] == RECEIVED:
-            ends[i] = bodies_between(x, y, radius_m, most_radius_m, cells, robots, sender[i], receiver[i]) > 0
+            ends[i] = bodies_between(x, y, radius_m, max_radius_m, cells, robots, sender[i], receiver[i]) > 0
     return ends
 
 
-# --- Disruption: receivers that are dead, radios that are off, and robots that a partition keeps apart.
-
-
 class Disrupted(Stage):
-    """Ends links by the disruption that holds. They were in range: that asks for path loss and walls alone."""
+    """Ends links by the active disruption. They stay in range, which depends on path loss and walls alone."""
 
     name = "disrupted"
-    keys = ()  # events bring them
+    keys = ()  # set by events
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
@@ -126,23 +126,23 @@ class Disrupted(Stage):
         self._disruption = context.disruption
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """RECEIVER_DEAD before BLACKOUT before PARTITIONED; that the sender is dead or off, its own side has told."""
-        now, receiver = self._disruption, links.receiver
-        if not now.anything:
+        """RECEIVER_DEAD before BLACKOUT before PARTITIONED; senders that are dead or off end at their queue."""
+        disruption, receiver = self._disruption, links.receiver
+        if not disruption.anything:
             return
         under_way = links.fate == RECEIVED
         for ends, fate in (
-            (now.apart(links.sender, receiver), Fate.PARTITIONED),
-            (~now.radio_on[receiver], Fate.BLACKOUT),
-            (~now.alive[receiver], Fate.RECEIVER_DEAD),
+            (disruption.apart(links.sender, receiver), Fate.PARTITIONED),
+            (~disruption.radio_on[receiver], Fate.BLACKOUT),
+            (~disruption.alive[receiver], Fate.RECEIVER_DEAD),
         ):
             links.fate[under_way & ends] = fate
 
     @property
     def lets_all_pass(self) -> bool:
-        """As it mostly is."""
+        """Whether no disruption is active."""
         return not self._disruption.anything
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """0 where a radio is off or a partition between, be it one-way, else 1; the radio graph knows the dead."""
+        """0 where a radio is off or a partition separates either way, else 1; the graph excludes dead robots."""
         return self._disruption.joined(links.sender, links.receiver).astype(np.float64)

@@ -1,19 +1,19 @@
-"""The chain: every stage that a packet passes on its way to a receiver, in order.
+"""The chain: all stages that a packet passes on its way to a receiver, in order.
 
 To add a stage:
 
-1. Say what a scenario may give: a frozen dataclass in `parameters/<name>.py`, and a field `<name>` of `Radio`, None by
-   default. The scenario's table `[radio.<name>]` follows from it. One number alone is just a field of `Radio`.
-2. Write `stages/<name>.py` with the keys of [radio] that it goes by (`KEYS`), one small compiled function (formula,
-   source and units in its docstring; arrays in, one array out), a `Stage` that applies it to the links, and
-   `stage(context)`, which returns it, or None where this radio has none. Draws are keyed by the arena's key, (sender,
-   receiver, sequence) as indices in the arena, and a purpose of its own, so that no stage shifts the draws of another.
-   A new way to end a packet is a new `Fate`; a column that later stages read, a new field of `Links`.
-3. List the module below, where it belongs: propagation, disruption (what it ends does not interfere either),
-   interference, reception, bursts, trace, what the receiver learns, delay.
+1. Declare its scenario keys: a frozen dataclass in `config/impairments.py`, and a field of `Radio`, None by default.
+   The scenario's table `[radio.<name>]` follows from it. A single number is just a field of `Radio`.
+2. Write a `Stage` in one of the modules of `stages/`, with its `name`, the `keys` of [radio] that it uses,
+   `of(context)`, which returns None where this radio does not need it, and one small compiled function (formula, source
+   and units in its docstring; arrays in, one array out). Draws are keyed by the arena's key, (sender, receiver,
+   sequence) as indices in the arena, and a purpose of its own, so that no stage shifts the draws of another. A new drop
+   reason is a new `Fate`; a column that later stages read is a new field of `Links`.
+3. List the class below, at its place: propagation, disruption (a link that it ends does not interfere either),
+   interference, reception, bursts, trace, measurements, delay.
 
-Radios with signals pass `AFTER_RECEPTION` alone: what stands there serves both kinds of radio. What comes before is one
-with reception there: what weakens signals belongs to `signal/pairs.py`, what takes frames to `signal/losses.py`.
+A PHY uses `AFTER_RECEPTION` alone, so these stages serve both radio models. Earlier steps are part of its reception:
+attenuation belongs to `phy/pairs.py`, a loss of frames to `phy/losses.py`.
 """
 
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
@@ -38,16 +38,16 @@ ORDER: tuple[type[Stage], ...] = (
     FixedLoss,
     BurstLoss,
     *AFTER_RECEPTION,
-)  # order has a meaning
+)  # the order matters
 
 
 def chain(context: ChannelContext) -> tuple[Stage, ...]:
-    """The stages that this medium has, in order."""
-    made = (kind.of(context) for kind in ORDER)
-    return tuple(stage for stage in made if stage is not None)
+    """The stages of this medium, in order."""
+    stages = (kind.of(context) for kind in ORDER)
+    return tuple(stage for stage in stages if stage is not None)
 
 
 def chain_after_reception(context: ChannelContext) -> tuple[Stage, ...]:
-    """Those of them that a signal passes once it was received: what comes before is one with its events."""
-    made = (kind.of(context) for kind in AFTER_RECEPTION)
-    return tuple(stage for stage in made if stage is not None)
+    """The stages after reception, for a PHY, whose events cover the earlier ones."""
+    stages = (kind.of(context) for kind in AFTER_RECEPTION)
+    return tuple(stage for stage in stages if stage is not None)

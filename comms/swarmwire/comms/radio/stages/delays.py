@@ -1,4 +1,7 @@
-"""Delays that vary from packet to packet, by distribution: each is a quantile of one uniform draw."""
+"""Stages that delay reception: latency with jitter, varying delay by a distribution, and propagation delay.
+
+Each varying delay is a quantile of one uniform draw.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -20,10 +23,11 @@ from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
 MAX_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
 SMALLEST_TAIL = 2.0**-54  # half a step of a draw, so that no quantile is infinite
+DELAY, DELAYS = purpose("delay"), purpose("delays")
 
 
 class DelayDistribution(NamedTuple):
-    """A distribution's numbers, as kernels take them."""
+    """Parameters of a delay distribution, as input of kernels."""
 
     distribution: int
     first: float
@@ -32,7 +36,7 @@ class DelayDistribution(NamedTuple):
 
 
 def delay_distribution(delays: Delays) -> DelayDistribution:
-    """The law with this mean and deviation.
+    """The distribution with this mean and deviation.
 
     Uniform: lowest (s) and width (s). Normal: mean (s), deviation (s), share that is cut off. Lognormal: mean and
     deviation of ln(delay / s). Pareto: least delay (s) and -1 / shape, with shape 1 + sqrt(1 + mean^2 / variance).
@@ -52,27 +56,21 @@ def delay_distribution(delays: Delays) -> DelayDistribution:
 
 
 @njit(cache=True)
-def varying_delay_ns(law, u):
+def varying_delay_ns(params, u):
     """The delay in whole ns (rounded down, at most a day) of a uniform draw u in [0, 1); it never falls with u."""
-    if law.distribution == UNIFORM:
-        delay_s = law.first + law.second * u
-    elif law.distribution == NORMAL:
+    if params.distribution == UNIFORM:
+        delay_s = params.first + params.second * u
+    elif params.distribution == NORMAL:
         # From the nearer tail: 1 - p would lose the digits of a small one.
-        above = max((1.0 - law.third) * (1.0 - u), SMALLEST_TAIL)
-        below = law.third + (1.0 - law.third) * u
+        above = max((1.0 - params.third) * (1.0 - u), SMALLEST_TAIL)
+        below = params.third + (1.0 - params.third) * u
         z = -normal_quantile(above) if above < 0.5 else normal_quantile(max(below, SMALLEST_TAIL))
-        delay_s = max(law.first + law.second * z, 0.0)
-    elif law.distribution == LOGNORMAL:
-        delay_s = math.exp(law.first + law.second * normal_quantile(u + SMALLEST_TAIL))
+        delay_s = max(params.first + params.second * z, 0.0)
+    elif params.distribution == LOGNORMAL:
+        delay_s = math.exp(params.first + params.second * normal_quantile(u + SMALLEST_TAIL))
     else:
-        delay_s = law.first * (1.0 - u) ** law.second
+        delay_s = params.first * (1.0 - u) ** params.second
     return int(min(delay_s * NS_PER_S, MAX_NS))
-
-
-# --- Latency and jitter: what passes between the end of the airtime and the moment at which a receiver has the packet.
-
-
-DELAY = purpose("delay")
 
 
 class Latency(Stage):
@@ -92,7 +90,7 @@ class Latency(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""
-        late_ns = delay_ns(
+        delays_ns = delay_ns(
             self._keys,
             self._robots,
             links.sender,
@@ -102,30 +100,24 @@ class Latency(Stage):
             self._latency_ns,
             self._jitter_ns,
         )
-        np.add(links.final_at_ns, late_ns, out=links.final_at_ns)
+        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
 @njit(cache=True)
 def delay_ns(keys, robots, sender, receiver, sequence, fate, latency_ns, jitter_ns):
-    """What `received_at` adds, in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
+    """The delay in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
 
     0 for links that ended.
     """
-    late_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(late_ns)):
+    delays_ns = np.zeros(len(sender), np.int64)
+    for i in range(len(delays_ns)):
         if fate[i] == RECEIVED:
-            late_ns[i] = latency_ns
+            delays_ns[i] = latency_ns
             if jitter_ns > 0:
                 key = keys[sender[i] // robots]
                 u = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], DELAY)
-                late_ns[i] += np.int64(u * jitter_ns)
-    return late_ns
-
-
-# --- Varying delay: a further delay with a distribution of its own, before a receiver has the packet.
-
-
-DELAYS = purpose("delays")
+                delays_ns[i] += np.int64(u * jitter_ns)
+    return delays_ns
 
 
 class VaryingDelay(Stage):
@@ -141,28 +133,27 @@ class VaryingDelay(Stage):
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.radio.delays is not None
-        self._law, self._keys, self._robots = delay_distribution(context.radio.delays), context.keys, context.robots
+        self._params, self._keys, self._robots = delay_distribution(context.radio.delays), context.keys, context.robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""
-        late_ns = drawn_ns(
-            self._law, self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate
+        delays_ns = drawn_ns(
+            self._params, self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate
         )
-        np.add(links.final_at_ns, late_ns, out=links.final_at_ns)
+        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
 @njit(cache=True)
-def drawn_ns(law, keys, robots, sender, receiver, sequence, fate):
-    """What `received_at` adds, in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
-    late_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(late_ns)):
+def drawn_ns(params, keys, robots, sender, receiver, sequence, fate):
+    """The delay in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
+    delays_ns = np.zeros(len(sender), np.int64)
+    for i in range(len(delays_ns)):
         if fate[i] == RECEIVED:
             s, r = sender[i], receiver[i]
-            late_ns[i] = varying_delay_ns(law, uniform(keys[s // robots], s % robots, r % robots, sequence[i], DELAYS))
-    return late_ns
-
-
-# --- Propagation delay: what a slow wave needs on its way.
+            delays_ns[i] = varying_delay_ns(
+                params, uniform(keys[s // robots], s % robots, r % robots, sequence[i], DELAYS)
+            )
+    return delays_ns
 
 
 class PropagationDelay(Stage):
@@ -173,7 +164,7 @@ class PropagationDelay(Stage):
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio says how fast its waves are."""
+        """The stage, where the radio sets a propagation speed."""
         speed_mps = context.radio.propagation_mps
         return None if speed_mps is None else PropagationDelay(speed_mps, context.wrap_m)
 
@@ -182,16 +173,16 @@ class PropagationDelay(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Links that are received become final later."""
-        late_ns = travel_ns(pose, links.sender, links.receiver, links.fate, self._speed_mps, self._wrap_m)
-        np.add(links.final_at_ns, late_ns, out=links.final_at_ns)
+        delays_ns = travel_ns(pose, links.sender, links.receiver, links.fate, self._speed_mps, self._wrap_m)
+        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
 @njit(cache=True)
 def travel_ns(pose, sender, receiver, fate, speed_mps, wrap_m):
-    """What `received_at` adds, in whole ns (rounded down), (k,); 0 for links that ended."""
-    late_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(late_ns)):
+    """The delay in whole ns (rounded down), (k,); 0 for links that ended."""
+    delays_ns = np.zeros(len(sender), np.int64)
+    for i in range(len(delays_ns)):
         if fate[i] == RECEIVED:
             dx, dy = to_sender_m(pose, sender[i], receiver[i], wrap_m)
-            late_ns[i] = np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
-    return late_ns
+            delays_ns[i] = np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
+    return delays_ns

@@ -1,4 +1,4 @@
-"""Fixed loss: the medium loses the same share everywhere, each packet for each receiver on its own."""
+"""Stages that lose packets, independently for each receiver: fixed loss, burst loss and trace replay."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -15,7 +15,7 @@ from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.traces import LinkTrace
 
-LOSS = purpose("fixed loss")
+LOSS, TRACE = purpose("fixed loss"), purpose("trace")
 
 
 class FixedLoss(Stage):
@@ -44,7 +44,7 @@ class FixedLoss(Stage):
 
 @njit(cache=True)
 def lost(keys, robots, sender, receiver, sequence, fate, loss):
-    """Which of the links under way are lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
+    """Whether each link under way is lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(ends)):
         if fate[i] == RECEIVED:
@@ -53,18 +53,15 @@ def lost(keys, robots, sender, receiver, sequence, fate, loss):
     return ends
 
 
-# --- Burst loss: links that are bad for a while lose more.
-
-
 class BurstLoss(Stage):
-    """Gilbert's and Elliott's chain for each directed link, in continuous time."""
+    """The Gilbert-Elliott chain for each directed link, in continuous time."""
 
     name = "burst_loss"
     keys = ("bursts",)
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has bursts; of a signal, its reception asks for them."""
+        """The stage, where a unit disk has bursts; in a PHY they are part of reception."""
         return BurstLoss(context) if context.radio.bursts is not None and not context.radio.is_phy else None
 
     remembers = True
@@ -74,14 +71,14 @@ class BurstLoss(Stage):
         self._bursts, self._loss = context.radio.bursts, context.radio.bursts.loss
         self._states = BurstStates(context.radio.bursts, context.keys, context.robots)
 
-    def go_on_from(self, before: Stage, at_ns: int) -> None:
-        """Links are as good or bad as they were."""
-        assert isinstance(before, BurstLoss)
-        before._states.change(self._bursts, at_ns)
-        self._states = before._states
+    def go_on_from(self, previous: Stage, at_ns: int) -> None:
+        """Keep the state of all links."""
+        assert isinstance(previous, BurstLoss)
+        previous._states.change(self._bursts, at_ns)
+        self._states = previous._states
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links end that a burst takes; they were in range. A link's packets come in the order of their time."""
+        """End links lost in a burst; they were in range. Packets of a link are handled in the order of time."""
         index = np.flatnonzero(links.fate == RECEIVED)
         index = index[np.argsort(links.final_at_ns[index], kind="stable")]
         sender, receiver, at_ns = links.sender[index], links.receiver[index], links.final_at_ns[index]
@@ -93,16 +90,10 @@ class BurstLoss(Stage):
         return 1.0 - self._loss
 
 
-# --- Trace: links that were measured lose and delay packets as they did then.
-
-
-TRACE = purpose("trace")
-
-
 class TraceReplay(Stage):
     """A Bernoulli trial with the measured delivery ratio for each packet and receiver, then the measured delay.
 
-    The values are those at the end of the airtime. Links without any are out of range, unless the model is to decide.
+    Values are those at the end of the airtime. Links without values are out of range, unless `others` is "model".
     """
 
     name = "trace"
@@ -110,7 +101,7 @@ class TraceReplay(Stage):
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has a trace; of a signal, its links have all but the delays."""
+        """The stage, where the radio has a trace; in a PHY it applies the delays alone."""
         return None if context.traces is None else TraceReplay(context)
 
     def __init__(self, context: ChannelContext) -> None:
@@ -121,14 +112,14 @@ class TraceReplay(Stage):
         self._only_delays = context.radio.is_phy
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links end that are lost, or that nobody measured; those that are received become final later."""
+        """End links that are lost or without measurement; received ones become final later."""
         sender, receiver = links.sender % self._robots, links.receiver % self._robots
         if not self._only_delays:
             self._end(links, sender, receiver)
         if self._traces.delay_s is not None:
             delay_s = np.nan_to_num(self._traces.delay_s.at(sender, receiver, links.final_at_ns))
-            late_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
-            np.add(links.final_at_ns, late_ns.astype(np.int64), out=links.final_at_ns)
+            delays_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
+            np.add(links.final_at_ns, delays_ns.astype(np.int64), out=links.final_at_ns)
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
         """The ratio of the worse direction at the time of the links."""
@@ -157,7 +148,7 @@ def _measured(trace: LinkTrace | None, sender: IntArray, receiver: IntArray, at_
 
 @njit(cache=True)
 def trace_lost(keys, robots, sender, receiver, sequence, fate, ratio):
-    """Which of the links under way are lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
+    """Whether each link under way is lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(ends)):
         if fate[i] == RECEIVED and ratio[i] < 1.0:

@@ -1,4 +1,4 @@
-"""How far apart two robots are, as stages see it: the shortest way on a torus."""
+"""Stages that measure a received packet: range, bearing and RSSI, each with a normal error."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -14,44 +14,39 @@ from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
+RANGE_NOISE, BEARING_NOISE = purpose("range noise"), purpose("bearing noise")
+RSSI_NOISE = purpose("rssi noise")
+TURN = 2.0 * np.pi
+
 
 @njit(cache=True)
 def to_sender_m(pose, sender, receiver, wrap_m):
-    """The way from receiver to sender, robot rows of `pose` (rows, 3): x and y in m; `wrap_m` is the medium's."""
+    """Vector from receiver to sender, robot rows of `pose` (rows, 3): x and y in m, the shortest on a torus."""
     dx, dy = pose[sender, 0] - pose[receiver, 0], pose[sender, 1] - pose[receiver, 1]
     return dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
 
 
-# --- What a receiver learns of where a sender was, whichever column it is.
-
-
 class Measurement(Stage):
-    """Fills a column of what is given with what a kernel measures between two poses, with its error.
+    """Fills a column of `Links.given` with the measurement of a kernel between two poses, with its error.
 
     Args:
-        medium: whose radio gives the column.
-        column: its name.
+        context: the context of a medium whose radio measures the column.
+        column: name of the column.
         noise: deviation of the error, in the column's unit.
         measured: kernel of (keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise): (k,).
     """
 
-    def __init__(self, context: ChannelContext, column: str, noise: float, measured: Callable[..., FloatArray]) -> None:
+    def __init__(self, context: ChannelContext, column: str, noise: float, kernel: Callable[..., FloatArray]) -> None:
         self._keys, self._robots, self._wrap_m = context.keys, context.robots, context.wrap_m
         self._column = context.radio.measures.columns.index(column)
-        self._noise, self._measured = noise, measured
+        self._noise, self._kernel = noise, kernel
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Fill the column, for links that ended with 0."""
-        who = links.sender, links.receiver, links.sequence
-        links.given[:, self._column] = self._measured(
-            self._keys, self._robots, self._wrap_m, pose, *who, links.fate, self._noise
+        ends = links.sender, links.receiver, links.sequence
+        links.given[:, self._column] = self._kernel(
+            self._keys, self._robots, self._wrap_m, pose, *ends, links.fate, self._noise
         )
-
-
-# --- The range that a receiver learns with a packet.
-
-
-RANGE_NOISE = purpose("range noise")
 
 
 class MeasuredRange(Measurement):
@@ -62,9 +57,9 @@ class MeasuredRange(Measurement):
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio gives the range."""
-        asked = context.radio.measures.range
-        return None if asked is None else MeasuredRange(context, asked.noise_m)
+        """The stage, where the radio measures the range."""
+        measure = context.radio.measures.range
+        return None if measure is None else MeasuredRange(context, measure.noise_m)
 
     def __init__(self, context: ChannelContext, noise_m: float) -> None:
         super().__init__(context, "range_m", noise_m, range_m)
@@ -85,15 +80,8 @@ def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_
     return out_m
 
 
-# --- The bearing that a receiver learns with a packet.
-
-
-BEARING_NOISE = purpose("bearing noise")
-TURN = 2.0 * np.pi
-
-
 class MeasuredBearing(Measurement):
-    """Where the sender was, seen from the receiver's body when the packet went on air, plus a normal error.
+    """The bearing of the sender from the receiver's body when the packet went on air, plus a normal error.
 
     In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
     """
@@ -103,9 +91,9 @@ class MeasuredBearing(Measurement):
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio gives the bearing."""
-        asked = context.radio.measures.bearing
-        return None if asked is None else MeasuredBearing(context, asked.noise_rad)
+        """The stage, where the radio measures the bearing."""
+        measure = context.radio.measures.bearing
+        return None if measure is None else MeasuredBearing(context, measure.noise_rad)
 
     def __init__(self, context: ChannelContext, noise_rad: float) -> None:
         super().__init__(context, "bearing_rad", noise_rad, bearing_rad)
@@ -128,17 +116,11 @@ def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, no
 
 @njit(cache=True)
 def wrapped(angle):
-    """The angle in (-pi, pi]; one that lies there already is unchanged."""
+    """The angle wrapped to (-pi, pi]; an angle in this interval is unchanged."""
     if -np.pi < angle <= np.pi:
         return angle
     turned = angle - TURN * np.ceil((angle - np.pi) / TURN)
     return min(turned, np.pi) if turned > -np.pi else np.pi
-
-
-# --- The strength of the signal that a receiver learns with a packet.
-
-
-RSSI_NOISE = purpose("rssi noise")
 
 
 class MeasuredRssi(Stage):
@@ -149,9 +131,9 @@ class MeasuredRssi(Stage):
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio gives the strength."""
-        given = context.radio.measures.rssi
-        return None if given is None else MeasuredRssi(context, given.noise_db)
+        """The stage, where the radio measures the RSSI."""
+        measure = context.radio.measures.rssi
+        return None if measure is None else MeasuredRssi(context, measure.noise_db)
 
     def __init__(self, context: ChannelContext, noise_db: float) -> None:
         self._noise_db, self._keys, self._robots = noise_db, context.keys, context.robots

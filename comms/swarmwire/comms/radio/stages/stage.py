@@ -1,4 +1,4 @@
-"""What a stage of the channel is, and what it may know."""
+"""The interface of a channel stage, and the context from which stages are made."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from swarmwire.comms.radio.traces import LinkTraces
 
 @dataclass(frozen=True, slots=True)
 class ChannelContext:
-    """What stages are made from."""
+    """The radio, the arenas and the robots, as input of all stages."""
 
     radio: Radio
     keys: KeyArray  # (arenas,) for draws
@@ -25,47 +25,47 @@ class ChannelContext:
     radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the medium
     antennas: Antennas  # of robots
-    running: BoolArray  # (arenas,) kept up to date by the medium: in others nobody sends any more
+    running: BoolArray  # (arenas,) kept up to date by the medium; other arenas have left the run
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
-    is_torus: bool = False  # distances are the shortest
+    is_torus: bool = False  # shortest distances count
 
     @property
     def wrap_m(self) -> tuple[float, float]:
-        """The sides over which a torus goes on, in m; 0 where an arena ends, as `geometry.to_nearest` takes them."""
+        """Sides of a torus in m, for `geometry.obstacles.to_nearest`; 0 where an arena has walls."""
         return self.size_m if self.is_torus else (0.0, 0.0)
 
 
 class Stage(ABC):
-    """One step in the life of a packet between the sender's radio and one receiver."""
+    """One step of a packet on its way from the sender's radio to one receiver."""
 
-    name: ClassVar[str]  # as `swarmwire describe` has it
-    keys: ClassVar[tuple[str, ...]]  # of [radio] that it goes by
-    remembers = False  # whether packets that never go on air must not be shown to it
+    name: ClassVar[str]  # as in `swarmwire describe`
+    keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
+    remembers = False  # whether it has state, so that it must not see packets that never go on air
 
     @classmethod
     @abstractmethod
     def of(cls, context: ChannelContext) -> "Stage | None":
-        """The stage of this medium; None where it has none."""
+        """The stage for this medium; None where it is not needed."""
 
     @abstractmethod
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Give a fate to links that end here, or change what becomes of the others; in place.
+        """Set the fate of links that end here, or change columns of the others; in place.
 
         Only links with fate RECEIVED are still under way. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in m,
-        heading. A stage before reception that ends a link also sets its `in_range` to 0.
+        heading in rad. A stage before reception that ends a link also sets its `in_range` to 0.
         """
 
-    def go_on_from(self, before: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages remember nothing
-        """Remember what a stage of the same kind did, whose radio had other numbers until `at_ns`."""
+    def go_on_from(self, previous: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages have no state
+        """Take over the state of the same stage with the radio parameters valid until `at_ns`."""
 
     @property
     def lets_all_pass(self) -> bool:
-        """Whether `delivery` would be 1 for everybody at the moment: then it is not asked."""
+        """Whether `delivery` is 1 for all links at the moment: it is then not called."""
         return False
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """With which probability lone packets pass, fast fading apart, (k,) or one for all: for the radio graph.
+        """Probability that lone packets pass, without fast fading, (k,) or one for all: for the radio graph.
 
-        The worse direction counts. `final_at_ns` is the time for which the graph is.
+        The worse direction counts. `final_at_ns` is the time of the graph.
         """
         return 1.0

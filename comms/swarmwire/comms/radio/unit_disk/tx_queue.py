@@ -1,4 +1,7 @@
-"""Queue and access: when a sender's radio puts its packets on air, and which of them it refuses."""
+"""Transmit queues of the unit disk: time on air of each packet, refusals, and the outage queue policy.
+
+Each sender has a queue, first in, first out. While a radio is off its packets end, or wait by its backlog policy.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -12,6 +15,9 @@ from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
+FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it
+NO_PACKETS = Transmissions.none()
+NO_LIMIT = 2**31  # where all but the newest packet end anyway
 
 
 @njit(cache=True)
@@ -27,9 +33,9 @@ def enter(
 ) -> tuple[IntArray, IntArray, IntArray]:
     """First in, first out: `on_air_at = max(sent_at, end of the sender's previous packet)`, all times in ns.
 
-    A packet that must wait is refused while `queue_limit` others of its sender wait (will go on air after `sent_at`).
-    That limit, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row, `queued` the packets that may
-    still wait.
+    A packet that must wait is refused while `queue_limit` others of its sender wait (go on air after `sent_at`).
+    `queue_limit`, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row; `queued_…` are packets
+    that may still wait.
     Returns on_air_at_ns (k,) (sent_at of a refused packet), fate (k,) and the new free_at_ns (rows,).
     """
     free_at_ns = free_at_ns.copy()
@@ -54,19 +60,12 @@ def enter(
     return on_air_at_ns, fate, free_at_ns
 
 
-# --- Backlog: packets that wait at a radio while it is off, and go on air when it is on again.
-
-
-# When a packet goes on air whose radio is off; airtimes may be added to it.
-FAR_NS = 2**62
-
-
 def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> tuple[Transmissions, IntArray]:
-    """The queue in which what waits at radios `which` (rows,) waits for them; and when their last airtime ends.
+    """Hold the packets of radios `which` (rows,) until they are on; returns the queue and the end of the last airtime.
 
-    `free_at_ns` (rows,) is when all that waits would have been sent.
+    `free_at_ns` (rows,) is the end of the last airtime of all queued packets.
     """
-    held = _held_back(queued.sender, queued.fate, queued.on_air_at_ns, queued.off_air_at_ns, which, free_at_ns)
+    held = _hold(queued.sender, queued.fate, queued.on_air_at_ns, queued.off_air_at_ns, which, free_at_ns)
     on_air_at_ns, off_air_at_ns, free_at_ns = held
     return queued._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
 
@@ -74,21 +73,21 @@ def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) ->
 def release_queue(
     queued: Transmissions, which: BoolArray, free_at_ns: IntArray, at_ns: int
 ) -> tuple[Transmissions, IntArray]:
-    """The queue in which what waited for radios `which` (rows,) goes on air from `at_ns` on, one after the other.
+    """Release the packets held by radios `which` (rows,): they go on air from `at_ns` on, one after the other.
 
-    `free_at_ns` (rows,) is when their last airtime ended; also returned, as it is then.
+    `free_at_ns` (rows,) is the end of their last airtime; returned with its new values.
     """
-    gone = _let_go(
+    released = _release(
         queued.sender, queued.sent_at_ns, queued.on_air_at_ns, queued.off_air_at_ns, which, free_at_ns, at_ns
     )
-    on_air_at_ns, off_air_at_ns, free_at_ns = gone
+    on_air_at_ns, off_air_at_ns, free_at_ns = released
     return queued._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
 
 
 def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Transmissions:
-    """The queue in which only the newest packet waits for each radio of `which` (rows,).
+    """Keep only the newest packet held by each radio of `which` (rows,).
 
-    Older ones end as BLACKOUT at `at_ns` (rows,), by sender: it is the radio that is off that they are lost to.
+    Older ones end as BLACKOUT at `at_ns` (rows,), by sender, since the radio that is off loses them.
     """
     if not which.any():
         return queued
@@ -105,14 +104,14 @@ def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Tra
 
 
 @njit(cache=True)
-def _held_back(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
+def _hold(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
     on_air_at_ns, off_air_at_ns, free_at_ns = on_air_at_ns.copy(), off_air_at_ns.copy(), free_at_ns.copy()
     seen = np.zeros(len(which), np.bool_)
     for p in range(len(sender)):
         s = sender[p]
         if not which[s] or fate[p] != ACCEPTED:
             continue
-        if not seen[s]:  # the packet before the first that waits has been sent when this one would have begun
+        if not seen[s]:  # the packet before the first one held ends when this one would have started
             seen[s] = True
             free_at_ns[s] = on_air_at_ns[p]
         off_air_at_ns[p] += FAR_NS - on_air_at_ns[p]
@@ -121,94 +120,87 @@ def _held_back(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
 
 
 @njit(cache=True)
-def _let_go(sender, sent_at_ns, on_air_at_ns, off_air_at_ns, which, free_at_ns, at_ns):
+def _release(sender, sent_at_ns, on_air_at_ns, off_air_at_ns, which, free_at_ns, at_ns):
     on_air_at_ns, off_air_at_ns, free_at_ns = on_air_at_ns.copy(), off_air_at_ns.copy(), free_at_ns.copy()
     for p in range(len(sender)):
         s = sender[p]
         if not which[s] or on_air_at_ns[p] < FAR_NS:
             continue
-        lasts_ns = off_air_at_ns[p] - on_air_at_ns[p]
+        duration_ns = off_air_at_ns[p] - on_air_at_ns[p]
         on_air_at_ns[p] = max(at_ns, free_at_ns[s], sent_at_ns[p])
-        off_air_at_ns[p] = on_air_at_ns[p] + lasts_ns
+        off_air_at_ns[p] = on_air_at_ns[p] + duration_ns
         free_at_ns[s] = off_air_at_ns[p]
     return on_air_at_ns, off_air_at_ns, free_at_ns
 
 
-# --- The senders' side of all radios: packets are numbered, queued, and leave when they go on air or are refused.
-
-
-NOTHING = Transmissions.none()
-NO_LIMIT = 2**31  # where all but the newest packet end anyway
-
-
 class TxQueues:
-    """Each robot's radio: a queue, first in, first out, and a count of the packets that it was handed."""
+    """The radio of each robot: a queue, first in, first out, and the count of its packets."""
 
     def __init__(self, radio: Radio, rows: int) -> None:
         self._radio = radio
-        self._intake = Admission(rows)
+        self._admission = Admission(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
         self._backlog = np.full(rows, DROP)
         self.queued = Transmissions.none()
 
     def tune(self, radio: Radio) -> None:
-        """The radio has other numbers for packets to come."""
+        """Use the parameters of `radio` for later packets."""
         self._radio = radio
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """The packets as the radios take them up, sorted by sender; also kept in `queued`.
+        """Admit packets to the queues; returns them sorted by sender, also kept in `queued`.
 
-        `sent_at_ns` (rows,) is when each robot hands its packets over, `others_alive` (rows,) are the receivers that a
-        robot's broadcast intends, those of the epoch.
+        `sent_at_ns` (rows,) is the send time of each robot, `others_alive` (rows,) the number of intended receivers of
+        its broadcasts in this epoch.
         """
-        packets = self._intake.take(sent_at_ns, sent, others_alive, epoch)
+        packets = self._admission.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
         packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
         self.queued = newest_only(self.queued.followed_by(packets), self._backlog == NEWEST, sent_at_ns)
         return packets
 
-    def leave(self, until_ns: int, now: Disruption) -> Transmissions:
-        """Take out of the queues what goes on air, or is refused, before `until_ns`.
+    def leave(self, until_ns: int, disruption: Disruption) -> Transmissions:
+        """Take out of the queues the packets that go on air, or are refused, before `until_ns`.
 
-        What a radio that is off should put on air ends at that moment as BLACKOUT: its queue drains at the usual pace,
-        unless it is kept back.
+        A packet due while its radio is off ends at that time as BLACKOUT: the queue drains at the usual pace, unless
+        its backlog is held.
         """
-        packets = self._taken(self.queued.on_air_at_ns < until_ns)
-        if not now.anyone_out:
+        packets = self._take_out(self.queued.on_air_at_ns < until_ns)
+        if not disruption.anyone_out:
             return packets
         accepted = packets.fate == ACCEPTED
-        off, dead = accepted & ~now.radio_on[packets.sender], accepted & ~now.alive[packets.sender]
+        off, dead = accepted & ~disruption.radio_on[packets.sender], accepted & ~disruption.alive[packets.sender]
         fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
         off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
         return packets._replace(fate=fate, off_air_at_ns=off_air_at_ns)
 
-    def switch(self, at_ns: int, now: Disruption) -> None:
-        """Radios are off or on from `at_ns` on: queues are kept back, or go on air again."""
-        before, self._backlog = self._backlog, now.backlog_now
-        held, free = self._backlog != DROP, (before != DROP) & (self._backlog == DROP)
+    def switch(self, at_ns: int, disruption: Disruption) -> None:
+        """Apply radios that are off or on from `at_ns` on: hold their queues, or release them."""
+        previous, self._backlog = self._backlog, disruption.backlog_now
+        held, free = self._backlog != DROP, (previous != DROP) & (self._backlog == DROP)
         if free.any():
             self.queued, self._free_at_ns = release_queue(self.queued, free, self._free_at_ns, at_ns)
-        if (held & (before == DROP)).any():
-            self.queued, self._free_at_ns = hold_queue(self.queued, held & (before == DROP), self._free_at_ns)
+        if (held & (previous == DROP)).any():
+            self.queued, self._free_at_ns = hold_queue(self.queued, held & (previous == DROP), self._free_at_ns)
         self.queued = newest_only(self.queued, self._backlog == NEWEST, np.full(len(held), at_ns))
 
     def die(self, at_ns: int, alive: BoolArray) -> Transmissions:
-        """Take out all that waits at radios of robots not alive (rows,): SENDER_DEAD now, and the radios are free."""
+        """Take out all packets of robots not `alive` (rows,) as SENDER_DEAD, and free their radios."""
         self._free_at_ns[~alive] = 0
-        packets = self._taken(~alive[self.queued.sender])
+        packets = self._take_out(~alive[self.queued.sender])
         at = np.full(len(packets.sender), at_ns)
         fate = np.where(packets.fate == ACCEPTED, Fate.SENDER_DEAD, packets.fate)
         return packets._replace(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
-    def _taken(self, due: BoolArray) -> Transmissions:
+    def _take_out(self, due: BoolArray) -> Transmissions:
         if not due.any():
-            return NOTHING
+            return NO_PACKETS
         packets, self.queued = self.queued.parted(due)
         return packets
 
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         radio = self._radio
-        lasts_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
+        duration_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
         held = self._backlog != DROP
         on_air_at_ns, fate, free_at_ns = enter(
             sent_at_ns,
@@ -216,9 +208,9 @@ class TxQueues:
             self.queued.sender,
             self.queued.on_air_at_ns,
             sender,
-            lasts_ns,
+            duration_ns,
             sizes > radio.max_payload_bytes,
             np.where(self._backlog == NEWEST, NO_LIMIT, radio.queue_limit),
         )
         self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)
-        return on_air_at_ns, on_air_at_ns + np.where(fate == ACCEPTED, lasts_ns, 0), fate
+        return on_air_at_ns, on_air_at_ns + np.where(fate == ACCEPTED, duration_ns, 0), fate

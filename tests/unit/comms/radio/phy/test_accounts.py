@@ -191,7 +191,7 @@ def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(Reporter, "decided", counted)
     for room in (1, 200, 300, 400):
-        monkeypatch.setattr(model, "MIN_ROOM", room)
+        monkeypatch.setattr(model, "MIN_CAPACITY", room)
         assert finished(crowded()) == at_once
     assert goes >= {1, 2, 3}
 

@@ -158,7 +158,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     rules, ticks, frame_bits = phy_params_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     rssi_dbm = on_air(told, "rssi_dbm")[:1]
-    frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.acknowledgement_bits))
+    frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.ack_bits))
     keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
     right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
@@ -243,7 +243,7 @@ def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
     lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]
     second = lost[0] & ~lost[1]
     draws = [uniform(KEYS[arena], 0, sequence, 16 * attempt, purpose("csma backoff")) for attempt in range(2)]
-    backoffs = sum(np.floor(u * 2**rules.least_exponent).astype(np.int64) for u in draws)
+    backoffs = sum(np.floor(u * 2**rules.min_be).astype(np.int64) for u in draws)
     waited_ns = on_air(told, "final_at_ns") - on_air(told, "sent_at_ns")
     assert np.count_nonzero(second) > 20
     assert len(set((waited_ns - backoffs * rules.backoff_ns)[second].tolist())) == 1
