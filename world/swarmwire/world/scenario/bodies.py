@@ -56,7 +56,7 @@ def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
     """The body with what the scenario itself says of its sheet; the group in its name tells it from all others."""
     if not table.body_overrides:
         return body
-    key = f"robots.{group}.sheet"
+    key = f"robots.{group}.body_overrides"
     path = sheet_path(table.body, where)
     base = {"like": table.body} if path is None else read_toml(path)
     spec = merged({**base, "name": f"{body.name} of {group}"}, table.body_overrides)
