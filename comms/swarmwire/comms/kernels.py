@@ -1,42 +1,175 @@
-"""How kernels that only borrow their arrays are compiled: without counting references.
+"""Compiled functions: the two ways to make them, and a cache on disk that notices every change.
 
-By default compiled code counts a reference each time that it takes an array out of a tuple of arrays; where small
-functions pass such tuples on a million times a second, that is four fifths of the time. Kernels compiled by this
-allocate nothing, and their caller holds all the arrays until they return. (numba compiles parts of itself in this way.)
-They are inlined into one another, so that tuples are not copied from one to the next.
+- `njit`: numba's, cached.
+- `kernel`: for functions that allocate nothing and are called a million times a second. By default compiled code counts
+  a reference each time that it takes an array out of a tuple of arrays; where small functions pass such tuples on, that
+  is four fifths of the time. A kernel counts none, since its caller holds all arrays until it returns (numba compiles
+  parts of itself in this way), and is inlined, so that tuples are not copied from one to the next.
 
-Only those that Python calls have a way in from there: it unpacks every array of every tuple, and for a small function
-that takes longer to compile than the function itself.
+numba's own cache looks at the file of a compiled function alone: after a change of a constant or of a function that
+it uses from elsewhere, machine code from before would run on. Here the cache also compares what a function uses
+(`digest_of`) and the fields of the tuples that it is given.
+
+This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
+`_source_stamp`, `_index_key`, `_compile_for_args`. So pyproject.toml pins numba's minor version, and
+`tests/unit/comms/test_kernels.py` fails when one of them is not as it was.
 """
 
+# pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
+
+from __future__ import annotations
+
+import hashlib
+import sys
 from collections.abc import Callable
-from typing import Any, NoReturn
+from functools import cache
+from types import CodeType, ModuleType
+from typing import Any, NoReturn, TypeVar, cast
 
-from numba import njit
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+from numba.core.types import BaseNamedTuple
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}  # modules whose functions numba knows by itself
+PLAIN = bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype
 
 
-def kernel(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """`numba.njit` for kernels that allocate nothing; what is not called `from_python` other kernels alone can call."""
-    uncounted: dict[str, Any] = {"cache": True, "_nrt": False, "forceinline": True}
-    ways_in: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not from_python}
+def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
+    """`numba.njit` with options of its own; cached on disk unless told otherwise."""
 
-    def compiled(function: Callable[..., Any]) -> Any:
-        kernel: Any = njit(**uncounted, **ways_in, **options)(function)
-        return kernel if from_python else _for_kernels(kernel)
+    def compiled(function: F) -> F:
+        made: Any = numba.njit(**options)(function)
+        if cache and isinstance(made, Dispatcher):  # without the compiler numba returns the function itself
+            made._cache = _Cache(function)
+        return cast("F", made)
 
     return compiled
 
 
-def _for_kernels(kernel: Any) -> Any:
+def kernel(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """A kernel that allocates nothing; unless it is called `from_python`, other kernels alone can call it.
+
+    The way in from Python unpacks every array of every tuple: for a small function that takes longer to compile than
+    the function itself.
+    """
+    uncounted: dict[str, Any] = {"_nrt": False, "forceinline": True}
+    ways_in: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not from_python}
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        made: Any = njit(**uncounted, **ways_in, **options)(function)
+        return made if from_python else _for_kernels(made)
+
+    return compiled
+
+
+def _for_kernels(made: Any) -> Any:
     """The kernel, which raises TypeError if Python calls it: numba would call what is not there, and crash."""
 
     def keep(compiled: Any) -> None:  # for other kernels; numba would also list it among what Python may call
-        kernel.overloads[tuple(compiled.signature.args)] = compiled
+        made.overloads[tuple(compiled.signature.args)] = compiled
 
     def refuse(*_: Any, **__: Any) -> NoReturn:
-        raise TypeError(
-            f"{kernel.__name__}: expected a call by another kernel, or from_python=True where it is defined"
-        )
+        raise TypeError(f"{made.__name__}: expected a call by another kernel, or from_python=True where it is defined")
 
-    kernel.add_overload, kernel._compile_for_args = keep, refuse
-    return kernel
+    made.add_overload, made._compile_for_args = keep, refuse
+    return made
+
+
+class _Cache(FunctionCache):
+    """The cache of one compiled function; what it holds is dropped once anything that the function uses has changed."""
+
+    _is_stamped = False
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code for a signature; None if there is none, or none that is up to date."""
+        self._stamp()
+        try:
+            return super().load_overload(sig, target_context)
+        except (AttributeError, ImportError):  # it names a class that was renamed or moved
+            self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the machine code of a signature."""
+        self._stamp()
+        super().save_overload(sig, data)
+
+    def _stamp(self) -> None:
+        """Take what the function uses into the stamp: only now, since all of its module is there when it is called."""
+        if not self._is_stamped:
+            self._is_stamped = True
+            file: Any = self._cache_file
+            file._source_stamp = file._source_stamp, digest_of(self._py_func)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return super()._index_key(sig, codegen), tuple(_tuple_fields(kind) for kind in sig)
+
+
+def _tuple_fields(kind: Any) -> Any:
+    """The names of a named tuple's fields, nested ones as well: machine code knows them by their places."""
+    if issubclass(type(kind), BaseNamedTuple):
+        return kind.fields, tuple(_tuple_fields(of) for of in kind.types)
+    return None
+
+
+def digest_of(function: Callable[..., Any]) -> str:
+    """SHA-256 over a function's code, and over the constants and compiled functions that it uses, theirs included."""
+    found, waiting = dict[Any, bytes](), [function]
+    while waiting:
+        if (of := waiting.pop()) not in found:
+            found[of], used = _own(of)
+            waiting += used
+    return hashlib.sha256(b"".join(found.values())).hexdigest()
+
+
+@cache
+def _own(function: Any) -> tuple[bytes, tuple[Any, ...]]:
+    """The digest of a function's own code and constants, and the functions that are behind what it calls."""
+    digest, used = hashlib.sha256(), list[Any]()
+
+    def add_code(code: CodeType) -> None:
+        digest.update(code.co_code + repr((code.co_names, code.co_varnames)).encode())
+        for constant in code.co_consts:
+            if isinstance(constant, CodeType):
+                add_code(constant)
+            else:
+                digest.update(repr(constant).encode())
+
+    def add_value(name: str, value: Any) -> None:
+        if isinstance(value, Dispatcher):
+            digest.update(name.encode())
+            used.append(value.py_func)
+        elif isinstance(value, ModuleType):
+            if value.__name__.partition(".")[0] not in FOREIGN:
+                for attribute in names:
+                    if attribute in vars(value):
+                        add_value(f"{name}.{attribute}", vars(value)[attribute])
+        elif isinstance(value, type):
+            digest.update(repr((name, getattr(value, "_fields", ()))).encode())
+        elif isinstance(value, np.ndarray):
+            digest.update(repr((name, value.dtype.descr, value.shape)).encode() + value.tobytes())
+        elif isinstance(value, tuple):
+            digest.update(repr((name, type(value).__name__, len(value))).encode())
+            for place, item in enumerate(value):
+                add_value(str(place), item)
+        elif isinstance(value, PLAIN):
+            digest.update(repr((name, value)).encode())
+
+    names = _names_in(function.__code__)
+    add_code(function.__code__)
+    for name in names:
+        if name in function.__globals__:
+            add_value(name, function.__globals__[name])
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        add_value(name, cell.cell_contents)
+    return digest.digest(), tuple(used)
+
+
+def _names_in(code: CodeType) -> tuple[str, ...]:
+    """The names that a function reads, nested ones as well, each once."""
+    nested = (constant for constant in code.co_consts if isinstance(constant, CodeType))
+    return tuple(dict.fromkeys([*code.co_names, *(name for inner in nested for name in _names_in(inner))]))
