@@ -42,9 +42,9 @@ OUTCOMES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 
 def changed(**arrays: Any) -> bytes:
-    """A sound frame but for these arrays, "_" for "/"."""
+    """A valid frame except for these arrays; the prefix `received_` stands for `received/`."""
     whole = frames.decode(encode_bridged(3, ROW, RECEIVED, OUTCOMES))
-    wrong = {name.replace("_", "/"): array for name, array in arrays.items()}
+    wrong = {name.replace("received_", "received/"): array for name, array in arrays.items()}
     return frames.encode(whole.kind, whole.tick, {**whole.arrays, **wrong})
 
 

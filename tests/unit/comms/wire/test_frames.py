@@ -204,7 +204,7 @@ def test_more_bytes_than_the_limit_are_oversized_and_not_read() -> None:
     data = whole()
     assert fault(data, max_bytes=len(data) - 1) == "oversized"
     assert fault(b"\xc1" * 10, max_bytes=9) == "oversized"
-    assert frames.decode(data, most_bytes=len(data)).tick == 3
+    assert frames.decode(data, max_bytes=len(data)).tick == 3
 
 
 def test_every_cut_of_a_frame_is_malformed() -> None:
