@@ -3,9 +3,9 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms import draws
+from swarmwire.comms.kernels import njit
 
 _M0, _M1 = (np.uint64(m) for m in draws.MULTIPLIERS)
 _W0, _W1 = (np.uint64(w) for w in draws.WEYL)
@@ -17,7 +17,7 @@ _ROUNDS = draws.ROUNDS
 _CENTRE, _TAIL, _FAR_TAIL = draws.CENTRE, draws.TAIL, draws.FAR_TAIL
 
 
-@njit(cache=True)
+@njit()
 def uniform(key, c0, c1, c2, c3):
     """Uniform draw in [0, 1) of a uint64 key and four counters (the low 32 bits count)."""
     key = np.uint64(key)
@@ -30,13 +30,13 @@ def uniform(key, c0, c1, c2, c3):
     return np.float64(((x1 << _S32) | x0) >> _S11) * _TO_UNIT
 
 
-@njit(cache=True)
+@njit()
 def normal(key, c0, c1, c2, c3):
     """Standard normal draw of a uint64 key and four counters."""
     return normal_quantile(uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT)
 
 
-@njit(cache=True)
+@njit()
 def normal_quantile(p):
     """The standard normal quantile of p in (0, 1)."""
     q = p - 0.5
@@ -47,7 +47,7 @@ def normal_quantile(p):
     return -tail if q < 0.0 else tail
 
 
-@njit(cache=True)
+@njit()
 def _ratio(pieces, x):
     above, below = pieces[0][7], pieces[1][7]
     for i in range(6, -1, -1):
@@ -56,7 +56,7 @@ def _ratio(pieces, x):
     return above / below
 
 
-@njit(cache=True)
+@njit()
 def _log(x):
     bits = np.float64(x).view(np.uint64)
     exponent = np.int64(bits >> _S52) - 1023

@@ -5,9 +5,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 
 RELATIVE_ERROR = 0.005
 LARGEST_NS = 10**14  # a little more than a day; what is longer counts as this
@@ -47,7 +47,7 @@ class LogHistogram:
         return np.where(bins > 0, 2.0 * np.power(_GROWTH, bins - 1.0) / (_GROWTH + 1.0), 0.0)
 
 
-@njit(cache=True)
+@njit()
 def _count(count, arena, duration_ns):
     last_ns, place = 0, 0
     for i in range(len(duration_ns)):

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -92,7 +92,7 @@ def _failed(metric: Metric) -> CustomCodeFailed:
     return CustomCodeFailed(f"the metric {metric.name} ({type(metric).__name__})", traceback.format_exc())
 
 
-@njit(cache=True)
+@njit()
 def _add(value, latest, running, counts, seen, total, least, most):
     """Add the values of a tick, (metrics, arenas), to the statistics; those of counts become their totals so far.
 

@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static, Truth
 
 T = TypeVar("T")
@@ -91,7 +91,7 @@ class Moment:
         return found
 
 
-@njit(cache=True)
+@njit()
 def agreement(x: FloatArray, y: FloatArray, alive: BoolArray, lengths: bool) -> FloatArray:
     """How near sums of vectors (arenas, robots) come to the most they can be, 0 to 1, (arenas,): |sum| / most.
 
@@ -114,7 +114,7 @@ def agreement(x: FloatArray, y: FloatArray, alive: BoolArray, lengths: bool) -> 
     return share
 
 
-@njit(cache=True)
+@njit()
 def _direction(pose):
     """Both in one pass, which costs half of what two of numpy's do."""
     arenas, robots, _ = pose.shape
@@ -126,7 +126,7 @@ def _direction(pose):
     return c, s
 
 
-@njit(cache=True)
+@njit()
 def _count(alive):
     """How many robots of each arena are alive, the same with NaN for none, and whether all are."""
     arenas, robots = alive.shape
@@ -140,7 +140,7 @@ def _count(alive):
     return count, divisor, everyone
 
 
-@njit(cache=True)
+@njit()
 def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray]:
     """How many components each arena has that hold a robot alive, and the most of them that one holds, (arenas,) each.
 
@@ -162,7 +162,7 @@ def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray
     return pieces, largest
 
 
-@njit(cache=True)
+@njit()
 def _root(parent, row):
     while parent[row] != row:
         parent[row] = parent[parent[row]]  # halves the way for those to come

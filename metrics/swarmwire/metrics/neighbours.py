@@ -3,12 +3,12 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.kernels import njit
 
 
-@njit(cache=True)
+@njit()
 def neighbours_of(edges: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """`start` (nodes + 1,) and `other` (2 e,): node i is joined by an edge (e, 2) to other[start[i] : start[i + 1]]."""
     start, other = np.zeros(nodes + 1, np.int64), np.empty(2 * len(edges), np.int64)

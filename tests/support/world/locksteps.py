@@ -79,7 +79,8 @@ def rows_of(frame: bytes) -> list[int]:
 
 def state(roster: Lockstep | RealTime) -> Any:
     slots = [
-        (slot.runner, slot.state, slot.rows.tolist(), id(getattr(slot, "actions", None))) for slot in roster._allocations
+        (slot.runner, slot.state, slot.rows.tolist(), id(getattr(slot, "actions", None)))
+        for slot in roster._allocations
     ]
     return slots, sorted(roster._by_runner), roster._tick
 

@@ -29,8 +29,8 @@ OF_SETTINGS = [
     ("radio.preset='wifi'", f"radio.preset: expected one of {PRESETS} (did you mean wifi-b-1M?), got 'wifi'"),
     (
         "robots.flock.cuont=3",
-        "robots.flock.cuont: unknown key; expected one of body, body_overrides, count, agent, act_every_ticks, params, radio, "
-        "place (did you mean count?)",
+        "robots.flock.cuont: unknown key; expected one of body, body_overrides, count, agent, act_every_ticks, params, "
+        "radio, place (did you mean count?)",
     ),
     ("events=[{at_s=1}]", f"events.0.do: is missing; expected one of {DO}"),
     (

@@ -5,9 +5,9 @@
 import hashlib
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import ReceivedPackets
 
 WAITING_BYTES = 2**20  # hashed together at most, over all arenas
@@ -67,7 +67,7 @@ class TrajectoryHash:
         return [digest.hexdigest() for digest in self._hashes]
 
 
-@njit(cache=True)
+@njit()
 def _packets(receiver, sender, sequence, received_at_ns, first, robots):
     """What was received, (k, 4), receivers as indices in their arenas, which begin at the rows `first`."""
     table = np.empty((len(receiver), 4), np.int64)

@@ -8,7 +8,6 @@ It does no I/O, except that its constructor reads the images that a scenario nam
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
@@ -18,6 +17,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import Group, Static
@@ -38,7 +38,7 @@ from swarmwire.world.sensors.sensor import Sensor, led_places_m
 LOWEST = np.nextafter(-np.pi, 0.0)
 
 
-@njit(cache=True)
+@njit()
 def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings as `angles.wrapped` has them."""
     arenas, robots = state.shape[:2]

@@ -5,12 +5,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.geometry.obstacles import sides_of
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Boundary
 
 WHITE = Floor()
@@ -78,7 +77,7 @@ def shade_at(ground, x, y):
     return ground.grey[min(int(down * rows), rows - 1), min(int(right * columns), columns - 1)] / 255.0
 
 
-@njit(cache=True)
+@njit()
 def shades_over(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
     """The shade at every x with every y in m, (len(y), len(x)): a picture of the floor."""
     shades = np.empty((len(y), len(x)))

@@ -9,12 +9,11 @@ index also has images of the obstacles that reach into the arena over its edge.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 
 CELLS_PER_OBSTACLE = 4
 MARGIN_M = 1e-9  # added to the reach against rounding
@@ -76,7 +75,7 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
 
 
-@njit(cache=True)
+@njit()
 def _list(start, item, shape, arena, side_start, side, cells, reach_m):
     """Count what is within reach of each cell into start[c], or, given `item`, write it from start[c] on."""
     wide, high = 1.0 / cells.per_x, 1.0 / cells.per_y
@@ -96,7 +95,7 @@ def _list(start, item, shape, arena, side_start, side, cells, reach_m):
                     start[c] += 1
 
 
-@njit(cache=True)
+@njit()
 def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
     """Whether an obstacle may be within reach of a cell around x, y; in doubt it is."""
     if side_start[k] == side_start[k + 1]:

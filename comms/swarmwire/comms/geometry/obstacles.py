@@ -8,9 +8,9 @@ There are circles and convex polygons only: a box is a polygon with four sides.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Obstacle
 
 
@@ -27,7 +27,7 @@ class Obstacles(NamedTuple):
     polygon_top_m: FloatArray  # (polygons,) likewise
 
 
-@njit(cache=True)
+@njit()
 def sides_of(corners):
     """Sides of a convex polygon with these corners (k, 2), counter-clockwise, as rows (k, 5).
 
@@ -74,7 +74,7 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
     )
 
 
-@njit(cache=True)
+@njit()
 def ray_to_circle(px, py, dx, dy, cx, cy, radius):
     """Distance along the unit ray (dx, dy) from (px, py) to a circle; 0 from inside, inf if it misses."""
     ox, oy = cx - px, cy - py
@@ -88,7 +88,7 @@ def ray_to_circle(px, py, dx, dy, cx, cy, radius):
     return along - np.sqrt(root2)
 
 
-@njit(cache=True)
+@njit()
 def ray_to_polygon(px, py, dx, dy, obstacles, k):
     """As `ray_to_circle`, to polygon k: the ray is clipped by one side after the other (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, np.inf
@@ -106,7 +106,7 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
     return enter if enter <= leave else np.inf
 
 
-@njit(cache=True)
+@njit()
 def to_nearest(away_m, side_m):
     """What to add to a difference of coordinates on a torus, so that it becomes the shortest; 0 if `side_m` is 0.
 
@@ -115,7 +115,7 @@ def to_nearest(away_m, side_m):
     return -side_m * np.floor(away_m / side_m + 0.5) if side_m > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit()
 def is_blocked_on(obstacles, arena, x0, y0, x1, y1, side_x, side_y):
     """As `is_blocked`, for the shortest line between two points of a torus with these sides; 0: the arena ends there.
 
@@ -133,7 +133,7 @@ def is_blocked_on(obstacles, arena, x0, y0, x1, y1, side_x, side_y):
     return both and is_blocked(obstacles, arena, x0 - over_x, y0 - over_y, x1 - over_x, y1 - over_y)
 
 
-@njit(cache=True)
+@njit()
 def is_blocked(obstacles, arena, x0, y0, x1, y1):
     """Whether an obstacle of the arena touches the straight line between two points."""
     dx, dy = x1 - x0, y1 - y0

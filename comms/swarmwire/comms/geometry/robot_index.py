@@ -10,10 +10,9 @@ Positions in a cell must still be compared.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 
 MAX_CELLS_PER_SIDE = 512  # of a `Grid`, in each arena
 MAX_PER_SIDE = 512  # of `Cells`, in each arena
@@ -49,20 +48,20 @@ def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, runnin
     return Grid(cell_m, nx, ny, left_m, bottom_m, start, order)
 
 
-@njit(cache=True)
+@njit()
 def cell_of(at_m, origin_m, cell_m, cells):
     """The cell index along one axis of a coordinate in m."""
     return min(max(int(np.floor((at_m - origin_m) / cell_m)), 0), cells - 1)
 
 
-@njit(cache=True)
+@njit()
 def is_empty(cells, arena):
     """Whether no robot of an arena is in the grid."""
     per_arena = cells.nx * cells.ny
     return cells.start[arena * per_arena] == cells.start[(arena + 1) * per_arena]
 
 
-@njit(cache=True)
+@njit()
 def _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m):
     rows, arenas = len(x), len(present)
     robots = rows // arenas

@@ -3,9 +3,9 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
@@ -57,7 +57,7 @@ class PacketCounters:
         self._fates = np.zeros((self._arenas, len(Fate)), np.int64)
 
 
-@njit(cache=True)
+@njit()
 def _settle(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fates_out, in_range_out):
     for i in range(len(sender)):
         if final_at_ns[i] <= until_ns:

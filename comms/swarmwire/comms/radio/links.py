@@ -5,9 +5,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.transmissions import Transmissions
 
@@ -87,7 +87,7 @@ class Links(NamedTuple):
         return Links._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
 
 
-@njit(cache=True)
+@njit()
 def _with_the_rest(packet, receiver, sender, sequence, off_air_at_ns, intended, fate, in_range):
     """The integer columns of `Links` in their order, (8, links + packets)."""
     links, packets = len(packet), len(sender)

@@ -7,10 +7,10 @@ is final, and counts the fates.
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, Fate, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
@@ -44,7 +44,7 @@ def wait_for_earlier(links: Links, first: int, rows: int) -> None:
     _delay(links.sender, links.receiver, links.final_at_ns, order, first)
 
 
-@njit(cache=True)
+@njit()
 def _delay(sender, receiver, final_at_ns, order, first):
     for i in range(1, len(order)):
         previous, now = order[i - 1], order[i]

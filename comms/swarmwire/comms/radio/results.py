@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRecords
 
 
-@njit(cache=True)
+@njit()
 def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
     """The rows of `index` (k,), at least one, sorted by (receiver, received_at, sender); stable, (k,)."""
     order = index.view(np.uint64)
@@ -34,7 +34,7 @@ def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, s
     return order.view(np.int64)
 
 
-@njit(cache=True)
+@njit()
 def _counting_sort(order, key, keys):
     """`order` sorted by key[row], 0 to keys - 1; stable."""
     start = np.zeros(keys + 1, np.int64)
@@ -51,7 +51,7 @@ def _counting_sort(order, key, keys):
     return out
 
 
-@njit(cache=True)
+@njit()
 def _time_parts(order, at_ns):
     """The part of time of each row, for about as many equal parts as rows; and the number of parts."""
     first_ns = last_ns = at_ns[order[0]]
@@ -66,7 +66,7 @@ def _time_parts(order, at_ns):
     return part, ((last_ns - first_ns) >> shift) + 1
 
 
-@njit(cache=True)
+@njit()
 def _insertion_sort(order, receiver, at_ns):
     """Sort rows that are grouped by receiver by time within each group; in place, stable."""
     for k in range(1, len(order)):
@@ -130,7 +130,7 @@ class Parted(NamedTuple):
     open: IntArray  # not final yet
 
 
-@njit(cache=True)
+@njit()
 def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int) -> Parted:
     """The rows of links that are final by `until_ns` by kind of result, and the open ones."""
     k = len(fate)
@@ -180,7 +180,7 @@ def finished(
     return ReceptionRecords(*columns, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
 
 
-@njit(cache=True)
+@njit()
 def _finished(index, link_columns, packet_columns, robots):
     """The integer columns of `ReceptionRecords` in their order, then that of payloads, (13, k)."""
     packet, receiver, receivers, final_at_ns, fate = link_columns
@@ -228,7 +228,7 @@ def departed(index: IntArray, links: Links, packets: Transmissions, robots: int)
     )
 
 
-@njit(cache=True)
+@njit()
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
     """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
     place, kept = np.full(rows, -1), np.empty(rows, np.int64)

@@ -3,12 +3,12 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.kernels import njit
 
 PHASE, JITTER = purpose("send phase"), purpose("send jitter")
 JITTER_SHARE = 5  # the jitter spans a fifth of the period, so that a robot's packets keep their order
@@ -44,7 +44,7 @@ class SendTimes:
         return sent_at_ns
 
 
-@njit(cache=True)
+@njit()
 def keyed_ns(keys, tick, draw_purpose, width_ns):
     """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, draw_purpose)."""
     robots = len(width_ns)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
 
@@ -83,7 +83,7 @@ def _refuse(is_invalid: AnyArray, column: str, expected: str) -> None:
         raise RefusedRow(int(np.argmax(is_invalid)), column, expected)
 
 
-@njit(cache=True)
+@njit()
 def _at(links, start, time_ns, value, link, at_ns):
     values = np.full(len(link), np.nan)
     for i in range(len(link)):

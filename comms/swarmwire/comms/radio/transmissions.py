@@ -5,9 +5,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, Payloads, SentPackets
 
 
@@ -60,7 +60,7 @@ class Transmissions(NamedTuple):
         return Transmissions._make([*columns, Payloads.joined([self.payloads, later.payloads])])
 
 
-@njit(cache=True)
+@njit()
 def _take(columns, index):
     """The rows of `index` of all columns, (columns, k)."""
     out = np.empty((len(columns), len(index)), np.int64)
@@ -106,7 +106,7 @@ class Admission:
         )
 
 
-@njit(cache=True)
+@njit()
 def _sequence_numbers(sender, sent_before):
     """The sequence number of each packet, (k,); increments `sent_before` (rows,)."""
     sequence = np.empty(len(sender), np.int64)

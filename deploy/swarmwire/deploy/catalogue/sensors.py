@@ -6,7 +6,7 @@ from typing import Any, get_args, get_type_hints
 
 from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
-from swarmwire.agent.step_context import OUTCOMES
+from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.packets import TxResult
@@ -41,12 +41,12 @@ def _of_packets() -> Iterator[Entry]:
 def _of_outcomes() -> Entry:
     results = tuple((result.name, result.meaning) for result in TxResult)
     facts = (
-        ("in an agent", f'needs = ("{OUTCOMES}", …)'),
+        ("in an agent", f'needs = ("{TX_STATUS}", …)'),
         ("read as", f"robot.radio.tx_status: {first_line(RadioPort.tx_status.__doc__)}"),
         ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
     )
     told = "The sender learns what became of a packet to one robot, as far as its own radio knows."
-    return Entry(kind="sensor", name=OUTCOMES, help=told, facts=(*facts, *results))
+    return Entry(kind="sensor", name=TX_STATUS, help=told, facts=(*facts, *results))
 
 
 def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str]) -> Entry:

@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
 from swarmwire.metrics.metric import Measure, Metric
@@ -96,7 +96,7 @@ class Newest:
         self._total_ns = [sum(own) for own in by_sender_ns.tolist()]
 
 
-@njit(cache=True)
+@njit()
 def _take(fate, arena, receiver, sender, sent_at_ns, place, alive, newest_ns, pairs, gained_ns):
     """Put in what was received; add to the pairs alive that ever received, (arenas,), and to the sum of their times."""
     for i in range(len(fate)):

@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -45,7 +45,7 @@ class Airtime(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _counted_ns(arena, sender, on_air_at_ns, off_air_at_ns, tick_ns, alive, owed_ns):
     """The airtime that counts in this tick, of robots alive, (arenas,); `owed_ns` is what every robot has left."""
     for i in range(len(arena)):

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
@@ -84,7 +84,7 @@ def second_eigenvalue(edges: IntArray, nodes: int, most_dense: int = MAX_DENSE) 
     return max(round(float(found), DIGITS), 0.0)
 
 
-@njit(cache=True)
+@njit()
 def _dense(edges, nodes):
     laplacian = np.zeros((nodes, nodes))
     for e in range(len(edges)):

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
@@ -46,7 +46,7 @@ def _articulation(moment: Moment) -> FloatArray | float:
     return np.where(moment.robots_alive > 0, np.count_nonzero(cuts, axis=1), np.nan)
 
 
-@njit(cache=True)
+@njit()
 def cut_vertices(edges: IntArray, nodes: int) -> BoolArray:
     """Which nodes (nodes,) of the graph with these edges (e, 2) split their component if they are taken out."""
     start, to = neighbours_of(edges, nodes)

@@ -14,11 +14,11 @@ nothing changes, and without a radio there are no events at all.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.config import parameter
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.moment import Moment
@@ -70,7 +70,7 @@ class Fragmentation:
         return counted
 
 
-@njit(cache=True)
+@njit()
 def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted_ns):
     """The table above for each arena: sets `counted`, and `lasted_ns` where an event is over; whether any is."""
     any_over = False

@@ -3,10 +3,10 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
 
@@ -31,7 +31,7 @@ class Latencies:
         return finished.arena.take(received), air_ns, agent_ns
 
 
-@njit(cache=True)
+@njit()
 def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
     """Of the links received: their rows, how long until they were, and until their receivers act, (k,)."""
     received, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)

@@ -6,10 +6,10 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
@@ -46,7 +46,7 @@ class _Latency(OfWindow):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _sums(arena, latency_ns, arenas):
     """Of each arena the sum of its packets' latencies, and how many they are, (2, arenas)."""
     sums = np.zeros((2, arenas), np.int64)

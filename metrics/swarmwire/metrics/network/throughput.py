@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
@@ -43,7 +43,7 @@ def _throughput_bps(moment: Moment) -> FloatArray | float:
     return _received_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
 
 
-@njit(cache=True)
+@njit()
 def _received_bytes(fate, arena, size_bytes, arenas):
     total = np.zeros(arenas)
     for i in range(len(fate)):

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment
@@ -43,7 +43,7 @@ class AggregationHop(OfClosePairs):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def largest_flock(pairs: IntArray, alive: BoolArray) -> FloatArray:
     """The robots in the largest flock of each arena, (arenas,).
 

@@ -5,11 +5,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.config import parameter
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure
 from swarmwire.metrics.moment import Moment, components_of
@@ -65,7 +65,7 @@ def _largest_cluster(pairs: IntArray, alive: BoolArray) -> IntArray:
     return components_of(pairs, alive)[1]
 
 
-@njit(cache=True)
+@njit()
 def _follow(enough, now_ns, hold_ns, since_ns, found_s):
     """Note where a stretch begins and ends, and when the first began that lasted."""
     for arena in range(len(enough)):

@@ -9,15 +9,15 @@ Places that are spread so evenly that their directions cancel have none.
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import njit
 
 CANCELLED = 1e-9  # a mean of directions shorter than this is rounding
 
 
-@njit(cache=True)
+@njit()
 def from_centroid_m(pose: FloatArray, alive: BoolArray, wrap_m: tuple[float, float]) -> FloatArray:
     """Each robot's place less the centroid of the robots alive of its arena, (arenas, robots, 2).
 
@@ -39,7 +39,7 @@ def from_centroid_m(pose: FloatArray, alive: BoolArray, wrap_m: tuple[float, flo
     return away_m
 
 
-@njit(cache=True)
+@njit()
 def _mean(at, alive, origin, side):
     """The mean of the shortest differences to `origin`; NaN if nobody is alive."""
     total, n = 0.0, 0
@@ -51,7 +51,7 @@ def _mean(at, alive, origin, side):
     return total / n if n else np.nan
 
 
-@njit(cache=True)
+@njit()
 def _circular_mean(at, alive, side):
     """The place in the mean direction of the angles 2 pi at / side; NaN if they cancel, or nobody is alive."""
     turn, c, s, n = 2.0 * np.pi / side, 0.0, 0.0, 0

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -41,7 +41,7 @@ class Cohesion(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _largest(away_m, alive):
     arenas, robots = alive.shape
     largest_m = np.full(arenas, np.nan)

@@ -5,11 +5,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -59,7 +59,7 @@ class Deadlocked(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _step(pose, command, alive, tick_s, wrap_m, limits, told_m, then):
     """How many robots of each arena are deadlocked; puts the present tick in the place of the one a window ago."""
     arenas, robots = alive.shape

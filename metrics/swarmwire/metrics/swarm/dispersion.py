@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -43,7 +43,7 @@ class Dispersion(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _dispersion(away_m, radius_m, alive):
     arenas, robots = alive.shape
     dispersion = np.full(arenas, np.nan)

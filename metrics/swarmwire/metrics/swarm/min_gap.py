@@ -5,11 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -51,7 +50,7 @@ class MinGap(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def smallest_gap_m(
     pose: FloatArray,
     radius_m: FloatArray,

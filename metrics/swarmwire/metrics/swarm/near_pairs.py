@@ -3,11 +3,10 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 from swarmwire.metrics.swarm.strips import along_m, fill, first_order, room_for
@@ -34,7 +33,7 @@ class NearPairs:
         return _near_pairs(moment.pose, moment.alive, self._reach_m, self._order, self._strips, self._wrap_m)
 
 
-@njit(cache=True)
+@njit()
 def _near_pairs(pose, alive, reach_m, order, strips, wrap_m):
     """Each robot with those after it in its strip, and with those of the next strip: others have it after them."""
     arenas, robots = alive.shape
@@ -61,7 +60,7 @@ def _near_pairs(pose, alive, reach_m, order, strips, wrap_m):
     return pairs[:k]
 
 
-@njit(cache=True)
+@njit()
 def _with_room(pairs, most):
     """The same, longer if it may have to hold more than it can."""
     return pairs if most <= len(pairs) else np.concatenate((pairs, np.empty((most, 2), np.int64)))

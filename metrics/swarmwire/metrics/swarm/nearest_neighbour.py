@@ -5,11 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -44,7 +43,7 @@ class NearestNeighbour(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _mean_nearest_m(pose, alive, order, strips, wrap_m):
     """From each robot strip by strip outwards, until the sides of the next ones are farther than the nearest so far."""
     mean_m = np.full(len(order), np.nan)

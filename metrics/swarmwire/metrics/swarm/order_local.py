@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -44,7 +44,7 @@ class OrderLocal(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _order_local(c, s, alive, pairs):
     arenas, robots = alive.shape
     c, s = c.ravel(), s.ravel()

@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.config import parameter
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -49,7 +49,7 @@ class Oscillation(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _count_changes(command, alive, dead_band_radps, side, changes):
     """Add this tick's changes of each arena to `changes`, and note each robot's `side`: 1 left, -1 right, 0 none."""
     arenas, robots = alive.shape

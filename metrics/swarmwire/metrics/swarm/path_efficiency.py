@@ -5,11 +5,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -52,7 +52,7 @@ class PathEfficiency(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _step(pose, alive, wrap_m, moved_m, before, gone_m):
     """The mean of each arena, after adding the step from `before`, which becomes the present place, to `gone_m`."""
     arenas, robots = alive.shape

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -45,7 +45,7 @@ class Rotation(Metric):
         return measure
 
 
-@njit(cache=True)
+@njit()
 def _rotation(away_m, c, s, alive):
     arenas, robots = alive.shape
     rotation = np.full(arenas, np.nan)

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric
 from swarmwire.metrics.moment import Moment
@@ -39,7 +39,7 @@ def _error(moment: Moment) -> FloatArray | float:
     return np.nan if value is None else _spread(value.reshape(moment.alive.shape), moment.alive)
 
 
-@njit(cache=True)
+@njit()
 def _spread(value, alive):
     found = np.full(len(value), np.nan)
     for arena in range(len(value)):

@@ -5,11 +5,11 @@
 from math import ceil, hypot
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.moment import Moment
 
@@ -53,7 +53,7 @@ class FloorCells:
         return self.seen / np.where(self.free > 0, self.free, np.nan)
 
 
-@njit(cache=True)
+@njit()
 def _span(at_m, reach_m, size_m, cells, torus):
     """The first and last cell along an axis whose centre may be within reach; on a torus also beyond the edge."""
     per_m = cells / size_m
@@ -62,7 +62,7 @@ def _span(at_m, reach_m, size_m, cells, torus):
     return (first, last) if torus else (max(first, 0), min(last, cells - 1))
 
 
-@njit(cache=True)
+@njit()
 def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
     arenas, ny, nx = cells.shape
     wide_m, high_m = width_m / nx, height_m / ny
@@ -84,7 +84,7 @@ def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
                     column = column + 1 if column + 1 < nx else 0
 
 
-@njit(cache=True)
+@njit()
 def _take(cells, width_m, height_m, torus, obstacles):
     """Mark the cells whose centres lie in an obstacle."""
     for arena in range(len(cells)):
@@ -95,7 +95,7 @@ def _take(cells, width_m, height_m, torus, obstacles):
             _take_one(cells[arena], width_m, height_m, torus, obstacles.polygon[k], sides)
 
 
-@njit(cache=True)
+@njit()
 def _take_one(cells, width_m, height_m, torus, circle, sides):
     """Mark the cells of an arena that lie in a circle, and on the inner side of each of these sides, if any."""
     ny, nx = cells.shape

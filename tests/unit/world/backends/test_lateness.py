@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.world.backends.pacing import LatencySummary, LatencyHistogram
+from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary
 
 NS_PER_S = 1e9
 

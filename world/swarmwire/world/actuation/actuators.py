@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import MOTORS, WHEELS
 from swarmwire.comms.bodies.drives import DRIVES, NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.tick_io import Actions, LedChanges
 from swarmwire.comms.truth import Group
 
@@ -52,7 +52,7 @@ def drive_limits_of(groups: Sequence[Group]) -> DriveLimits:
     return DriveLimits(kind, *rest)
 
 
-@njit(cache=True)
+@njit()
 def take_commands(
     limits: DriveLimits,
     alive: BoolArray,
@@ -102,7 +102,7 @@ def take_commands(
     return clipped, not_finite
 
 
-@njit(cache=True)
+@njit()
 def _within(limits, i, linear, angular, lateral):
     """A command within the limits of robot index i, and whether it exceeded them."""
     kind, max_linear, max_angular = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
@@ -155,7 +155,7 @@ def noise_of(drive: Drive) -> WheelNoise:
     return NO_WHEEL_NOISE if isinstance(drive, Holonomic) else drive.noise
 
 
-@njit(cache=True)
+@njit()
 def _act_noise(keys, noisy, wheel_base_m, factor, factor_std, bias_mps, tick, target):
     for arena in range(target.shape[0]):
         for i in range(target.shape[1]):
@@ -169,7 +169,7 @@ def _act_noise(keys, noisy, wheel_base_m, factor, factor_std, bias_mps, tick, ta
             target[arena, i, 1] = (right - left) / wheel_base_m[i]
 
 
-@njit(cache=True)
+@njit()
 def _factor(key, i, tick, wheel, factor, factor_std):
     """The factor of a wheel's speed in a tick."""
     if factor_std[i] == 0.0:
@@ -205,7 +205,7 @@ class FailedDrives:
         _act_failures(self.motors, self._left, self._right, self._wheel_base_m, target)
 
 
-@njit(cache=True)
+@njit()
 def _act_failures(motors, left_failed, right_failed, wheel_base_m, target):
     for arena in range(target.shape[0]):
         for i in range(target.shape[1]):

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from math import inf
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.sensor_specs import BatterySpec
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of
 
@@ -58,7 +58,7 @@ class Batteries:
         _drain(self.charge, self._draw, self._half_base_m, self._holonomic, alive, leds, target)
 
 
-@njit(cache=True)
+@njit()
 def _drain(charge, draw, half_base_m, holonomic, alive, leds, target):
     robots = charge.shape[1]
     for arena in range(charge.shape[0]):

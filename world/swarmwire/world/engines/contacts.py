@@ -3,12 +3,12 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 
 
-@njit(cache=True)
+@njit()
 def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
     """One rising int64 code for each pair of bodies in contact, as `count_began` has them, of one arena.
 
@@ -30,7 +30,7 @@ def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
     return codes[:kept]
 
 
-@njit(cache=True)
+@njit()
 def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) -> None:
     """Add the pairs of `now` that are not in `before` to onsets (arenas, 2): two robots, a robot and something fixed.
 
@@ -48,7 +48,7 @@ def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) 
             onsets[code // (bodies * bodies), 1 if code % bodies == bodies - 1 else 0] += 1
 
 
-@njit(cache=True)
+@njit()
 def mark(now: IntArray, touched: FloatArray) -> None:
     """Set touched (arenas, robots) to 1 for each robot in the pairs of `now`, codes as above, else to 0."""
     touched[:] = 0.0

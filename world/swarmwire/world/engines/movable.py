@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles, sides_of
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Obstacle
 
 GRAVITY_MPS2 = 9.81
@@ -103,7 +103,7 @@ def _rows(standing: Sequence[tuple[Obstacle, ...]], obstacles: Obstacles) -> tup
     return round_one, row
 
 
-@njit(cache=True)
+@njit()
 def _move(state, is_round, rows, centre, corner, obstacles, pose):
     arenas, per_arena = pose.shape[:2]
     for arena in range(arenas):

@@ -10,12 +10,11 @@ were tested. `overlaps` lists the robots that overlap. `PositionCorrections` kee
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.geometry.robot_index import Cells, cell_of, column_of, row_of
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.world.engines.engine import EngineConfig
 
 MAX_PASSES = 8  # in a corner, one thing may push a disc back into another
@@ -34,7 +33,7 @@ class PositionCorrection(NamedTuple):
     cells: Cells  # each lists, rising, circle k as k and polygon k as k + circles: those whose circle is within reach
 
 
-@njit(cache=True)
+@njit()
 def shortest(apart_m, half_m, wraps):
     """A difference of coordinates; on a torus, of the nearest images."""
     return apart_m - 2.0 * half_m * np.floor((apart_m + half_m) / (2.0 * half_m)) if wraps else apart_m
@@ -169,7 +168,7 @@ def _out_of_polygon(side, start, stop, x, y, radius_m):
     return nearest_x / distance * (radius_m - distance), nearest_y / distance * (radius_m - distance)
 
 
-@njit(cache=True)
+@njit()
 def overlaps(state, radius_m, bottom_m, top_m, held, running, correction):
     """Rising codes, as `count_began` has them, of pairs of robots that overlap, and of robots that were pushed.
 
@@ -221,13 +220,13 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction):
     return codes
 
 
-@njit(cache=True)
+@njit()
 def _wrap_cell(cell, cells):
     """The cell within the arena, for an index that may lie beyond the border."""
     return cell + cells if cell < 0 else cell - cells if cell >= cells else cell
 
 
-@njit(cache=True)
+@njit()
 def _first_cell(cell, cells, wraps):
     """The first neighbour cell along an axis; on a torus it may lie beyond the border."""
     if wraps:
@@ -235,7 +234,7 @@ def _first_cell(cell, cells, wraps):
     return max(cell - 1, 0)
 
 
-@njit(cache=True)
+@njit()
 def _last_cell(cell, cells, wraps):
     """The last neighbour cell along an axis; no cell comes twice."""
     if wraps:
@@ -243,7 +242,7 @@ def _last_cell(cell, cells, wraps):
     return min(cell + 1, cells - 1)
 
 
-@njit(cache=True)
+@njit()
 def _room_for(codes, count):
     """The codes with room for one more."""
     if count < len(codes):

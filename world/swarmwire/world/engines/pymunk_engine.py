@@ -15,11 +15,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pymunk
-from numba import njit
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 from pymunk.constraints import PivotJoint
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, Motors
@@ -42,7 +42,7 @@ WRITE = BodyFields.FORCE | BodyFields.TORQUE
 CONTACT = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID
 
 
-@njit(cache=True)
+@njit()
 def apply_impulse(
     motors: Motors,
     target: FloatArray,

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.scenario.tables import ArenaTable, DiscPatchTable, GroundTable, MapTable
 
@@ -82,7 +82,7 @@ def merged_boxes(occupied: BoolArray, max_boxes: int) -> IntArray:
     return _merged(occupied.copy(), max_boxes)
 
 
-@njit(cache=True)
+@njit()
 def _merged(uncovered, max_boxes):
     boxes = np.empty((max_boxes + 1, 4), np.int64)
     count = 0
@@ -103,7 +103,7 @@ def _merged(uncovered, max_boxes):
     return boxes[:count]
 
 
-@njit(cache=True)
+@njit()
 def _columns(uncovered, row, column, rows):
     """How many columns from `column` on are occupied in all of these rows."""
     columns = 0
@@ -112,7 +112,7 @@ def _columns(uncovered, row, column, rows):
     return columns
 
 
-@njit(cache=True)
+@njit()
 def _rows(uncovered, row, column, columns):
     """How many rows from `row` on are occupied in all of these columns."""
     rows = 0

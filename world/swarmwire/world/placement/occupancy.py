@@ -11,11 +11,11 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays, sides_of
 from swarmwire.comms.geometry.robot_index import MAX_CELLS_PER_SIDE, cell_of
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.scenario.tables import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
@@ -74,13 +74,13 @@ class Disc(NamedTuple):
     top_m: float
 
 
-@njit(cache=True)
+@njit()
 def on_torus(at_m, half_m):
     """A coordinate on a torus, wrapped to -half_m to half_m."""
     return at_m - 2.0 * half_m * np.floor((at_m + half_m) / (2.0 * half_m))
 
 
-@njit(cache=True)
+@njit()
 def _distance(x, y, sides):
     """Distance in m of a point from a convex polygon, 0 within."""
     within, least2 = True, np.inf
@@ -94,7 +94,7 @@ def _distance(x, y, sides):
     return 0.0 if within else np.sqrt(least2)
 
 
-@njit(cache=True)
+@njit()
 def disc_clear_of_obstacles(occupancy, x, y, disc):
     """Whether a disc at x, y lies within the arena, or on the torus, and keeps clear of all obstacles."""
     if occupancy.wraps:
@@ -108,14 +108,14 @@ def disc_clear_of_obstacles(occupancy, x, y, disc):
     return within_arena(occupancy, x, y, disc.radius_m) and _disc_clear_here(occupancy, x, y, disc)
 
 
-@njit(cache=True)
+@njit()
 def within_arena(occupancy, x, y, radius_m):
     """Whether a disc at x, y is clear of the walls, or of the border of an arena without walls."""
     reach = radius_m + GAP_M
     return abs(x) + reach <= occupancy.half_x_m and abs(y) + reach <= occupancy.half_y_m
 
 
-@njit(cache=True)
+@njit()
 def _disc_clear_here(occupancy, x, y, disc):
     reach = disc.radius_m + disc.gap_m
     for i in range(len(occupancy.circle)):
@@ -135,7 +135,7 @@ def _disc_clear_here(occupancy, x, y, disc):
     return True
 
 
-@njit(cache=True)
+@njit()
 def disc_clear_of_robots(occupancy, x, y, disc):
     """Whether a disc at x, y keeps clear of all robots whose height it shares."""
     ny, nx = occupancy.head.shape
@@ -155,7 +155,7 @@ def disc_clear_of_robots(occupancy, x, y, disc):
     return True
 
 
-@njit(cache=True)
+@njit()
 def _too_near(occupancy, x, y, disc, other):
     dx, dy = x - other[0], y - other[1]
     if occupancy.wraps:
@@ -164,7 +164,7 @@ def _too_near(occupancy, x, y, disc, other):
     return dx * dx + dy * dy < apart * apart and other[4] > disc.bottom_m and disc.top_m > other[3]
 
 
-@njit(cache=True)
+@njit()
 def _parted(a, b, gap_m):
     """Whether a side of polygon a has all of b beyond it, with a gap (half of the separating axis theorem)."""
     for i in range(len(a)):
@@ -176,7 +176,7 @@ def _parted(a, b, gap_m):
     return False
 
 
-@njit(cache=True)
+@njit()
 def polygon_clear_of_obstacles(occupancy, corners, gap_m):
     """Whether a convex polygon, corners (k, 2) counter-clockwise, lies within the arena, clear of all obstacles."""
     for i in range(len(corners)):
@@ -192,7 +192,7 @@ def polygon_clear_of_obstacles(occupancy, corners, gap_m):
     return True
 
 
-@njit(cache=True)
+@njit()
 def _polygon_clear_here(occupancy, sides, gap_m):
     for i in range(len(occupancy.circle)):
         if _distance(occupancy.circle[i, 0], occupancy.circle[i, 1], sides) < occupancy.circle[i, 2] + gap_m:

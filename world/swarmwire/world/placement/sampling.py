@@ -5,11 +5,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws_compiled import uniform
 from swarmwire.comms.geometry.robot_index import cell_of
+from swarmwire.comms.kernels import njit
 from swarmwire.world.placement.occupancy import (
     Disc,
     Occupancy,
@@ -36,7 +36,7 @@ class Region(NamedTuple):
     inner_m: float  # inner radius of a ring
 
 
-@njit(cache=True)
+@njit()
 def candidate(region, key, entity, attempt, purpose):
     """Candidate `attempt` of an entity: x, y, whether it lies in the region."""
     u = uniform(key, entity, attempt, 0, purpose)
@@ -50,7 +50,7 @@ def candidate(region, key, entity, attempt, purpose):
     return region.x_m + u * region.half_x_m, region.y_m + v * region.half_y_m, inside
 
 
-@njit(cache=True)
+@njit()
 def free_circle(
     occupancy: Occupancy, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
 ) -> tuple[float, float]:
@@ -63,7 +63,7 @@ def free_circle(
     return np.nan, np.nan
 
 
-@njit(cache=True)
+@njit()
 def free_polygon(
     occupancy: Occupancy,
     region: Region,
@@ -92,7 +92,7 @@ def free_polygon(
     return np.nan, np.nan, np.nan
 
 
-@njit(cache=True)
+@njit()
 def put_robots(
     occupancy: Occupancy,
     region: Region,

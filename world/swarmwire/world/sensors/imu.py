@@ -8,13 +8,13 @@ bias begins as a normal draw per robot and field, and takes a normal step of dri
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.sensor_specs import ImuSpec
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
@@ -54,7 +54,7 @@ class ImuSensor:
         return felt[:, :, 0].copy(), felt[:, :, 1].copy(), felt[:, :, 2].copy()
 
 
-@njit(cache=True)
+@njit()
 def _feel(felt, before, bias, drift, state, start, keys, running, tick, tick_s):
     for arena in range(felt.shape[0]):
         if not running[arena]:

@@ -14,12 +14,12 @@ from math import ceil, floor, isinf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Following, Sensor
 
@@ -89,14 +89,14 @@ class Stages:
             _apply(values, keys, active, start, tick, self._params, self._purposes)
 
 
-@njit(cache=True)
+@njit()
 def _apply(values, keys, running, start, tick, params, purposes):
     for arena in range(len(values)):
         if running[arena]:
             _apply_to(values[arena], keys[arena], start, tick, params, purposes)
 
 
-@njit(cache=True)
+@njit()
 def _apply_to(values, key, start, tick, params, purposes):
     if params.noise > 0.0 or params.relative > 0.0:
         _add_noise(values, key, start, tick, params, purposes[NOISE])
@@ -113,7 +113,7 @@ def _apply_to(values, key, start, tick, params, purposes):
         _drop(values, key, start, tick, params, purposes[DROP_OUT])
 
 
-@njit(cache=True)
+@njit()
 def _add_noise(values, key, start, tick, params, noise_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
@@ -127,7 +127,7 @@ def _add_noise(values, key, start, tick, params, noise_purpose):
                 values[i, k] = value + size * draw
 
 
-@njit(cache=True)
+@njit()
 def _add_outliers(values, key, start, tick, params, selection_purpose, value_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
@@ -137,7 +137,7 @@ def _add_outliers(values, key, start, tick, params, selection_purpose, value_pur
                 values[i, k] = low + fraction * (high - low)
 
 
-@njit(cache=True)
+@njit()
 def _drop(values, key, start, tick, params, selection_purpose):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
@@ -145,13 +145,13 @@ def _drop(values, key, start, tick, params, selection_purpose):
                 values[i, k] = params.blank
 
 
-@njit(cache=True)
+@njit()
 def _round(flat, step):
     for k in range(len(flat)):
         flat[k] = np.rint(flat[k] / step) * step
 
 
-@njit(cache=True)
+@njit()
 def _clip(flat, low, high):
     for k in range(len(flat)):
         if flat[k] < low and flat[k] > -np.inf:
@@ -160,13 +160,13 @@ def _clip(flat, low, high):
             flat[k] = high
 
 
-@njit(cache=True)
+@njit()
 def _wrap(flat):
     for k in range(len(flat)):
         flat[k] = _wrapped(flat[k])
 
 
-@njit(cache=True)
+@njit()
 def _wrapped(angle):
     """The angle in (-pi, pi], unchanged bit for bit if it is there already (as `world.placement.placement.wrapped`)."""
     if -np.pi < angle <= np.pi:

@@ -5,7 +5,6 @@
 from math import pi
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.sensor_specs import (
@@ -20,7 +19,7 @@ from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.ground import shade_at
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Field, Noise, Scene
 
@@ -119,7 +118,7 @@ class OdometrySensor:
         return shown[:, :, 0].copy(), shown[:, :, 1].copy()
 
 
-@njit(cache=True)
+@njit()
 def _add_travel(measured, counted, travel, start, scale, keys, running, tick, slip):
     """Add the new travel of both wheels to `measured`: times the wheel's scale, times 1 + slip x a normal draw."""
     for arena in range(measured.shape[0]):

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.phy import Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.losses import passing_share
@@ -106,7 +106,7 @@ class Coverage:
         return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
 
 
-@njit(cache=True)
+@njit()
 def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_db, inside_db_per_m, start, end):
     out_dbm = np.empty(len(start))
     for i in range(len(start)):
@@ -120,7 +120,7 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
     return out_dbm
 
 
-@njit(cache=True)
+@njit()
 def _blocked(obstacles, start, end):
     found = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
@@ -128,7 +128,7 @@ def _blocked(obstacles, start, end):
     return found
 
 
-@njit(cache=True)
+@njit()
 def _gains_db(law, key):
     """The gain of fading on many links, each elsewhere; it is distributed alike at all places."""
     out_db = np.empty(GAINS)

@@ -9,11 +9,10 @@ poses; within a tick only the on/off state of a jammer changes.
 import math
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.propagation import PropagationParams
@@ -75,7 +74,7 @@ def powers_of(
     return _powers(jammers, jammers.places(pose), x, y, robots, obstacles, propagation)
 
 
-@njit(cache=True)
+@njit()
 def _powers(jammers, place, x, y, robots, obstacles, propagation):
     power_mw = np.zeros((len(place), robots))
     amplitude_db = propagation.amplitude_db if propagation.shadows else 0.0

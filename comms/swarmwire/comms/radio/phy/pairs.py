@@ -11,12 +11,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.phy.losses import MeasuredLinks
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
@@ -87,7 +86,7 @@ def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
     return pairs._replace(loss_db=forward_db, reverse_db=reverse_db, blocked=still_blocked)
 
 
-@njit(cache=True)
+@njit()
 def _near(x, y, robots, cells, propagation):
     """Pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
     ahead = np.empty((len(cells.order), 2, 2), np.uint64)
@@ -142,7 +141,7 @@ def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2)
     return count
 
 
-@njit(cache=True)
+@njit()
 def _add_shadows(loss, x, y, robots, rows, field, amplitude_db, a, b):
     single = np.float32
     height = np.empty((len(x), shadowing.WAVES), single)
@@ -159,14 +158,14 @@ def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
         loss[i] += shadowing.between_db(field, s // robots, amplitude_db, height, s, r, dx, dy, parts)
 
 
-@njit(cache=True)
+@njit()
 def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b):
     for i in range(len(a)):
         s, r = a[i], b[i]
         loss[i] += wall_loss_db(obstacles, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
 
 
-@njit(cache=True)
+@njit()
 def _add_bodies(loss, x, y, robots, cells, radius_m, max_radius_m, body_db, a, b):
     for i in range(len(a)):
         loss[i] += body_db * bodies_between(x, y, radius_m, max_radius_m, cells, robots, a[i], b[i])
@@ -190,7 +189,7 @@ def _max_dbm(send_dbm, receive_dbi, s, r):
     return max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s])
 
 
-@njit(cache=True)
+@njit()
 def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
     at, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:
@@ -209,7 +208,7 @@ def _gains(gain, x, y, at, number, fading_model, a, b, real, imaginary):
         gain[i] = gain_of(fading_model, h, math.sqrt(dx * dx + dy * dy))
 
 
-@njit(cache=True)
+@njit()
 def _find_blocked(blocked, x, y, robots, obstacles, a, b):
     for i in range(len(a)):
         s, r = a[i], b[i]

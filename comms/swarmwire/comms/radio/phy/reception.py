@@ -10,12 +10,11 @@ interfere (access "none"), every receiver receives each of them on its own.
 import math
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
@@ -60,7 +59,7 @@ def log_success(table, receiver, sinr, bits):
     return bits * (table[row] + share * (table[row + 1] - table[row]))
 
 
-@njit(cache=True)
+@njit()
 def _table(receiver, sinr):
     out = np.empty(len(sinr))
     for i in range(len(out)):
@@ -120,7 +119,7 @@ def lone_delivery(params, mean_dbm, bits):
     return math.exp(alone_log_success(params, from_db(mean_dbm), bits))
 
 
-@njit(cache=True)
+@njit()
 def lone_deliveries(params, mean_dbm, bits):
     """`lone_delivery` at several powers, (k,)."""
     delivery = np.empty(len(mean_dbm))

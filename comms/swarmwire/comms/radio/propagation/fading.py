@@ -23,11 +23,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.radio.config.phy import FADINGS, Fading
 from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total
@@ -45,7 +44,7 @@ RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
 _MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
 
 
-@njit(cache=True)
+@njit()
 def gamma_tails(shape, x):
     """P(X <= x) and P(X > x) of X ~ Gamma(shape, 1), x >= 0; the smaller one to 1e-13 relative for shapes up to 200.
 
@@ -81,7 +80,7 @@ def gamma_tails(shape, x):
     return 1.0 - above, above
 
 
-@njit(cache=True)
+@njit()
 def gamma_quantile(shape, below, above):
     """The x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
 
@@ -114,7 +113,7 @@ def gamma_quantile(shape, below, above):
     return x
 
 
-@njit(cache=True)
+@njit()
 def _start(shape, below, above):
     """A first guess: by a normal quantile above shape 1 (Wilson and Hilferty, 1931), by the ends' asymptotes below."""
     if shape > 1.0:
@@ -131,7 +130,7 @@ def _start(shape, below, above):
     return 1.0 - math.log(above / (1.0 - split))
 
 
-@njit(cache=True)
+@njit()
 def nakagami_gain(rayleigh_gain, m):
     """The Nakagami-m power gain with the same cumulative probability as a Rayleigh gain; m >= 0.5.
 
@@ -145,7 +144,7 @@ def nakagami_gain(rayleigh_gain, m):
     return gamma_quantile(m, -math.expm1(-rayleigh_gain), math.exp(-rayleigh_gain)) / m
 
 
-@njit(cache=True)
+@njit()
 def scatter_waves(key, wave_number):
     """The waves of the arena with this key, (5, WAVES): u and v as x, y in cycles per m, and phases in turns.
 
@@ -161,7 +160,7 @@ def scatter_waves(key, wave_number):
     return waves
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def arriving(waves, x, y, out):
     """Waves u and v at (x, y) in m, into `out` (4, WAVES): real and imaginary parts of u, then of v."""
     for n in range(WAVES):
@@ -171,13 +170,13 @@ def arriving(waves, x, y, out):
         out[2, n], out[3, n] = cosine(v), sine(v)
 
 
-@njit(cache=True)
+@njit()
 def own_number(key, robot):
     """A robot's keyed number, 53 random bits."""
     return np.uint64(uniform(key, robot, 0, ROBOT_NUMBER, FADING) * 2.0**53)
 
 
-@njit(cache=True)
+@njit()
 def signs_of(number_a, number_b):
     """64 random bits of a pair: its robots' numbers, mixed as SplitMix64 does (Steele et al., OOPSLA 2014)."""
     z = number_a * _MIX[2] + number_b
@@ -208,7 +207,7 @@ def _wave(half, at, a, b, n):
     return sign * (u_real * v_real - u_imaginary * v_imaginary), sign * (u_real * v_imaginary + u_imaginary * v_real)
 
 
-@njit(cache=True)
+@njit()
 def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
     """`scattered` of one link: robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m."""
     if b < a:
@@ -235,7 +234,7 @@ def fading_model(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_O
     return FadingModel(kind, fading.k, fading.m, frequency_hz / speed_mps)
 
 
-@njit(cache=True)
+@njit()
 def fading_gain(law, key, a, b, ax, ay, bx, by):
     """Power gain between robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m.
 
@@ -255,7 +254,7 @@ def gain_of(law, h, distance_m):
     return nakagami_gain(gain, law.m) if law.distribution == NAKAGAMI else gain
 
 
-@njit(cache=True)
+@njit()
 def rician_gain(real, imaginary, k, path):
     """Rice's gain: a direct wave, with k >= 0 times the power of the scattered ones, adds to them.
 

@@ -8,21 +8,20 @@ radio that any obstacle blocks uses `line_of_sight` instead.
 
 import math
 
-from numba import njit
-
 from swarmwire.comms.geometry import robot_index
+from swarmwire.comms.kernels import njit
 
 PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
 
 
-@njit(cache=True)
+@njit()
 def wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
     """Loss in dB in walls between two points in m; equal both ways to the last bit."""
     crossed, inside_m = crossed_and_inside_m(obstacles, arena, ax, ay, bx, by)
     return crossed * crossing_db + inside_m * inside_db_per_m
 
 
-@njit(cache=True)
+@njit()
 def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
     """Number of obstacles of the arena that the line between two points enters, and its length inside them in m.
 
@@ -50,7 +49,7 @@ def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
     return crossed, inside_m
 
 
-@njit(cache=True)
+@njit()
 def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
     """Length inside a circle of a line of `length` from (px, py) along the unit vector (dx, dy); all in m."""
     along = (cx - px) * dx + (cy - py) * dy
@@ -62,7 +61,7 @@ def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
     return max(min(along + half, length) - max(along - half, 0.0), 0.0)
 
 
-@njit(cache=True)
+@njit()
 def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
     """As `chord_in_circle`, in polygon k: the line is clipped by one side after the other (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, length
@@ -80,7 +79,7 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
     return max(leave - enter, 0.0)
 
 
-@njit(cache=True)
+@njit()
 def bodies_between(x, y, radius_m, max_radius_m, cells, robots, a, b):
     """Number of other robots with their disc on the line between rows a and b; equal both ways.
 
@@ -106,7 +105,7 @@ def bodies_between(x, y, radius_m, max_radius_m, cells, robots, a, b):
     return count
 
 
-@njit(cache=True)
+@njit()
 def is_on_line(ax, ay, bx, by, cx, cy, radius_m):
     """Whether a disc around (cx, cy) covers a point of the line from (ax, ay) to (bx, by); all in m."""
     dx, dy = bx - ax, by - ay

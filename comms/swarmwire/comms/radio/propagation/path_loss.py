@@ -12,8 +12,7 @@ log-distance model, so that touching robots do not amplify each other.
 
 import math
 
-from numba import njit
-
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.shadowing import shadowing_db
 
@@ -21,7 +20,7 @@ NEAREST_M = 1.0
 HALVINGS = 60
 
 
-@njit(cache=True)
+@njit()
 def loss_db(curve, distance_m):
     """Path loss in dB over a distance in m."""
     distance_m = max(distance_m, NEAREST_M)
@@ -31,7 +30,7 @@ def loss_db(curve, distance_m):
     return curve.far_db + curve.far_slope_db * math.log10(distance_m) + absorbed_db
 
 
-@njit(cache=True)
+@njit()
 def reach_m(curve, most_loss_db):
     """The greatest distance in m with at most this loss, to 1e-12 relative; 0 if `NEAREST_M` has more."""
     if loss_db(curve, NEAREST_M) > most_loss_db:
@@ -49,7 +48,7 @@ def reach_m(curve, most_loss_db):
     return within_m
 
 
-@njit(cache=True)
+@njit()
 def _reach_of_lines_m(curve, most_loss_db):
     near_m = 10.0 ** ((most_loss_db - curve.near_db) / curve.near_slope_db)
     if near_m <= curve.break_m:
@@ -58,7 +57,7 @@ def _reach_of_lines_m(curve, most_loss_db):
     return max(far_m, curve.break_m)
 
 
-@njit(cache=True)
+@njit()
 def loss_between_db(
     curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
 ):
@@ -77,7 +76,7 @@ def loss_between_db(
     return loss
 
 
-@njit(cache=True)
+@njit()
 def rssi_dbm(power_dbm, sender_gain_dbi, receiver_gain_dbi, loss_db):
     """Received power in dBm: power + both gains - all losses. Reciprocal up to the difference in power."""
     return power_dbm + (sender_gain_dbi + receiver_gain_dbi) - loss_db

@@ -23,11 +23,10 @@ need many per link; with those of the mathematical library they would take ten t
 import math
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.config.phy import Shadowing
 
 SUMS = 16  # terms of `total`, which is unrolled for this number
@@ -42,20 +41,20 @@ _A, _B, _C, _D, _E, _F, _G, _H, _I, _J, _K = (
 )
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def _series(y):
     z = y * y
     high = _F + z * (_G + z * (_H + z * (_I + z * (_J + z * _K))))
     return y * (_A + z * (_B + z * (_C + z * (_D + z * (_E + z * high)))))
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def sine(turns):
     """sin(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; odd in x to the last bit."""
     return _series(turns - np.rint(turns))
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def cosine(turns):
     """cos(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; even in x to the last bit."""
     return _series(0.25 - abs(turns - np.rint(turns)))
@@ -83,7 +82,7 @@ def amplitude_db(shadowing: Shadowing) -> float:
     return shadowing.deviation_db / math.sqrt(shadowing.correlation_m * WAVES)
 
 
-@njit(cache=True)
+@njit()
 def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     """Shadowing X in dB, added to the loss, between (ax, ay) and (bx, by) in m; equal both ways to the last bit.
 
@@ -95,7 +94,7 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
     return between_db(waves.reshape((1, 3, -1)), 0, amplitude_db, height, 0, 1, bx - ax, by - ay, np.empty(SUMS))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def heights(waves, x, y, out):
     """The sine of each wave at (x, y) in m, for the integral of a link that ends there, into `out` (WAVES,)."""
     for n in range(len(out)):

@@ -12,13 +12,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.config.impairments import Bursts
 
 # Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
@@ -29,7 +28,7 @@ MIN_CAPACITY = 1024
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
 
 
-@njit(cache=True)
+@njit()
 def bad_after(was_bad, dt_s, a, b, u):
     """Whether a link is bad `dt_s` after it was in a known state; rates a and b in 1/s, u uniform in [0, 1).
 
@@ -122,7 +121,7 @@ class BurstStates:
         self._kept = len(link)
 
 
-@njit(cache=True)
+@njit()
 def _place(links, link):
     """The place of a link in the table, or the free place for it."""
     mask = np.uint64(len(links) - 1)
@@ -133,14 +132,14 @@ def _place(links, link):
     return at
 
 
-@njit(cache=True)
+@njit()
 def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
     for i in range(len(link)):
         at = _place(links, link[i])
         links[at], links_at_ns[at], links_bad[at] = link[i], at_ns[i], bad[i]
 
 
-@njit(cache=True)
+@njit()
 def _lost(bursting, keys, robots, rows, sender, receiver, sequence, at_ns):
     ends = np.zeros(len(sender), np.bool_)
     for i in range(len(sender)):

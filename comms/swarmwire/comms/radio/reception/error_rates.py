@@ -9,13 +9,13 @@ tables and thresholds.
 import math
 
 import numpy as np
-from numba import njit
 
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 
 
-@njit(cache=True)
+@njit()
 def all_right(error_rate, bits):
     """(1 - error_rate)^bits, without losing the digits of small rates; 1 for no bits, which may be a fraction."""
     if bits <= 0.0 or error_rate <= 0.0:
@@ -32,7 +32,7 @@ def all_right(error_rate, bits):
 _TERMS = tuple((-1.0) ** k * math.comb(16, k) for k in range(2, 17))
 
 
-@njit(cache=True)
+@njit()
 def oqpsk_bit_errors(sinr):
     """BER = 8/15 1/16 sum_{k=2..16} (-1)^k C(16, k) exp(20 SINR (1/k - 1)); 0.5 at SINR 0.
 
@@ -44,7 +44,7 @@ def oqpsk_bit_errors(sinr):
     return min(max(total * 8.0 / 15.0 / 16.0, 0.0), 0.5)
 
 
-@njit(cache=True)
+@njit()
 def oqpsk_success(sinr, bits):
     """The probability that `bits` bits are right; a frame counts its whole PPDU, 8 x (PSDU + 6) bits."""
     return all_right(oqpsk_bit_errors(sinr), bits)
@@ -64,13 +64,13 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 HALF_WIDTH = 6.0
 
 
-@njit(cache=True)
+@njit()
 def dbpsk_bit_errors(sinr):
     """1 Mbit/s: BER = 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
     return 0.5 * math.exp(-22.0 * sinr)
 
 
-@njit(cache=True)
+@njit()
 def dqpsk_bit_errors(sinr):
     """2 Mbit/s: BER = (sqrt 2 + 1) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x), x = Eb/N0 = 11 SINR; at most 1/2."""
     x = 11.0 * sinr
@@ -79,7 +79,7 @@ def dqpsk_bit_errors(sinr):
     return min((SQRT2 + 1.0) / math.sqrt(8.0 * math.pi * SQRT2 * x) * math.exp(-(2.0 - SQRT2) * x), 0.5)
 
 
-@njit(cache=True)
+@njit()
 def biorthogonal_errors(signal):
     """Error rate of one of 16 biorthogonal codes; `signal` is the right code's correlation in units of noise.
 
@@ -97,7 +97,7 @@ def biorthogonal_errors(signal):
     return min(missing + 0.5 * math.erfc(signal / SQRT2), 1.0)
 
 
-@njit(cache=True)
+@njit()
 def dsss_success(rate, sinr, bits):
     """The probability that `bits` bits are right at one of DSSS_RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
 
@@ -134,7 +134,7 @@ for _code, (_, _, _factor, _weights) in enumerate(SPECTRA):
     _COEFFICIENTS[_code, : len(_weights)] = np.multiply(_factor, _weights)
 
 
-@njit(cache=True)
+@njit()
 def raw_bit_errors(points, sinr):
     """Bit error rate before decoding, by the points of the constellation; s = SINR in 20 MHz.
 
@@ -149,7 +149,7 @@ def raw_bit_errors(points, sinr):
     return (side - 1.0) / (side * math.log2(side)) * math.erfc(math.sqrt(1.5 * sinr / (points - 1.0)))
 
 
-@njit(cache=True)
+@njit()
 def ofdm_bit_errors(rate, sinr):
     """Upper bound of the bit error rate after decoding, at one of OFDM_RATES_BPS by index: at most 1.
 
@@ -165,13 +165,13 @@ def ofdm_bit_errors(rate, sinr):
     return min(total * d ** _FIRST[code], 1.0)
 
 
-@njit(cache=True)
+@njit()
 def ofdm_success(rate, sinr, bits):
     """The probability that `bits` bits of payload are right; 0.1 us."""
     return all_right(ofdm_bit_errors(rate, sinr), bits)
 
 
-@njit(cache=True)
+@njit()
 def table_success(sinr_db, success, frame_bits, sinr, bits):
     """The probability that `bits` bits are right: success^(bits / frame_bits), so that chunks of a frame multiply.
 
@@ -192,7 +192,7 @@ def table_success(sinr_db, success, frame_bits, sinr, bits):
     return 1.0 if bits <= 0.0 else whole ** (bits / frame_bits)
 
 
-@njit(cache=True)
+@njit()
 def threshold_success(least_sinr, sinr):
     """1 if SINR, a ratio, reaches `least_sinr`, else 0, for any number of bits."""
     return 1.0 if sinr >= least_sinr else 0.0

@@ -9,9 +9,9 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.phy import Reception, SuccessTable
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import (
@@ -89,7 +89,7 @@ def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
     return ieee80211ag(bit_rate_bps) if reception.model == "802.11ag" else ieee802154()
 
 
-@njit(cache=True)
+@njit()
 def chunk_success(receiver, sinr, bits):
     """The probability that `bits` bits (may be a fraction) are right at a constant SINR, a ratio of powers."""
     if receiver.model == _THRESHOLD:

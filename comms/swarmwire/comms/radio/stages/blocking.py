@@ -6,11 +6,11 @@ Disruption ends links to dead robots, to radios that are off, and across partiti
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
@@ -44,7 +44,7 @@ class LineOfSight(Stage):
         return (~ends).astype(np.float64)
 
 
-@njit(cache=True)
+@njit()
 def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
     """Whether an obstacle blocks each link under way, (k,)."""
     ends = np.zeros(len(sender), np.bool_)
@@ -97,7 +97,7 @@ class BodiesBlock(Stage):
         return behind_bodies(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver, links.fate)
 
 
-@njit(cache=True)
+@njit()
 def behind_bodies(x, y, radius_m, cells, robots, sender, receiver, fate):
     """Whether a robot is between the ends of each link under way, (k,); equal both ways.
 

@@ -9,12 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal_quantile, uniform
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.measurements import to_sender_m
@@ -55,7 +55,7 @@ def delay_distribution(delays: Delays) -> DelayDistribution:
     return DelayDistribution(kind, mean_s * (shape - 1.0) / shape, -1.0 / shape, 0.0)
 
 
-@njit(cache=True)
+@njit()
 def varying_delay_ns(params, u):
     """The delay in whole ns (rounded down, at most a day) of a uniform draw u in [0, 1); it never falls with u."""
     if params.distribution == UNIFORM:
@@ -103,7 +103,7 @@ class Latency(Stage):
         np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
-@njit(cache=True)
+@njit()
 def delay_ns(keys, robots, sender, receiver, sequence, fate, latency_ns, jitter_ns):
     """The delay in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
 
@@ -143,7 +143,7 @@ class VaryingDelay(Stage):
         np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
-@njit(cache=True)
+@njit()
 def drawn_ns(params, keys, robots, sender, receiver, sequence, fate):
     """The delay in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
     delays_ns = np.zeros(len(sender), np.int64)
@@ -177,7 +177,7 @@ class PropagationDelay(Stage):
         np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
 
 
-@njit(cache=True)
+@njit()
 def travel_ns(pose, sender, receiver, fate, speed_mps, wrap_m):
     """The delay in whole ns (rounded down), (k,); 0 for links that ended."""
     delays_ns = np.zeros(len(sender), np.int64)

@@ -3,12 +3,12 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.reception.bursts import BurstStates
@@ -42,7 +42,7 @@ class FixedLoss(Stage):
         return 1.0 - self._loss
 
 
-@njit(cache=True)
+@njit()
 def lost(keys, robots, sender, receiver, sequence, fate, loss):
     """Whether each link under way is lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)
@@ -146,7 +146,7 @@ def _measured(trace: LinkTrace | None, sender: IntArray, receiver: IntArray, at_
     return np.ones(len(sender)) if trace is None else np.nan_to_num(trace.at(sender, receiver, at_ns), nan=1.0)
 
 
-@njit(cache=True)
+@njit()
 def trace_lost(keys, robots, sender, receiver, sequence, fate, ratio):
     """Whether each link under way is lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
     ends = np.zeros(len(sender), np.bool_)

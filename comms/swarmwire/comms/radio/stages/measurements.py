@@ -5,12 +5,12 @@
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
@@ -19,7 +19,7 @@ RSSI_NOISE = purpose("rssi noise")
 TURN = 2.0 * np.pi
 
 
-@njit(cache=True)
+@njit()
 def to_sender_m(pose, sender, receiver, wrap_m):
     """Vector from receiver to sender, robot rows of `pose` (rows, 3): x and y in m, the shortest on a torus."""
     dx, dy = pose[sender, 0] - pose[receiver, 0], pose[sender, 1] - pose[receiver, 1]
@@ -65,7 +65,7 @@ class MeasuredRange(Measurement):
         super().__init__(context, "range_m", noise_m, range_m)
 
 
-@njit(cache=True)
+@njit()
 def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_m):
     """max(0, distance + noise z), z normal, keyed by (sender, receiver, sequence); 0 for ended links; in m, (k,)."""
     out_m = np.zeros(len(sender))
@@ -99,7 +99,7 @@ class MeasuredBearing(Measurement):
         super().__init__(context, "bearing_rad", noise_rad, bearing_rad)
 
 
-@njit(cache=True)
+@njit()
 def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_rad):
     """atan2(dy, dx) - heading + noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; (k,)."""
     out_rad = np.zeros(len(sender))
@@ -114,7 +114,7 @@ def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, no
     return out_rad
 
 
-@njit(cache=True)
+@njit()
 def wrapped(angle):
     """The angle wrapped to (-pi, pi]; an angle in this interval is unchanged."""
     if -np.pi < angle <= np.pi:
@@ -147,7 +147,7 @@ class MeasuredRssi(Stage):
         links.given[:, self._column] = np.where(links.fate == RECEIVED, links.rssi_dbm, 0.0) + noise_db
 
 
-@njit(cache=True)
+@njit()
 def error_db(keys, robots, sender, receiver, sequence, fate, noise_db):
     """The error noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; in dB, (k,)."""
     out_db = np.zeros(len(sender))

@@ -8,12 +8,11 @@ Arenas have walls or wrap around (torus); on a torus the shortest distance count
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import BROADCAST
 
 # Two robots exactly `range_m` apart must not fall two cells apart by rounding.
@@ -39,7 +38,7 @@ def reach(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], ran
     return Reach(*_within(x, y, len(x) // len(running), cells, range_m))
 
 
-@njit(cache=True)
+@njit()
 def links_in_reach(neighbours: Reach, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
     """Packet row and robot row for each robot in range of a packet's sender, packet by packet.
 
@@ -58,7 +57,7 @@ def links_in_reach(neighbours: Reach, robots: int, sender: IntArray, to: IntArra
     return packet[:count], receiver[:count]
 
 
-@njit(cache=True)
+@njit()
 def pairs_in_reach(neighbours: Reach, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs that are alive and in range of each other, sorted, (e, 2)."""
     first, other = neighbours.first, neighbours.other.view(np.uint64)
@@ -74,7 +73,7 @@ def pairs_in_reach(neighbours: Reach, alive: BoolArray) -> IntArray:
     return pair[:count]
 
 
-@njit(cache=True)
+@njit()
 def _sort(values):
     for k in range(1, len(values)):
         value, place = values[k], k
@@ -84,7 +83,7 @@ def _sort(values):
         values[place] = value
 
 
-@njit(cache=True)
+@njit()
 def _within(x, y, robots, cells, range_m):
     # In grid order, so that the strips around a robot are read sequentially.
     order, sorted_x, sorted_y = cells.order.view(np.uint64), x[cells.order], y[cells.order]
@@ -103,7 +102,7 @@ def _within(x, y, robots, cells, range_m):
     return first, other[:count].view(np.int64)
 
 
-@njit(cache=True)
+@njit()
 def _strips(x, y, robots, cells):
     """Strips of cells below, at and above each robot row: first and stop in grid order, (rows, 3) each."""
     first, stop = np.zeros((len(x), 3), np.int64), np.zeros((len(x), 3), np.int64)
@@ -141,7 +140,7 @@ def reach_on_torus(pose: FloatArray, running: BoolArray, size_m: tuple[float, fl
     return Reach(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
 
 
-@njit(cache=True)
+@njit()
 def _within_torus(x, y, robots, cells, size_m, range_m):
     capacity = 0
     for s in range(len(x)):
@@ -160,7 +159,7 @@ def _within_torus(x, y, robots, cells, size_m, range_m):
     return first, other[:count].copy()
 
 
-@njit(cache=True)
+@njit()
 def _near(cells, x, y, robots, s, neighbours):
     """Number of robots in the cells around robot s, including s; stored in `neighbours` unless that is empty."""
     if robot_index.is_empty(cells, s // robots):
@@ -178,7 +177,7 @@ def _near(cells, x, y, robots, s, neighbours):
     return count
 
 
-@njit(cache=True)
+@njit()
 def _first_of(cell, cells):
     """First cell to search along one axis, and the number of cells; none twice."""
     return (cell - CELLS // 2, CELLS) if cells >= CELLS else (0, cells)

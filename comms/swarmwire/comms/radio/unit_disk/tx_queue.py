@@ -6,9 +6,9 @@ Each sender has a queue, first in, first out. While a radio is off its packets e
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
@@ -20,7 +20,7 @@ NO_PACKETS = Transmissions.none()
 NO_LIMIT = 2**31  # where all but the newest packet end anyway
 
 
-@njit(cache=True)
+@njit()
 def enter(
     sent_at_ns: IntArray,
     free_at_ns: IntArray,
@@ -103,7 +103,7 @@ def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Tra
     return queued._replace(fate=fate, on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns)
 
 
-@njit(cache=True)
+@njit()
 def _hold(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
     on_air_at_ns, off_air_at_ns, free_at_ns = on_air_at_ns.copy(), off_air_at_ns.copy(), free_at_ns.copy()
     seen = np.zeros(len(which), np.bool_)
@@ -119,7 +119,7 @@ def _hold(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
     return on_air_at_ns, off_air_at_ns, free_at_ns
 
 
-@njit(cache=True)
+@njit()
 def _release(sender, sent_at_ns, on_air_at_ns, off_air_at_ns, which, free_at_ns, at_ns):
     on_air_at_ns, off_air_at_ns, free_at_ns = on_air_at_ns.copy(), off_air_at_ns.copy(), free_at_ns.copy()
     for p in range(len(sender)):

@@ -8,10 +8,9 @@ one before.
 # pyright: basic, reportUnknownMemberType=false
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 
 # Contacts are sought within the distance that a robot's speed covers in a step, plus this share of its radius, since
 # others may push it.
@@ -78,7 +77,7 @@ def _is_before(one, other):
     return one.which < other.which
 
 
-@njit(cache=True)
+@njit()
 def contact_islands(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
     """The rows with a listed contact in `contacts` (k,) of dtype CONTACT, and the rows without; both rising.
 

@@ -13,12 +13,11 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.geometry.robot_index import build, cell_of
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.world.engines.discs.contacts import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 
 CELLS_PER_OBSTACLE = 4
@@ -51,7 +50,7 @@ def obstacle_cells(obstacles: Obstacles, size_m: tuple[float, float], reach_m: f
     return ObstacleCells(per_side, reach_m, start, which)
 
 
-@njit(cache=True)
+@njit()
 def _fill(obstacles, size_m, per_side, reach_m, at, which):
     """Put each obstacle at at[c] in `which` for each cell c near it; if there is no room, count them in at[c + 1]."""
     circles = len(obstacles.circle)
@@ -66,7 +65,7 @@ def _fill(obstacles, size_m, per_side, reach_m, at, which):
             _put(circles + k, arena, left, right, bottom, top, size_m, per_side, at, which)
 
 
-@njit(cache=True)
+@njit()
 def _put(obstacle, arena, left, right, bottom, top, size_m, per_side, at, which):
     width, height = size_m[0] / per_side, size_m[1] / per_side
     first, last = cell_of(left, -0.5 * size_m[0], width, per_side), cell_of(right, -0.5 * size_m[0], width, per_side)
