@@ -32,7 +32,7 @@ from swarmwire.agent.on_robot.settings import (
 )
 from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.wire.sessions import end_now
+from swarmwire.comms.wire.ending import end_now
 
 ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in emulation.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.comms.wire.sessions import end_now
+from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.commands.certs.group import certs_app
 from swarmwire.deploy.commands.check import check_command
 from swarmwire.deploy.commands.compare import compare_command

@@ -112,7 +112,7 @@ def test_a_page_needs_one_place_for_the_numbers(places):
 def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
     assert names(places) == ("two-received",)
     with pytest.raises(BadInput, match="did you mean two-received"):
-        find_experiment("two-hear", places)
+        find_experiment("two-receive", places)
     with pytest.raises(BadInput, match="expected a campaign's folder"):
         digest(find_experiment("two_received", places), places, [tmp_path / "two-losses"])
 

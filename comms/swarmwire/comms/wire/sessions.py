@@ -13,11 +13,9 @@ time-out.
 # zenoh's stubs leave out some return types.
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
 
-import atexit
 import json
 import logging
 import os
-import sys
 import threading
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,11 +23,11 @@ from typing import Any
 
 import zenoh
 
+from swarmwire.comms.wire.ending import left_closing
 from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network, protocol_of
 
 CLOSE_TIMEOUT_S = 1.0  # a healthy peer answers in milliseconds
-MAX_CLOSE_S = 12.0  # after ten seconds zenoh gives up
 BLOCK_TIMEOUT_S = 5.0
 LOCATORS_TIMEOUT_S = 2.0
 # A dead peer is noticed at once, by its closed socket. A frozen or unreachable one is noticed after its lease. On one
@@ -48,8 +46,6 @@ SMALL_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(ha
 Endpoints = str | Sequence[str]
 
 log = logging.getLogger(__name__)
-
-_closing_threads: list[threading.Thread] = []
 
 
 def close_session(session: zenoh.Session, patience_s: float = CLOSE_TIMEOUT_S) -> None:
@@ -80,25 +76,6 @@ def _close(session: zenoh.Session) -> None:
         session.close()
     except zenoh.ZError as error:
         log.info("a session was left to the end of the process: %s", error)
-
-
-# While a thread closes a session, Python must not be torn down: a thread that returns from zenoh would find no
-# interpreter, and the process would abort ("exception not rethrown"). So the end of the process waits for such threads,
-# or `end_now` ends it at once.
-
-
-def left_closing(closing: threading.Thread) -> None:
-    """Let the end of the process wait for a thread that still closes a session."""
-    _closing_threads.append(closing)
-    atexit.register(closing.join, MAX_CLOSE_S)
-
-
-def end_now(code: int) -> None:
-    """End this process at once if a session is still closing; else return. Programs call it last."""
-    if any(closing.is_alive() for closing in _closing_threads):
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
 
 
 def mutual_tls(network: Network) -> dict[str, Any]:

@@ -14,13 +14,13 @@ import zenoh
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire import sessions
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.ending import end_now
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm, swarm_config
 from swarmwire.comms.wire.sessions import (
     close_session,
     closed_after,
-    end_now,
     listens_at,
     open_router,
     open_runner,
@@ -211,7 +211,7 @@ def ended(program: str) -> tuple[int, str, str]:
 
 
 def test_where_nothing_is_closing_it_returns(monkeypatch):
-    monkeypatch.setattr(sessions, "_left", [])
+    monkeypatch.setattr(ending, "_closing_threads", [])
     end_now(3)
 
 
@@ -220,7 +220,7 @@ def test_a_program_ends_at_once_with_its_exit_code():
 
 
 def test_once_all_is_closed_it_ends_as_usual():
-    closed = "session.may.set(); ending._left[0].join(); "
+    closed = "session.may.set(); ending._closing_threads[0].join(); "
     assert ended(PROGRAM + closed + "ending.end_now(3); sys.exit(4)") == (4, "done\n", "")
 
 
