@@ -19,8 +19,9 @@ from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire.access_control import access_of
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.wanted import wanted
 from swarmwire.deploy.cli import app

@@ -11,8 +11,9 @@ from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.messages import Message, f4
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from tests.support.waiting import until
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import zenoh
 
     from swarmwire.agent.radios.tracker import Tracker
-    from swarmwire.comms.wire.robot_network import SwarmKeys
+    from swarmwire.comms.wire.keys import SwarmKeys
 
 Say = Callable[[str], None]
 
@@ -75,7 +75,8 @@ def network_parts(
     # Imported here: zenoh costs memory and time, and a robot without a network does not use it.
     from swarmwire.agent.radios.control import ControlPoint
     from swarmwire.comms.wire.access_control import access_of
-    from swarmwire.comms.wire.robot_network import SwarmKeys, open_swarm
+    from swarmwire.comms.wire.keys import SwarmKeys
+    from swarmwire.comms.wire.robot_network import open_swarm
     from swarmwire.comms.wire.sessions import close_session
 
     if network.warning:

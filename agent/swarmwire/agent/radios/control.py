@@ -17,7 +17,8 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, SwarmKeys
+from swarmwire.comms.wire.keys import SwarmKeys
+from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED
 
 MAX_WAITING = 32  # requests; one more is refused, and its sender repeats it
 TIMEOUT_S = 2.0  # at close, for an answer in progress

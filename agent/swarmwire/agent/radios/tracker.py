@@ -10,8 +10,8 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import POSE_BYTES, Pose, decode_pose
-from swarmwire.comms.wire.robot_network import SwarmKeys
 
 MAX_AGE_NS = NS_PER_S  # a pose with an older stamp, or one that far in the future, is not used
 

@@ -21,8 +21,8 @@ from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, t
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_bridged
-from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 
 JOIN_TIMEOUT_S = 10.0  # of all queries

@@ -32,8 +32,8 @@ from swarmwire.comms.packets import (
     SentPackets,
     TxStatuses,
 )
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
-from swarmwire.comms.wire.robot_network import SwarmKeys
 
 VERSION = 1
 _LAYOUT = struct.Struct("<BhIq")  # version, to, sequence, sent_utc_ns

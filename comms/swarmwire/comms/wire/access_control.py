@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.keys import Keys, ObserverKeys, fault_of_name
+from swarmwire.comms.wire.keys import Keys, ObserverKeys, SwarmKeys, fault_of_name
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import SwarmKeys
 
 TRACKER, OPERATOR, WORLD = "tracker", "operator", "world"  # default names on their certificates
 ANY = "*"  # any runner, or any run

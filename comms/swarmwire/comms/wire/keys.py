@@ -79,3 +79,47 @@ class ObserverKeys:
         self.truth = f"{root}/truth"  # observed ticks at a limited rate; may be lost
         self.status = f"{root}/status"  # queryable: the run's status, for observers
         self.control = f"{root}/control"  # queryable: control requests, for operators
+
+
+class SwarmKeys:
+    """The keys of one swarm, under `swarmwire/{swarm}/`; a key contains the name of the robot that may put to it."""
+
+    def __init__(self, swarm: str) -> None:
+        self.root = f"swarmwire/{swarm}"
+        self.any_radio = f"{self.root}/radio/*/*"
+        self.any_pose = f"{self.root}/pose/*"
+        self.any_control = f"{self.root}/control/*"
+        self.any_bridge_sent = f"{self.root}/bridge/*/sent"
+        self.any_bridge_join = f"{self.root}/bridge/*/join"
+
+    def radio(self, robot: str, tag: int) -> str:
+        """The key of a robot's packets whose message has this tag."""
+        return f"{self.root}/radio/{robot}/{tag:04x}"
+
+    def any_radio_of(self, robot: str) -> str:
+        """All packets of this robot."""
+        return f"{self.root}/radio/{robot}/*"
+
+    def pose(self, robot: str) -> str:
+        """The tracker's poses of this robot, encoded by `radio_bridge.encode_pose`."""
+        return f"{self.root}/pose/{robot}"
+
+    def control(self, robot: str) -> str:
+        """Queryable of this robot: "estop" and "status" requests of the operator."""
+        return f"{self.root}/control/{robot}"
+
+    def alive(self, robot: str) -> str:
+        """Liveliness token of this robot's agent."""
+        return f"{self.root}/alive/{robot}"
+
+    def bridge_join(self, robot: str) -> str:
+        """Queryable of the world's radio medium: this robot requests its `BridgeInfo`."""
+        return f"{self.root}/bridge/{robot}/join"
+
+    def bridge_sent(self, robot: str) -> str:
+        """From a robot with `--radio medium` to the world's medium: `actions` frames, of which the packets count."""
+        return f"{self.root}/bridge/{robot}/sent"
+
+    def bridge_received(self, robot: str) -> str:
+        """From the world's medium to that robot: a `tick` frame for each tick in which it received packets."""
+        return f"{self.root}/bridge/{robot}/received"

@@ -21,6 +21,7 @@ import zenoh
 
 from swarmwire.comms.clock import Clock, WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import PROVEN, Network
 from swarmwire.comms.wire.sessions import SMALL_RUNTIME, mutual_tls
 
@@ -30,50 +31,6 @@ LOCATORS_TIMEOUT_S = 2.0
 ESTOP, STATUS = "estop", "status"  # control requests
 STOPPED = "stopped"  # the reply to ESTOP
 POLL_NS = to_ns(0.02)  # between two looks for replies, and two attempts to reach a robot
-
-
-class SwarmKeys:
-    """The keys of one swarm, under `swarmwire/{swarm}/`; a key contains the name of the robot that may put to it."""
-
-    def __init__(self, swarm: str) -> None:
-        self.root = f"swarmwire/{swarm}"
-        self.any_radio = f"{self.root}/radio/*/*"
-        self.any_pose = f"{self.root}/pose/*"
-        self.any_control = f"{self.root}/control/*"
-        self.any_bridge_sent = f"{self.root}/bridge/*/sent"
-        self.any_bridge_join = f"{self.root}/bridge/*/join"
-
-    def radio(self, robot: str, tag: int) -> str:
-        """The key of a robot's packets whose message has this tag."""
-        return f"{self.root}/radio/{robot}/{tag:04x}"
-
-    def any_radio_of(self, robot: str) -> str:
-        """All packets of this robot."""
-        return f"{self.root}/radio/{robot}/*"
-
-    def pose(self, robot: str) -> str:
-        """The tracker's poses of this robot, encoded by `radio_bridge.encode_pose`."""
-        return f"{self.root}/pose/{robot}"
-
-    def control(self, robot: str) -> str:
-        """Queryable of this robot: "estop" and "status" requests of the operator."""
-        return f"{self.root}/control/{robot}"
-
-    def alive(self, robot: str) -> str:
-        """Liveliness token of this robot's agent."""
-        return f"{self.root}/alive/{robot}"
-
-    def bridge_join(self, robot: str) -> str:
-        """Queryable of the world's radio medium: this robot requests its `BridgeInfo`."""
-        return f"{self.root}/bridge/{robot}/join"
-
-    def bridge_sent(self, robot: str) -> str:
-        """From a robot with `--radio medium` to the world's medium: `actions` frames, of which the packets count."""
-        return f"{self.root}/bridge/{robot}/sent"
-
-    def bridge_received(self, robot: str) -> str:
-        """From the world's medium to that robot: a `tick` frame for each tick in which it received packets."""
-        return f"{self.root}/bridge/{robot}/received"
 
 
 def open_swarm(network: Network, access: Mapping[str, Any] | None = None, small: bool = True) -> zenoh.Session:

@@ -7,8 +7,9 @@ import asyncssh
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.wire.access_control import access_control
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, SwarmKeys, ask_all, open_swarm
+from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, ask_all, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.fleet.connecting import connected, lost
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot, hosts_of

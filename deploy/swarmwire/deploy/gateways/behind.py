@@ -10,7 +10,7 @@ from swarmwire.comms.clock import DatedClock, ScaledClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import access_of
-from swarmwire.comms.wire.robot_network import SwarmKeys
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.deploy.gateways.chosen import Chosen, chosen_gateways
 from swarmwire.deploy.gateways.gateways import Gateways
 from swarmwire.deploy.gateways.listening import listening_places

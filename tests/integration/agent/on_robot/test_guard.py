@@ -6,8 +6,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import ESTOP, SwarmKeys, ask_all, endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
 from tests.support.agent.on_robot.installed import Command, deeds, install
 from tests.support.agent.on_robot.scripted import PLAYERS
 from tests.support.waiting import until

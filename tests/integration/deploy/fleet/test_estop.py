@@ -5,8 +5,9 @@ from contextlib import contextmanager
 import pytest
 
 from swarmwire.comms.wire.access_control import access_control
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.fleet import estop as estop_module
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import zenoh
 
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of
+from swarmwire.comms.wire.robot_network import endpoints_of
 
 KEYS = SwarmKeys("lab")
 ROBOTS = ("flock-0", "flock-1", "flock_2")

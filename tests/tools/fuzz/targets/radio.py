@@ -13,9 +13,9 @@ from swarmwire.agent.radios.world_radio import WorldRadio, _Arrival
 from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import BridgeInfo, Pose, encode_bridged, encode_pose
-from swarmwire.comms.wire.robot_network import SwarmKeys
 from swarmwire.comms.wire.tick_frames import encode_actions
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from tests.support.agent.players import Other, Word

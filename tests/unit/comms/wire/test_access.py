@@ -14,9 +14,8 @@ from swarmwire.comms.wire.access_control import (
     observers_access,
     router_access,
 )
-from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, ObserverKeys, run_of, runner_of
+from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, ObserverKeys, SwarmKeys, run_of, runner_of
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.robot_network import SwarmKeys
 
 KEYS = SwarmKeys("lab")
 ROBOTS = ("flock-0", "flock-1")

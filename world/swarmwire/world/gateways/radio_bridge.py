@@ -14,9 +14,10 @@ from zenoh.handlers import Callback
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, encode_bridged
-from swarmwire.comms.wire.robot_network import SwarmKeys, endpoints_of, open_swarm
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
 

@@ -9,8 +9,8 @@ import zenoh
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.truth import Static
+from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose
-from swarmwire.comms.wire.robot_network import SwarmKeys
 
 # zenoh's stubs leave out the return type of put.
 
