@@ -134,8 +134,8 @@ def test_senses_of_light_touch_and_place_are_alike_in_every_layout_and_global_on
 def test_groups_of_one_body_whose_sheets_the_scenario_changes_do_not_hide_each_others_global_senses(tmp_path):
     (tmp_path / "seeker.py").write_text(SEEKER)
     stones = 'body = "kilobot"\ncount = 2\nagent = "seeker.py:Stone"\n'
-    placed = f"[robots.placed]\n{stones}sheet.sensors.positioning = {{}}\n"
-    heavy = f"[robots.heavy]\n{stones}sheet.mass_kg = 1.0\n"
+    placed = f"[robots.placed]\n{stones}body_overrides.sensors.positioning = {{}}\n"
+    heavy = f"[robots.heavy]\n{stones}body_overrides.mass_kg = 1.0\n"
     (tmp_path / "stones.toml").write_text(LIT[: LIT.index("[robots.moths]")] + placed + heavy)
     result = run(tmp_path / "stones.toml", overrides=["duration_s=0.1"])
     assert result.global_sensors == {"kilobot of placed": ["positioning"]}

@@ -90,7 +90,7 @@ def test_bodies_that_go_where_they_are_told_cannot_be_pushed_and_it_is_said_at_t
         scenario_from(mapping, "s.toml")
     world = World(posed([[0.0, 0.0, 0.0]], physics={"engine": "kinematic"}), [1], {})
     with pytest.raises(TypeError, match="knows no forces"):
-        world.push(np.ones((1, 2)))
+        world.apply_impulse(np.ones((1, 2)))
 
 
 def test_of_engines_side_by_side_only_the_one_with_forces_pushes():

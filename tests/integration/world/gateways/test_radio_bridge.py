@@ -165,7 +165,7 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
 def test_nothing_received_is_no_frame(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
-        monkeypatch.setattr("swarmwire.world.gateways.radio_bridge.encode_air", lambda *_: published.append(1) or b"")
+        monkeypatch.setattr("swarmwire.world.gateways.radio_bridge.encode_bridged", lambda *_: published.append(1) or b"")
         bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
         bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # nobody behind the bridge received it
         assert not published
@@ -201,9 +201,9 @@ def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
 
 
 @pytest.mark.parametrize(
-    ("own", "robots", "air", "said"),
+    ("own", "robots", "medium", "said"),
     [
-        ("flock-0", ROBOTS, AIR, "expected a robot that the world lends its air to: flock-1, flock-2"),
+        ("flock-0", ROBOTS, AIR, "expected a robot that the world lends its radio to: flock-1, flock-2"),
         ("flock-1", ROBOTS, None, "expected a world with a radio; this run has none"),
         ("flock-1", ROBOTS[::-1], AIR, "expected the robots of the world, in its order: flock-0, flock-1, flock-2"),
     ],
@@ -218,7 +218,7 @@ def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
     session = open_swarm(Network(listen=ANY_PORT))
     clock = DatedClock()
     try:
-        with pytest.raises(BadInput, match="expected a world that lends its air to flock-1; none in the network"):
+        with pytest.raises(BadInput, match="expected a world that lends its radio to flock-1; none in the network"):
             WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
     finally:
         close_session(session)

@@ -144,7 +144,7 @@ class RadioBridge:
                 query.reply_err("expected a world with a radio; this run has none")
             elif row is None:
                 robots = ", ".join(self._rows) or "none"
-                query.reply_err(f"expected a robot that the world lends its air to: {robots}")
+                query.reply_err(f"expected a robot that the world lends its radio to: {robots}")
             else:
                 query.reply(key, self._medium.terms(row).encode())
 
