@@ -27,8 +27,8 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
     shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
     assert sum(glimpse.edges is not None for glimpse in shown) == 5
     assert (
-        shown[0].sensors["flock"].rows.tolist()
-        == shown[0].sensors["flock"].fields["compass.heading_rad"].tolist()
+        shown[0].readings["flock"].rows.tolist()
+        == shown[0].readings["flock"].fields["compass.heading_rad"].tolist()
         == [7]
     )
     assert shown[0].finished is None

@@ -152,7 +152,7 @@ class WorldRadio:
                 if reply.err is not None and (error := reply.err.payload.to_string()) != "Timeout":
                     raise BadInput("radio", "world", error)
             self._wall.sleep_until(min(self._wall.now_ns() + QUERY_INTERVAL_NS, end_ns))
-        expected = f"expected a world that lends its air to {self._own}; none in the network answers"
+        expected = f"expected a world that lends its radio to {self._own}; none in the network answers"
         raise BadInput("radio", "world", expected)
 
     def _joined(self) -> BridgeInfo:
