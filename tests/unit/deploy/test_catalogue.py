@@ -10,7 +10,7 @@ from rich.console import Console
 
 from swarmwire.agent import behaviours
 from swarmwire.agent.parameters import REQUIRED, parameters_of
-from swarmwire.agent.step_context import OUTCOMES
+from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.sensors import SENSOR_SPECS
@@ -37,7 +37,7 @@ EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for k
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 HELD = {
     "bodies": [*body_names()],
-    "sensors": [*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures)), OUTCOMES],
+    "sensors": [*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures)), TX_STATUS],
     "behaviours": behaviours.__all__,
     "drives": [*DRIVES],
     "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],

@@ -154,14 +154,14 @@ def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, whe
 
 def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path) -> None:
     of = world(tmp_path, f'like = "epuck"\n[actuators.x]\nkind = "{CODE}:Flashes"\n', needs=())
-    before = of.actuators.leds.told
+    before = of.actuators.leds.agent_view
     of.move(actuated(of, [1], [0], [255.0]))
-    lit = of.actuators.leds.told
+    lit = of.actuators.leds.agent_view
     assert lit[:, 0].tolist() == [0, 255]
     of.move(commanded(of, 0.0, 0.0))
-    assert of.actuators.leds.told is lit
+    assert of.actuators.leds.agent_view is lit
     of.move(actuated(of, [1], [0], [0.0]))
-    assert not of.actuators.leds.told.any()
+    assert not of.actuators.leds.agent_view.any()
     assert (before.any(), lit[1, 0]) == (False, 255)  # what was told is never written to
 
 
@@ -280,7 +280,7 @@ def test_agents_know_names_and_widths_and_nothing_of_classes_and_keys(tmp_path: 
     body = world(tmp_path).static.groups[0].body
     spec = body.sensors["paint"]
     assert (spec.fields, spec.params) == ({"amount": 0, "ticks": 3}, {"scale": 2.0})
-    told = body_from_mapping(body.told.as_mapping(), "assignment")
+    told = body_from_mapping(body.agent_view.as_mapping(), "assignment")
     assert (told.sensors["paint"].fields, told.sensors["paint"].params) == ({"amount": 0, "ticks": 3}, {})
     assert (told.actuators["painter"].width, told.actuators["painter"].params) == (2, {})
     assert (told.sensors["paint"].kind, told.actuators["painter"].kind) == ("", "")
