@@ -98,7 +98,7 @@ BODY = """
 like = "epuck"
 name = "worn"
 drive = { noise = { factor_std = 0.05 } }
-senses = { proximity = { drop_out = 0.05 }, battery = { capacity_wh = 0.0006, idle_w = 1.0, drive_w_per_mps = 4.0 } }
+sensors = { proximity = { drop_out = 0.05 }, battery = { capacity_wh = 0.0006, idle_w = 1.0, drive_w_per_mps = 4.0 } }
 """
 FAILING = """
 events = [

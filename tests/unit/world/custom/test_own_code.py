@@ -154,14 +154,14 @@ def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, whe
 
 def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path) -> None:
     of = world(tmp_path, f'like = "epuck"\n[actuators.x]\nkind = "{CODE}:Flashes"\n', needs=())
-    before = of.actuators.leds.agent_view
+    before = of.actuators.leds.told
     of.move(actuated(of, [1], [0], [255.0]))
-    lit = of.actuators.leds.agent_view
+    lit = of.actuators.leds.told
     assert lit[:, 0].tolist() == [0, 255]
     of.move(commanded(of, 0.0, 0.0))
-    assert of.actuators.leds.agent_view is lit
+    assert of.actuators.leds.told is lit
     of.move(actuated(of, [1], [0], [0.0]))
-    assert not of.actuators.leds.agent_view.any()
+    assert not of.actuators.leds.told.any()
     assert (before.any(), lit[1, 0]) == (False, 255)  # what was told is never written to
 
 
