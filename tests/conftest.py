@@ -96,7 +96,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
 
 
 class AgainIfSlow:
-    """A unit test is quick, at least once in three: the first time may compile, another have a busy machine."""
+    """Runs a slow unit test up to three times: the first may compile a kernel, and the machine may be busy."""
 
     def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
         """Run a unit test, again while it is too slow, and report the last."""

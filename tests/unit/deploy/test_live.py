@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ from swarmwire.deploy.live import viewer_program
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.sampling import Sampling, Since
 from tests.support.metrics.truths import edges, finished, static, tally, truth
-
-VIEWER = pytest.mark.skipif(find_spec("rerun") is None, reason="needs the extra [view]")
 
 
 def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets():
@@ -46,7 +43,6 @@ def test_ticks_are_taken_once():
         since.take()
 
 
-@VIEWER
 @pytest.mark.parametrize("content", [b"", b"hello"])
 def test_what_is_no_recording_is_refused(tmp_path, content):
     (tmp_path / "run.rrd").write_bytes(content)
@@ -55,7 +51,6 @@ def test_what_is_no_recording_is_refused(tmp_path, content):
             view_command(shown)
 
 
-@VIEWER
 @pytest.mark.parametrize("content", [{}, {"live.json": "{}"}, {"live.json": "nothing"}])
 def test_nothing_to_see_is_refused(tmp_path, content):
     for name, text in content.items():

@@ -32,6 +32,7 @@ KEYS, SEEN = Keys("run1"), ObserverKeys("run1")
 ACCESS = RunAccess(("a", "b", "gone"), ("wall",), ("alice",), ("gate", "gate2"), ("gone",))
 NAMES = (*ACCESS.runners, *ACCESS.observers, *ACCESS.operators, *ACCESS.routers, *ACCESS.worlds, "robot-1")
 LISTEN = "tls/127.0.0.1:0"
+TIMEOUT_S = 60.0  # of links, so that a busy machine cuts none
 BLOCK = zenoh.CongestionControl.BLOCK
 
 
@@ -69,7 +70,7 @@ class World:
     def __init__(self, folder: Path, opened: ExitStack) -> None:
         network = as_name(folder, "world")
         self.session = opened.enter_context(
-            closed_after(open_world(LISTEN, 10.0, network, agents_access(KEYS, ACCESS)))
+            closed_after(open_world(LISTEN, TIMEOUT_S, network, agents_access(KEYS, ACCESS)))
         )
         self.endpoint = listens_at(self.session)[0]
         self.received: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
@@ -109,7 +110,7 @@ def endpoint(request: pytest.FixtureRequest, world: World, folder: Path, opened:
 
 
 def runner(folder: Path, name: str, endpoint: str, opened: ExitStack) -> zenoh.Session:
-    return opened.enter_context(closed_after(open_runner(endpoint, 10.0, as_name(folder, name))))
+    return opened.enter_context(closed_after(open_runner(endpoint, TIMEOUT_S, as_name(folder, name))))
 
 
 def replies(session: zenoh.Session, key: str) -> list[bytes]:
