@@ -62,7 +62,7 @@ def test_nothing_to_see_is_refused(tmp_path, content):
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"^view: .*swarmwire-metrics\[view\]"):
         view_command(tmp_path)
 

@@ -12,6 +12,7 @@ from typing import Protocol, cast
 
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import CLUSTER
 from swarmwire.comms.plugins import entry_points_of
 from swarmwire.deploy.campaign.task import PieceResult, Task
 
@@ -82,11 +83,7 @@ def open_executor(on: str, workers: int | None, scenario: Path) -> Executor:
 
 
 def _open_dask(on: str, workers: int | None, scenario: Path) -> Executor:
-    try:
-        from swarmwire.deploy.campaign.dask_executor import DaskExecutor
-    except ModuleNotFoundError as error:
-        if error.name not in ("dask", "distributed"):
-            raise
-        expected = f'expected the package {error.name}, which dask:// needs: pip install "swarmwire[cluster]"'
-        raise BadInput("--on", "", expected) from None
+    CLUSTER.need("--on")
+    from swarmwire.deploy.campaign.dask_executor import DaskExecutor
+
     return DaskExecutor(on, workers, scenario)

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import UI
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.gateway_options import (
     Ca,
@@ -101,14 +102,13 @@ def run_command(
     from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
-    from swarmwire.deploy.page.extra import need_ui_extra
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario.file import load_scenario
 
     if ui:
-        need_ui_extra("--ui")
+        UI.need("--ui")
     checked = load_scenario(scenario, overrides or [])
     for name in revoked or []:
         if name not in checked.robot_names():

@@ -3,14 +3,14 @@
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import TUNE
 from swarmwire.deploy.commands.exit_codes import INTERRUPTED
 from swarmwire.deploy.commands.hang_up import leaving_when_hung_up
 from swarmwire.deploy.commands.options import Overrides, Quiet
@@ -92,7 +92,7 @@ def tune_command(
         "SCENARIO": scenario, "--search": search, "--goal": goal, "--seeds": seeds, "--check-seeds": check_seeds,
         "--set": overrides, "--sampler": sampler, "--sampler-seed": sampler_seed, "--batch": batch, "--out": out,
     }  # fmt: skip
-    _check_optuna()
+    TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
@@ -116,11 +116,6 @@ def tune_command(
     print_tuned(tuned, console, program())
     if not tuned.is_over:
         raise typer.Exit(INTERRUPTED)
-
-
-def _check_optuna() -> None:
-    if find_spec("optuna") is None:
-        raise SwarmwireError('tune needs Optuna, which is not installed: pip install "swarmwire[tune]"')
 
 
 def _refuse_with_resume(asked: Mapping[str, object]) -> None:

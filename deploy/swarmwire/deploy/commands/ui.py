@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.extras import UI, VIEW
 from swarmwire.deploy.commands.access_options import Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.commands.ctl.chosen_run import Chosen, Endpoint
 from swarmwire.deploy.commands.with_parent import WithParent, standard_input_closed
@@ -34,12 +35,9 @@ def ui_command(
 
     The page is for browsers of this machine alone, and lets in whoever has its address with the token in it.
     """
+    UI.need("ui")
+    VIEW.need("ui")
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
-    from swarmwire.deploy.page.extra import need_ui_extra
-    from swarmwire.metrics.viewer.extra import need_view_extra
-
-    need_ui_extra("ui")
-    need_view_extra("ui")
     from swarmwire.deploy.control.remote_control import only_run_at
     from swarmwire.deploy.control.run_finder import find_run
     from swarmwire.deploy.interrupt import Interrupt

@@ -8,6 +8,7 @@ import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import VIEW
 from swarmwire.deploy.commands.with_parent import WithParent, standard_input_closed
 from swarmwire.metrics.record.names import RECORDING
 
@@ -31,9 +32,8 @@ def view_command(
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.live.showing import RadioModel
     from swarmwire.deploy.live.viewer_program import has_screen
-    from swarmwire.metrics.viewer.extra import need_view_extra
 
-    need_view_extra("view")
+    VIEW.need("view")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     with Interrupt() as interrupt:
         way = RadioModel(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from swarmwire.comms.extras import UI
 from swarmwire.deploy.commands.access_options import (
     Ca,
     Certificate,
@@ -83,7 +84,6 @@ def world_command(
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.listening import Listening
-    from swarmwire.deploy.page.extra import need_ui_extra
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
@@ -91,7 +91,7 @@ def world_command(
     from swarmwire.world.scenario.file import load_scenario
 
     if ui:
-        need_ui_extra("--ui")
+        UI.need("--ui")
     checked = load_scenario(scenario, overrides or [])
     of = member(
         WORLD,

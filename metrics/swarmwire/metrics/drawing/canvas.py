@@ -5,7 +5,7 @@ from typing import Any, cast
 
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.drawing.extra import need_report_extra
+from swarmwire.comms.extras import REPORT
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
 from swarmwire.metrics.whole_file import check_path, chosen_file
 
@@ -17,7 +17,7 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
 
     BadInput without matplotlib, or for a size that nobody could look at.
     """
-    need_report_extra("pictures")
+    REPORT.need("pictures")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import ByteArray, IntArray
-from swarmwire.metrics.drawing.extra import need_report_extra
+from swarmwire.comms.extras import REPORT
 
 COLORS = 64
 EVEN_COLORS = 24  # of these, of areas
@@ -20,7 +20,7 @@ def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray
 
     Frames that are equal to the one before prolong it. BadInput without the extra [report].
     """
-    need_report_extra("films")
+    REPORT.need("films")
     palette = _palette(samples)
     rest = _indexed(frames, palette)
     first = next(rest)

@@ -7,14 +7,14 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.comms.arrays import ByteArray
-from swarmwire.metrics.drawing.extra import need_report_extra
+from swarmwire.comms.extras import REPORT
 
 _QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for visually lossless
 
 
 def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> None:
     """Write frames (height, width, 3), with even sides, as a film. BadInput without the extra [report]."""
-    need_report_extra("films")
+    REPORT.need("films")
     import imageio_ffmpeg
 
     ffmpeg: Any = None

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-from swarmwire.metrics.drawing.extra import need_report_extra
+from swarmwire.comms.extras import REPORT
 from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
 
 _NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
@@ -14,7 +14,7 @@ _CODE = re.compile(r"`([^`]*)`")
 
 def page(report: Report) -> str:
     """The whole page. ValueError if two figures have one name; BadInput without jinja2."""
-    need_report_extra("reports")
+    REPORT.need("reports")
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     names = [figure.name for figure in report.figures]

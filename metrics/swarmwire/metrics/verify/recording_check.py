@@ -1,11 +1,11 @@
 """Whether the recording for the viewer can be read, and how far it reaches."""
 
 import warnings
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from swarmwire.comms.extras import VIEW
 from swarmwire.metrics.verify.finding import State
 
 FILE_HEADER_BYTES = 12  # of a .rrd: magic, version, options
@@ -15,8 +15,8 @@ FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-
 def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
     """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
     megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
-    if find_spec("rerun") is None or find_spec("rerun_bindings") is None:
-        return State.WHOLE, f"{megabytes}, not read: that needs rerun-sdk (swarmwire-metrics[view])"
+    if VIEW.missing():
+        return State.WHOLE, f"{megabytes}, not read: that needs {VIEW.requirement}"
     try:
         last, closed = _read_all(path)
     except Exception as error:  # noqa: BLE001 - rerun promises no type; whatever it is, the file is unreadable

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.metrics.viewer.extra import need_view_extra
+from swarmwire.comms.extras import VIEW
 from swarmwire.metrics.viewer.program import end, free_port, program
 
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
@@ -32,7 +32,7 @@ def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, i
     it, and has ended when this returns. BadInput without the extra [view], the recording or the tick; NoGraphics
     without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
     """
-    need_view_extra("picture")
+    VIEW.need("picture")
     if png.suffix.lower() != ".png":
         raise BadInput(str(png), "", "expected a file name that ends in .png")
     if not rrd.is_file():

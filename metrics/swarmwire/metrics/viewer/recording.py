@@ -5,12 +5,12 @@ from typing import Any
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import VIEW
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.viewer.about import about
 from swarmwire.metrics.viewer.arena import RerunArena
-from swarmwire.metrics.viewer.extra import need_view_extra
 from swarmwire.metrics.viewer.layout import layout
 from swarmwire.metrics.viewer.plots import RerunPlots
 from swarmwire.metrics.viewer.plotted import Measured
@@ -45,7 +45,7 @@ class RerunRecording:
         of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
-        need_view_extra(self._what)
+        VIEW.need(self._what)
         self._path, self._metrics, self._clock = path, metrics, clock
         self._arena, self._selected = arena, selected
 

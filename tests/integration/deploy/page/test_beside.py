@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import UI
 from swarmwire.deploy.page.beside import PageBeside
-from swarmwire.deploy.page.extra import need_ui_extra
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from tests.support.deploy.commands import LOSSY, called
@@ -65,9 +65,9 @@ def test_a_run_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatc
 
 
 def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("swarmwire.deploy.page.extra.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r'ui: needs fastapi and uvicorn: pip install "swarmwire\[ui\]"'):
-        need_ui_extra("ui")
+        UI.need("ui")
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--ui", "--out", tmp_path / "run")
     assert (code, errors) == (2, 'error: --ui: needs fastapi and uvicorn: pip install "swarmwire[ui]"\n')
     assert not (tmp_path / "run").exists()

@@ -266,7 +266,7 @@ def test_a_recording_is_read_to_its_end(tmp_path):
 
 
 def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.verify.recording_check.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     fill(tmp_path)
     shutil.copy(tmp_path / "log.txt", tmp_path / "run.rrd")
     assert "not read" in text_of(tmp_path, "run.rrd")

@@ -338,7 +338,7 @@ def test_an_arena_that_is_not_there_is_refused(tmp_path):
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.viewer.extra.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire-metrics\[view\]"):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
 

@@ -1,6 +1,5 @@
 """Dask clusters by their address, and which workers are fit."""
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,9 +13,7 @@ from swarmwire.deploy.record.modules import module_digests
 
 
 def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
-    for name in [name for name in sys.modules if ".campaign.dask_" in name]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"^--on: .*swarmwire\[cluster\]"):
         open_executor("dask://there:8786", None, Path())
 

@@ -107,8 +107,8 @@ def test_a_bad_call_is_one_line(certs: Certs):
 
 
 def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("swarmwire.deploy.commands.certs.needed.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     errors = certs("init")[1]
-    assert errors.startswith("1 error: ")
+    assert errors.startswith("2 error: certs: ")
     assert 'pip install "swarmwire[fleet]"' in errors
     assert not certs.folder.exists()

@@ -5,7 +5,8 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.extras import ROS2
 
 DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
 NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh
@@ -20,12 +21,10 @@ class Messages:
 
     def __init__(self, distro: str) -> None:
         """BadInput if rosbags is not installed."""
-        try:
-            from rosbags.serde import SerdeError
-            from rosbags.typesys import Stores, get_typestore
-        except ModuleNotFoundError as error:
-            needs = f'ROS 2 needs the package {error.name}: pip install "swarmwire-agent[ros2]"'
-            raise BadInput("ros2", "", needs) from None
+        ROS2.need("ros2")
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, get_typestore
+
         self._distro, self._store, self._fault = distro, get_typestore(Stores(f"ros2_{distro}")), SerdeError
 
     def make(self, kind: str, *fields: Any) -> Any:

@@ -5,7 +5,8 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.commands.certs.needed import AuthorityFolder, need_cryptography
+from swarmwire.comms.extras import CERTIFICATES
+from swarmwire.deploy.commands.certs.options import AuthorityFolder
 
 
 def init_command(
@@ -21,7 +22,7 @@ def init_command(
 
       swarmwire certs init lab-ca
     """
-    need_cryptography()
+    CERTIFICATES.need("certs")
     from swarmwire.deploy.certificates.certificate_folder import begin_authority, renew_authority
 
     if renew:

@@ -7,8 +7,9 @@ import typer
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import CERTIFICATES
 from swarmwire.deploy.certificates.purposes import PURPOSES
-from swarmwire.deploy.commands.certs.needed import AuthorityFolder, need_cryptography
+from swarmwire.deploy.commands.certs.options import AuthorityFolder
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.wanted import Wanted
@@ -54,7 +55,7 @@ def issue_command(
 
       swarmwire certs issue lab-ca laptop-1 laptop-2 --for runner
     """
-    need_cryptography()
+    CERTIFICATES.need("certs")
     from swarmwire.deploy.certificates.certificate_folder import issue
 
     if fleet is not None:

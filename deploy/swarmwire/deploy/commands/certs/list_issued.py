@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.commands.certs.needed import AuthorityFolder
+from swarmwire.deploy.commands.certs.options import AuthorityFolder
 from swarmwire.deploy.commands.options import AsJson
 
 if TYPE_CHECKING:

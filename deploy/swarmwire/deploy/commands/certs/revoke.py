@@ -5,7 +5,8 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.commands.certs.needed import AuthorityFolder, need_cryptography
+from swarmwire.comms.extras import CERTIFICATES
+from swarmwire.deploy.commands.certs.options import AuthorityFolder
 
 
 def revoke_command(
@@ -18,7 +19,7 @@ def revoke_command(
 
       swarmwire certs revoke lab-ca flock-3
     """
-    need_cryptography()
+    CERTIFICATES.need("certs")
     from swarmwire.deploy.certificates.certificate_folder import revoke
     from swarmwire.deploy.certificates.files import REVOKED
     from swarmwire.deploy.certificates.register import Register

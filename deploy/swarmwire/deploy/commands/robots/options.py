@@ -1,13 +1,12 @@
 """Arguments that commands for robots share, and which robots they mean."""
 
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.extras import FLEET
 
 if TYPE_CHECKING:
     from swarmwire.deploy.fleet.fleet import Fleet, Robot
@@ -20,14 +19,11 @@ OfRobots = Annotated[
 OfGroups = Annotated[
     list[str] | None, typer.Option("--group", help="Only the robots of these groups. Repeatable.", metavar="NAMES")
 ]
-EXTRA = ("asyncssh", "cryptography", "pip")  # what `fleet` brings
 
 
 def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
-    """The fleet and the robots that are meant; SwarmwireError if what it takes to reach them is not installed."""
-    missing = [name for name in EXTRA if find_spec(name) is None]
-    if missing:
-        raise SwarmwireError(f'robots need {", ".join(missing)}, not installed: pip install "swarmwire[fleet]"')
+    """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
+    FLEET.need("robots")
     from swarmwire.deploy.fleet.fleet_file import read_fleet
 
     fleet = read_fleet(file)

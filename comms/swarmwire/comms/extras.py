@@ -1,0 +1,34 @@
+"""Extras: optional dependencies, and one error that gives the command to install what is missing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from swarmwire.comms.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Extra:
+    """An extra of a distribution, as pip takes it, and the modules that it installs."""
+
+    requirement: str
+    modules: tuple[str, ...]
+
+    def missing(self) -> Sequence[str]:
+        """The modules that are not installed."""
+        return [name for name in self.modules if find_spec(name) is None]
+
+    def need(self, what: str) -> None:
+        """BadInput, with `what` needs the modules in front, unless all of them are installed."""
+        if missing := self.missing():
+            raise BadInput(what, "", f'needs {" and ".join(missing)}: pip install "{self.requirement}"')
+
+
+CERTIFICATES = Extra("swarmwire[fleet]", ("cryptography",))
+CLUSTER = Extra("swarmwire[cluster]", ("dask", "distributed"))
+FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "pip"))
+REPORT = Extra("swarmwire-metrics[report]", ("matplotlib", "imageio_ffmpeg", "jinja2"))
+ROS2 = Extra("swarmwire-agent[ros2]", ("rosbags",))
+TUNE = Extra("swarmwire[tune]", ("optuna",))
+UI = Extra("swarmwire[ui]", ("fastapi", "uvicorn"))
+VIEW = Extra("swarmwire-metrics[view]", ("rerun", "rerun_bindings"))  # its wheel has 170 MB
