@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
@@ -35,20 +36,17 @@ from swarmwire.world.sensors import SENSORS, Scene
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Sensor, led_places_m
 
-LOWEST = np.nextafter(-np.pi, 0.0)
+_wrap_angle = njit()(wrap_angle)
 
 
 @njit()
 def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings as `angles.wrapped` has them."""
+    """Poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings in (-pi, pi]."""
     arenas, robots = state.shape[:2]
     pose, velocity = np.empty((arenas * robots, 3)), np.empty((arenas * robots, 3))
     for arena in range(arenas):
         for i in range(robots):
-            row, heading = arena * robots + i, state[arena, i, 2]
-            if not -np.pi < heading <= np.pi:
-                heading -= 2.0 * np.pi * np.ceil((heading - np.pi) / (2.0 * np.pi))
-                heading = min(max(heading, LOWEST), np.pi)
+            row, heading = arena * robots + i, _wrap_angle(state[arena, i, 2])
             pose[row, 0], pose[row, 1], pose[row, 2] = state[arena, i, 0], state[arena, i, 1], heading
             for column in range(3):
                 velocity[row, column] = state[arena, i, 3 + column]

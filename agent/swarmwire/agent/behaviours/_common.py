@@ -1,12 +1,9 @@
-"""Shared by behaviours: checks of parameters before a run, and the wrapping of angles."""
+"""Checks of parameters before a run, shared by behaviours."""
 
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from swarmwire.agent.parameters import BadParameter
-from swarmwire.comms.arrays import FloatArray
 
 
 def check_above_zero(params: Mapping[str, Any], *names: str) -> None:
@@ -34,8 +31,3 @@ def check_order(kind: type, params: Mapping[str, Any], lower: str, upper: str) -
     low, high = (params.get(name, getattr(kind, name)) for name in (lower, upper))
     if low > high:
         raise BadParameter(lower, f"expected at most {upper}, {high}; got {low}")
-
-
-def wrapped(angle_rad: FloatArray) -> FloatArray:
-    """The same directions within [-pi, pi)."""
-    return (angle_rad + np.pi) % (2.0 * np.pi) - np.pi

@@ -9,9 +9,10 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_share, wrapped
+from swarmwire.agent.behaviours._common import check_above_zero, check_share
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
+from swarmwire.comms.angles import wrap_by_modulo
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.messages import Message
 
@@ -28,7 +29,7 @@ W = TypeVar("W", bound=Walk)
 
 def begin_spells(state: Walk, rows: BoolArray, turn_rad: FloatArray, length_m: FloatArray | float) -> None:
     """The robots of the mask `rows` turn by `turn_rad`, (n,), and then go straight for `length_m`."""
-    np.copyto(state.turn_rad, wrapped(turn_rad), where=rows)
+    np.copyto(state.turn_rad, wrap_by_modulo(turn_rad), where=rows)
     np.copyto(state.left_m, length_m, where=rows)
 
 

@@ -4,9 +4,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import wrapped
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.comms.angles import wrap_by_modulo
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.messages import Message, f8
 
@@ -45,7 +45,7 @@ class Vicsek(VectorAgent):
         y = np.sin(own) + received.sum(np.sin(received.message.heading_rad))
         half = 0.5 * self.noise_rad
         wanted = np.arctan2(y, x) + robots.draw.uniform("noise of the direction", -half, half)
-        self._go(robots, wrapped(wanted - own))
+        self._go(robots, wrap_by_modulo(wanted - own))
         robots.radio.send(Direction, heading_rad=wanted)
 
     def _go(self, robots: Robots, turn: FloatArray) -> None:

@@ -21,6 +21,7 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.tracker import Tracker
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
@@ -151,8 +152,7 @@ def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
     (2.0, 1.5707963267948966)
     """
     dx_m, dy_m = sender.x_m - own.x_m, sender.y_m - own.y_m
-    turn_rad = math.remainder(math.atan2(dy_m, dx_m) - own.heading_rad, math.tau)
-    return math.hypot(dx_m, dy_m), math.pi if turn_rad <= -math.pi else turn_rad
+    return math.hypot(dx_m, dy_m), wrap_angle(math.atan2(dy_m, dx_m) - own.heading_rad)
 
 
 class ZenohRadio:

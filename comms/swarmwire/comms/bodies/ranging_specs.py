@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_by_atan2
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import parameter
@@ -18,9 +19,9 @@ FULL_DEG = 360.0
 SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by
 
 
-def within_a_turn(angle_rad: FloatArray) -> FloatArray:
-    """The angles wrapped into (-pi, pi]; the array is read-only."""
-    wrapped = np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
+def _directions(angle_rad: FloatArray) -> FloatArray:
+    """Directions in a body's frame, wrapped into one turn; read-only, since all robots share them."""
+    wrapped = wrap_by_atan2(angle_rad)
     wrapped.setflags(write=False)
     return wrapped
 
@@ -34,7 +35,7 @@ class RadialSpec(RangedSensorSpec):
     @cached_property
     def angle_rad(self) -> FloatArray:
         """The directions of the sensors in the body's frame, in (-pi, pi], (sensors,)."""
-        return within_a_turn(np.deg2rad(np.array(self.angles_deg, np.float64)))
+        return _directions(np.deg2rad(np.array(self.angles_deg, np.float64)))
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
@@ -162,7 +163,7 @@ class ScanSpec(RangedSensorSpec):
     @cached_property
     def angle_rad(self) -> FloatArray:
         """The directions of the rays in the body's frame, in (-pi, pi], (rays,)."""
-        return within_a_turn(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
+        return _directions(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from swarmwire.agent import behaviours
@@ -18,7 +17,6 @@ from swarmwire.agent.behaviours import (
     SmoothedAvoidance,
     SmoothedAvoidanceProximity,
 )
-from swarmwire.agent.behaviours._common import wrapped
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 
 ABOVE_ZERO: dict[type, tuple[str, ...]] = {
@@ -89,9 +87,3 @@ def test_a_subclass_keeps_the_limits_with_its_own_defaults() -> None:
 @pytest.mark.parametrize("kind", [getattr(behaviours, name) for name in behaviours.__all__])
 def test_every_behaviour_takes_its_own_defaults(kind: type) -> None:
     checked(kind, {name: parameter.default for name, parameter in parameters_of(kind).items()})
-
-
-def test_angles_of_other_turns_come_within_half_a_turn_to_either_side_the_left_end_left_out() -> None:
-    turns = np.array([0.0, 1.0, 4.0, -4.0, 7.0, np.pi, -np.pi])
-    expected = [0.0, 1.0, 4.0 - 2.0 * np.pi, 2.0 * np.pi - 4.0, 7.0 - 2.0 * np.pi, -np.pi, -np.pi]
-    assert wrapped(turns) == pytest.approx(expected)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.draws import normal, purpose, uniform
-from swarmwire.world.placement.placement import wrapped
 from swarmwire.world.sensors.pipeline import Stages
 from swarmwire.world.sensors.sensor import Field, Noise
 
@@ -67,7 +67,7 @@ def test_steps_come_after_noise_and_the_range_after_steps() -> None:
 @given(st.floats(-50, 50))
 def test_angles_are_wrapped_last_bit_for_bit_as_everywhere(angle: float) -> None:
     told = through(Field("value", angle=True), angle)
-    assert np.array_equal(told, np.broadcast_to(wrapped(np.array(angle)), (2, 5)))
+    assert np.array_equal(told, np.broadcast_to(wrap_angles(np.array(angle)), (2, 5)))
 
 
 @pytest.mark.parametrize("nothing", [np.inf, -np.inf, np.nan])

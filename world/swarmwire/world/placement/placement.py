@@ -12,6 +12,7 @@ from math import inf
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.arrays import FloatArray, KeyArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
@@ -34,13 +35,6 @@ from swarmwire.world.scenario.tables import AtPoses, CylinderTable, ObstacleTabl
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
 NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
-
-
-def wrapped(angle_rad: FloatArray) -> FloatArray:
-    """Angles of any shape in (-pi, pi]; those already there keep their bits."""
-    turned = angle_rad - 2.0 * np.pi * np.ceil((angle_rad - np.pi) / (2.0 * np.pi))
-    turned = np.clip(turned, np.nextafter(-np.pi, 0.0), np.pi)  # the last bit of the product may step over an end
-    return np.where((angle_rad > -np.pi) & (angle_rad <= np.pi), angle_rad, turned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +156,8 @@ def _fixed(table: RobotsTable) -> FloatArray:
 
 def _headings(table: PlaceTable, group: Group, key: np.uint64) -> FloatArray:
     if isinstance(table, AtPoses):
-        return wrapped(np.array(table.poses, np.float64)[:, 2])
+        return wrap_angles(np.array(table.poses, np.float64)[:, 2])
     if table.heading_rad is not None:
-        return wrapped(np.full(group.stop - group.start, table.heading_rad))
+        return wrap_angles(np.full(group.stop - group.start, table.heading_rad))
     keys: KeyArray = np.array(key, np.uint64)
     return np.pi - 2.0 * np.pi * uniform(keys, np.arange(group.start, group.stop), 0, 0, HEADING)

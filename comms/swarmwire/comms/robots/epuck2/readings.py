@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import ScanSpec, within_a_turn
+from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S
 
@@ -119,7 +120,7 @@ class Compass:
             wide = field_ut.astype(np.float64)  # the wire has half that
         x, y = wide[..., 0] - self.offset_x_ut, wide[..., 1] - self.offset_y_ut
         ahead, left = (-x, y) if self.chip == CHIPS[0] else (y, x)
-        return within_a_turn(self.north_rad - np.arctan2(left, ahead))
+        return wrap_angles(self.north_rad - np.arctan2(left, ahead))
 
     def field_ut(self, heading_rad: FloatArray, level_ut: float, down_ut: float) -> FloatArray:
         """What the magnetometer of a robot that heads there (n,) reads (n, 3) in a field of such strength."""

@@ -4,11 +4,12 @@
 poses of a real base.
 """
 
-from math import atan2, cos, hypot, isfinite, isnan, nan, pi, radians, remainder, sin
+from math import atan2, cos, hypot, isfinite, isnan, nan, radians, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.errors import BadFrame
@@ -35,12 +36,6 @@ def yaw_of(quaternion: Any) -> float:
 def quaternion(messages: Messages, yaw_rad: float) -> Any:
     """The quaternion of a yaw."""
     return messages.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, sin(0.5 * yaw_rad), cos(0.5 * yaw_rad))
-
-
-def within_turn(angle_rad: float) -> float:
-    """The angle wrapped into (-pi, pi]."""
-    wrapped = remainder(angle_rad, 2.0 * pi)
-    return pi if wrapped == -pi else wrapped
 
 
 class WheelPoses:
@@ -75,7 +70,7 @@ class WheelPoses:
         linear_mps, angular_radps = map(float, self.speed[base])
         make, unknown = messages.make, np.zeros(36)
         place = make("geometry_msgs/msg/Point", x_m, y_m, 0.0)
-        pose = make("geometry_msgs/msg/Pose", place, quaternion(messages, within_turn(turn_rad)))
+        pose = make("geometry_msgs/msg/Pose", place, quaternion(messages, wrap_angle(turn_rad)))
         linear = make("geometry_msgs/msg/Vector3", linear_mps, 0.0, 0.0)
         angular = make("geometry_msgs/msg/Vector3", 0.0, 0.0, angular_radps)
         twist = make("geometry_msgs/msg/Twist", linear, angular)
@@ -118,7 +113,7 @@ class WheelTravel:
         self._last = at, (x_m, y_m, yaw_rad)
 
     def _add(self, by: Pose, yaw_rad: float, for_s: float) -> None:
-        chord_m, turn_rad = hypot(by[0], by[1]), within_turn(by[2])
+        chord_m, turn_rad = hypot(by[0], by[1]), wrap_angle(by[2])
         if chord_m > JUMP_FACTOR * self._max_mps * max(for_s, 0.0) + JUMP_MARGIN_M:
             self.jumps += 1
             return
@@ -152,7 +147,7 @@ def motion_of(message: Any, north_deg: float) -> Motion:
         acceleration.x if has_acceleration else nan,
         acceleration.y if has_acceleration else nan,
         turn.z if message.angular_velocity_covariance[0] != -1.0 else nan,
-        within_turn(yaw_rad + radians(north_deg)) if not isnan(yaw_rad) else nan,
+        wrap_angle(yaw_rad + radians(north_deg)) if not isnan(yaw_rad) else nan,
     )
 
 
@@ -161,7 +156,7 @@ def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> 
     make = messages.make
     known = not isnan(motion.forward_mps2 + motion.left_mps2)
     turn_radps, heading_rad = motion.turn_radps, motion.heading_rad
-    yaw_rad = 0.0 if isnan(heading_rad) else within_turn(heading_rad - radians(north_deg))
+    yaw_rad = 0.0 if isnan(heading_rad) else wrap_angle(heading_rad - radians(north_deg))
     forward_mps2, left_mps2 = (motion.forward_mps2, motion.left_mps2) if known else (0.0, 0.0)
     return make(
         IMU,
