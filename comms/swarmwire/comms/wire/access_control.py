@@ -10,7 +10,7 @@ the endpoints of a run.
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import Keys, ObserverKeys, SwarmKeys, fault_of_name
@@ -18,10 +18,58 @@ from swarmwire.comms.wire.network import Network
 
 TRACKER, OPERATOR, WORLD = "tracker", "operator", "world"  # default names on their certificates
 ANY = "*"  # any runner, or any run
-LOCAL = {"link_protocols": ["unixsock-stream"]}
-LIVELINESS = ["liveliness_query", "declare_liveliness_subscriber"]
-Right = tuple[list[str], list[str]]  # kinds of messages as zenoh names them, and their allowed keys
-Rights = list[tuple[list[str], list[str]]]
+LIVELINESS = "liveliness_query declare_liveliness_subscriber"
+ANSWERS = "declare_queryable reply"
+Rights = list[tuple[str, list[str]]]  # kinds of messages as zenoh names them, and their allowed keys
+
+
+class Member(NamedTuple):
+    """The member at the other end of a link: the messages that may come from it, and those that may go to it."""
+
+    sends: Rights
+    receives: Rights
+
+
+def _rules(members: Mapping[str, Member], local: Member | None = None) -> dict[str, Any]:
+    """The value of `access_control` for members by the names on their certificates.
+
+    `local` are programs of this machine that connect by a unix socket, which needs no certificate.
+    """
+    # A subject without names would match every member; so each subject has one name.
+    subjects: list[dict[str, Any]] = [{"id": name, "cert_common_names": [name]} for name in members]
+    if local is not None:
+        subjects.append({"id": "local", "link_protocols": ["unixsock-stream"]})
+        members = {**members, "local": local}
+    ids = dict[tuple[str, str, tuple[str, ...]], str]()  # of each rule, which members share
+    policies = list[dict[str, Any]]()
+    for name, member in members.items():
+        rights = [("ingress", *right) for right in member.sends] + [("egress", *right) for right in member.receives]
+        rules = [
+            ids.setdefault((flow, messages, tuple(keys)), f"{flow} {len(ids)}")
+            for flow, messages, keys in rights
+            if keys
+        ]
+        policies.append({"subjects": [name], "rules": rules})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": [
+            {"id": id_, "permission": "allow", "flows": [flow], "messages": messages.split(), "key_exprs": list(keys)}
+            for (flow, messages, keys), id_ in ids.items()
+        ],
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _check_names(names: Sequence[str], where: str, expected: str) -> None:
+    """BadInput for an invalid name, and with `expected` for a repeated one."""
+    for name in names:
+        fault = fault_of_name(name)
+        if fault is not None:  # a `*` in it would match the keys of all members
+            raise BadInput(where, name, fault)
+        if names.count(name) > 1:
+            raise BadInput(where, name, expected)
 
 
 # The robots' network. Each peer checks for itself: a message that arrives must be one that its sender may send
@@ -58,75 +106,43 @@ def access_control(
 
     `robots` are all names in the swarm. BadInput for an invalid or repeated name, or if `own` is unknown or revoked.
     """
-    _check([*robots, tracker, operator], own, revoked)
-    rights = {robot: _rights_of_robot(keys, robot) for robot in robots}
-    rights |= {tracker: _rights_of_tracker(keys), operator: _rights_of_operator(keys)}
-    members = [name for name in rights if name not in revoked]
-    egress = [_rule(f"of own {i}", "egress", right) for i, right in enumerate(rights[own])]
-    rules, policies = list(egress), list[dict[str, Any]]()
-    for name in members:
-        ingress = [_rule(f"{name} {i}", "ingress", right) for i, right in enumerate(rights[name])]
-        rules += ingress
-        policies.append({"subjects": [name], "rules": [rule["id"] for rule in (*ingress, *egress)]})
-    # A subject without names would match every member; so each subject has one name.
-    subjects = [{"id": name, "cert_common_names": [name]} for name in members]
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    }
-
-
-def _rights_of_robot(keys: SwarmKeys, robot: str) -> list[Right]:
-    return [
-        (["put"], [keys.any_radio_of(robot), keys.bridge_sent(robot)]),
-        (["liveliness_token"], [keys.alive(robot)]),
-        (["declare_queryable", "reply"], [keys.control(robot)]),
-        (["query"], [keys.bridge_join(robot)]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_pose, keys.bridge_received(robot)]),
-        _liveliness_rights(keys),
-    ]
-
-
-def _rights_of_tracker(keys: SwarmKeys) -> list[Right]:
-    return [
-        (["put"], [keys.any_pose, keys.bridge_received("*")]),
-        (["declare_queryable", "reply"], [keys.any_bridge_join]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_bridge_sent]),
-        _liveliness_rights(keys),
-    ]
-
-
-def _rights_of_operator(keys: SwarmKeys) -> list[Right]:
-    return [
-        (["query"], [keys.any_control]),
-        (["declare_subscriber"], [keys.any_radio, keys.any_pose]),
-        _liveliness_rights(keys),
-    ]
-
-
-def _liveliness_rights(keys: SwarmKeys) -> Right:
-    return ["liveliness_query", "declare_liveliness_subscriber"], [keys.alive("*")]
-
-
-def _rule(name: str, flow: str, right: Right) -> dict[str, Any]:
-    messages, keys = right
-    return {"id": name, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys}
-
-
-def _check(names: Sequence[str], own: str, revoked: Collection[str]) -> None:
-    for name in names:
-        fault = fault_of_name(name)
-        if fault is not None:  # a `*` in it would match the keys of all members
-            raise BadInput("network", name, fault)
-        if names.count(name) > 1:
-            raise BadInput("network", name, "expected names that differ: of each robot, of tracker and operator")
+    names = [*robots, tracker, operator]
+    _check_names(names, "network", "expected names that differ: of each robot, of tracker and operator")
     if own not in names:
-        raise BadInput("network", own, f"expected the name of a robot, {names[-2]} or {names[-1]}")
+        raise BadInput("network", own, f"expected the name of a robot, {tracker} or {operator}")
     if own in revoked:
         raise BadInput("network", own, "its certificate is revoked: expected a name that is not")
+    rights = {robot: _rights_of_robot(keys, robot) for robot in robots}
+    rights |= {tracker: _rights_of_tracker(keys), operator: _rights_of_operator(keys)}
+    return _rules({name: Member(rights[name], rights[own]) for name in names if name not in revoked})
+
+
+def _rights_of_robot(keys: SwarmKeys, robot: str) -> Rights:
+    return [
+        ("put", [keys.any_radio_of(robot), keys.bridge_sent(robot)]),
+        ("liveliness_token", [keys.alive(robot)]),
+        (ANSWERS, [keys.control(robot)]),
+        ("query", [keys.bridge_join(robot)]),
+        ("declare_subscriber", [keys.any_radio, keys.any_pose, keys.bridge_received(robot)]),
+        (LIVELINESS, [keys.alive(ANY)]),
+    ]
+
+
+def _rights_of_tracker(keys: SwarmKeys) -> Rights:
+    return [
+        ("put", [keys.any_pose, keys.bridge_received(ANY)]),
+        (ANSWERS, [keys.any_bridge_join]),
+        ("declare_subscriber", [keys.any_radio, keys.any_bridge_sent]),
+        (LIVELINESS, [keys.alive(ANY)]),
+    ]
+
+
+def _rights_of_operator(keys: SwarmKeys) -> Rights:
+    return [
+        ("query", [keys.any_control]),
+        ("declare_subscriber", [keys.any_radio, keys.any_pose]),
+        (LIVELINESS, [keys.alive(ANY)]),
+    ]
 
 
 # The endpoints of a run. A unix socket, which only programs of its owner can open, needs no certificate and has the
@@ -139,6 +155,8 @@ def _check(names: Sequence[str], own: str, revoked: Collection[str]) -> None:
 #
 # A rule matches whole keys only, so the rules of a runner must include the world's subscription answer/*
 # (`any_answer`): with a rule for answer/R alone R would not learn of the subscription, and would send nothing at all.
+
+ROLES = ("runners", "observers", "operators", "routers", "worlds")
 
 
 @dataclass(frozen=True)
@@ -163,54 +181,37 @@ class RunAccess:
 
     def check(self, where: str = "access") -> None:
         """BadInput for an invalid or repeated name."""
-        named = [*self.runners, *self.observers, *self.operators, *self.routers, *self.worlds]
-        for name in named:
-            fault = fault_of_name(name)
-            if fault is not None:  # a `*` in it would match the keys of all members
-                raise BadInput(where, name, fault)
-            if named.count(name) > 1:
-                raise BadInput(where, name, "expected each name once, for one purpose")
+        names = [name for role in ROLES for name in cast("tuple[str, ...]", getattr(self, role))]
+        _check_names(names, where, "expected each name once, for one purpose")
 
     def without_revoked(self) -> "RunAccess":
         """A copy without the revoked names in the other lists."""
-
-        def valid(names: Iterable[str]) -> tuple[str, ...]:
-            return tuple(name for name in names if name not in self.revoked)
-
+        named = {role: cast("tuple[str, ...]", getattr(self, role)) for role in ROLES}
         return replace(
-            self,
-            runners=valid(self.runners),
-            observers=valid(self.observers),
-            operators=valid(self.operators),
-            routers=valid(self.routers),
-            worlds=valid(self.worlds),
+            self, **{role: tuple(name for name in names if name not in self.revoked) for role, names in named.items()}
         )
+
+    def valid(self) -> "RunAccess":
+        """`without_revoked`, after a `check`."""
+        self.check()
+        return self.without_revoked()
 
 
 def agents_access(keys: Keys, access: RunAccess) -> dict[str, Any]:
     """The value of `access_control` for the agents' endpoint of a world. BadInput for invalid names."""
-    access.check()
-    access = access.without_revoked()
-    rules = _Rules()
-    for name in access.runners:
-        rules.add(name, _cn(name), ingress=_from_runner(keys, [name]), egress=_to_runner(keys, [name]))
-    for name in access.routers:
-        rules.add(name, _cn(name), ingress=_from_runner(keys, access.runners), egress=_to_runner(keys, access.runners))
-    rules.add("local", LOCAL, ingress=_from_runner(keys, [ANY]), egress=_to_runner(keys, [ANY]))
-    return rules.as_mapping()
+    access = access.valid()
+    members = {name: _runners(keys, [name]) for name in access.runners}
+    members |= dict.fromkeys(access.routers, _runners(keys, access.runners))
+    return _rules(members, local=_runners(keys, [ANY]))
 
 
 def observers_access(keys: ObserverKeys, access: RunAccess) -> dict[str, Any]:
     """The value of `access_control` for the observers' endpoint of a world. BadInput for invalid names."""
-    access.check()
-    access = access.without_revoked()
-    rules = _Rules()
-    for name in access.observers:
-        rules.add(name, _cn(name), ingress=_from_observer(keys), egress=_to_observer(keys))
-    for name in (*access.operators, *access.routers):
-        rules.add(name, _cn(name), ingress=_from_operator(keys), egress=_to_operator(keys))
-    rules.add("local", LOCAL, ingress=_from_operator(keys), egress=_to_operator(keys))
-    return rules.as_mapping()
+    access = access.valid()
+    observer = _observer(keys, [keys.scene, keys.status])
+    operator = _observer(keys, [keys.scene, keys.status, keys.control])
+    members = dict.fromkeys(access.observers, observer)
+    return _rules(members | dict.fromkeys((*access.operators, *access.routers), operator), local=operator)
 
 
 def router_access(access: RunAccess) -> dict[str, Any]:
@@ -218,98 +219,44 @@ def router_access(access: RunAccess) -> dict[str, Any]:
 
     `access` names the routers on both sides of it. BadInput for invalid names.
     """
-    access.check()
-    access = access.without_revoked()
-    keys, rules = Keys(ANY), _Rules()
-    from_runners, to_runners = _from_runner(keys, access.runners), _to_runner(keys, access.runners)
-    for name in access.runners:
-        rules.add(name, _cn(name), ingress=_from_runner(keys, [name]), egress=_to_runner(keys, [name]))
-    for name in access.routers:
-        rules.add(name, _cn(name), ingress=from_runners + to_runners, egress=to_runners + from_runners)
-    for name in access.worlds:
-        rules.add(name, _cn(name), ingress=to_runners, egress=from_runners)
-    return rules.as_mapping()
+    access = access.valid()
+    keys = Keys(ANY)
+    from_runners, to_runners = _runners(keys, access.runners)
+    members = {name: _runners(keys, [name]) for name in access.runners}
+    members |= dict.fromkeys(access.routers, Member(from_runners + to_runners, to_runners + from_runners))
+    return _rules(members | dict.fromkeys(access.worlds, Member(to_runners, from_runners)))
 
 
-def _from_runner(keys: Keys, names: Iterable[str]) -> Rights:
-    """The messages that runners of these names send."""
+def _runners(keys: Keys, names: Iterable[str]) -> Member:
+    """The messages between a world and runners of these names."""
     names = list(names)
-    return [
-        (["put"], [keys.answer(name) for name in names]),
-        (["declare_subscriber"], [keys.frame(name) for name in names]),
-        (["query"], [key for name in names for key in (keys.offer(name), keys.join(name))]),
-        (["liveliness_token"], [keys.alive(name) for name in names]),
-        (LIVELINESS, [keys.world, Keys(ANY).world]),
-    ]
+    joins = [key for name in names for key in (keys.offer(name), keys.join(name))]
+    return Member(
+        sends=[
+            ("put", [keys.answer(name) for name in names]),
+            ("declare_subscriber", [keys.frame(name) for name in names]),
+            ("query", joins),
+            ("liveliness_token", [keys.alive(name) for name in names]),
+            (LIVELINESS, [keys.world, Keys(ANY).world]),
+        ],
+        receives=[
+            ("put", [keys.frame(name) for name in names]),
+            ("declare_subscriber", [keys.answer(ANY)]),
+            ("declare_queryable", [keys.offer(ANY), keys.join(ANY)]),
+            ("reply", joins),
+            ("liveliness_token", [keys.world]),
+            (LIVELINESS, [keys.alive(ANY)]),
+        ],
+    )
 
 
-def _to_runner(keys: Keys, names: Iterable[str]) -> Rights:
-    """The messages that a world sends to runners of these names."""
-    names = list(names)
-    return [
-        (["put"], [keys.frame(name) for name in names]),
-        (["declare_subscriber"], [keys.answer(ANY)]),
-        (["declare_queryable"], [keys.offer(ANY), keys.join(ANY)]),
-        (["reply"], [key for name in names for key in (keys.offer(name), keys.join(name))]),
-        (["liveliness_token"], [keys.world]),
-        (LIVELINESS, [keys.alive(ANY)]),
-    ]
-
-
-def _from_observer(keys: ObserverKeys) -> Rights:
-    return [
-        (["declare_subscriber"], [keys.truth]),
-        (["query"], [keys.scene, keys.status]),
-        (LIVELINESS, [keys.published, ObserverKeys(ANY).published]),
-    ]
-
-
-def _to_observer(keys: ObserverKeys) -> Rights:
-    return [
-        (["put"], [keys.truth]),
-        (["declare_queryable", "reply"], [keys.scene, keys.status]),
-        (["liveliness_token"], [keys.published]),
-    ]
-
-
-def _from_operator(keys: ObserverKeys) -> Rights:
-    return [*_from_observer(keys), (["query"], [keys.control])]
-
-
-def _to_operator(keys: ObserverKeys) -> Rights:
-    return [*_to_observer(keys), (["declare_queryable", "reply"], [keys.control])]
-
-
-def _cn(name: str) -> dict[str, Any]:
-    return {"cert_common_names": [name]}
-
-
-class _Rules:
-    """A builder of zenoh's rules, subjects and policies; the default is to deny."""
-
-    def __init__(self) -> None:
-        self._rules = list[dict[str, Any]]()
-        self._subjects = list[dict[str, Any]]()
-        self._policies = list[dict[str, Any]]()
-
-    def add(self, name: str, identity: Mapping[str, Any], *, ingress: Rights, egress: Rights) -> None:
-        """Add a member: the messages that may come from it, and those that may go to it."""
-        ids = list[str]()
-        for flow, rights in (("ingress", ingress), ("egress", egress)):
-            for i, (messages, keys) in enumerate(rights):
-                if keys:
-                    ids.append(f"{name} {flow} {i}")
-                    rule = {"id": ids[-1], "permission": "allow", "flows": [flow]}
-                    self._rules.append({**rule, "messages": messages, "key_exprs": keys})
-        self._subjects.append({"id": name, **identity})
-        self._policies.append({"subjects": [name], "rules": ids})
-
-    def as_mapping(self) -> dict[str, Any]:
-        """The value of zenoh's `access_control`."""
-        return {
-            "enabled": True,
-            "default_permission": "deny",
-            "rules": self._rules,
-            "subjects": self._subjects,
-            "policies": self._policies,
-        }
+def _observer(keys: ObserverKeys, queries: list[str]) -> Member:
+    """The messages between a world and an observer that may query these keys."""
+    return Member(
+        sends=[
+            ("declare_subscriber", [keys.truth]),
+            ("query", queries),
+            (LIVELINESS, [keys.published, ObserverKeys(ANY).published]),
+        ],
+        receives=[("put", [keys.truth]), (ANSWERS, queries), ("liveliness_token", [keys.published])],
+    )

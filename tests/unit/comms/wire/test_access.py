@@ -145,6 +145,12 @@ def test_what_is_not_named_is_refused_and_who_is_revoked_is_not_named(access: di
     assert "gone" not in str(access)
 
 
+def test_members_of_equal_rights_share_their_rules() -> None:
+    one, many = (observers_access(SEEN, RunAccess(observers=("a", "b", "c")[:count])) for count in (1, 3))
+    assert many["rules"] == one["rules"]
+    assert len({tuple(policy["rules"]) for policy in many["policies"] if policy["subjects"] != ["local"]}) == 1
+
+
 @pytest.mark.parametrize(
     ("access", "fault"),
     [
