@@ -8,7 +8,7 @@ from subprocess import PIPE, Popen
 
 from tests.release.built import Installed, bare
 
-ON_ROBOTS = {"eclipse-zenoh", "msgpack", "numpy", "swarmwire-agent", "swarmwire-comms"}
+ON_ROBOTS = {"eclipse-zenoh", "msgpack", "msgspec", "numpy", "swarmwire-agent", "swarmwire-comms"}
 QUICK = ("--set", "duration_s=0.5", "--set", "physics.engine=pymunk")
 PLACES = "import json, sys, swarmwire; print(json.dumps([sys.prefix, *swarmwire.__path__]))"
 LISTED = "import importlib.metadata as m, json; print(json.dumps([of.name for of in m.distributions()]))"

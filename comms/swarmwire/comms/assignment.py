@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from swarmwire.comms.arrays import IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.wire.frames import typed
 
 
 @dataclass(frozen=True)
@@ -71,50 +73,47 @@ class Assignment:
     @classmethod
     def from_mapping(cls, mapping: dict[str, Any]) -> "Assignment":
         """The assignment that `as_mapping` wrote down; BadFrame for other values."""
-        try:
-            measures = None if mapping["measures"] is None else _texts(mapping["measures"])
-            return cls(tuple(_group(group) for group in mapping["groups"]), _whole(mapping["rate_hz"]), measures)
-        except (KeyError, TypeError, ValueError, OverflowError, BadInput) as error:
-            raise BadFrame("malformed", f"expected robots: {' '.join(str(error).split())}") from error
+        frame = typed(_AssignmentFrame, mapping, "assignment")
+        return cls(tuple(map(_group, frame.groups)), frame.rate_hz, frame.measures)
 
 
-def _group(values: Any) -> GroupAssignment:
-    group = GroupAssignment(
-        name=_text(values["name"]),
-        agent=_text(values["agent"]),
-        params=values["params"],
-        body=body_from_mapping(values["body"], where="assignment"),
-        rows=np.array(values["rows"], np.int64),
-        robot_names=_texts(values["robot_names"]),
-        keys=np.array(values["keys"], np.uint64),
-        act_every_ticks=_whole(values["act_every_ticks"]),
+Whole = Annotated[int, Meta(ge=1, lt=2**31)]
+
+
+class _GroupFrame(Struct):
+    """A `GroupAssignment` on the wire."""
+
+    name: str
+    agent: str
+    params: dict[str, Any]
+    body: dict[str, Any]
+    rows: Annotated[list[Annotated[int, Meta(ge=0, le=2**63 - 1)]], Meta(min_length=1)]
+    robot_names: tuple[str, ...]
+    keys: list[Annotated[int, Meta(ge=0)]]
+    act_every_ticks: Whole
+
+
+class _AssignmentFrame(Struct):
+    """An `Assignment` on the wire."""
+
+    groups: list[_GroupFrame]
+    rate_hz: Whole
+    measures: tuple[str, ...] | None
+
+
+def _group(group: _GroupFrame) -> GroupAssignment:
+    rows = np.array(group.rows, np.int64)
+    if (rows[1:] <= rows[:-1]).any():
+        raise BadFrame("malformed", "rows: expected robots by rising numbers")
+    if not len(group.robot_names) == len(group.keys) == len(rows):
+        raise BadFrame("malformed", "robot_names, keys: expected one for each of the rows")
+    try:
+        body, keys = body_from_mapping(group.body, where="assignment"), np.array(group.keys, np.uint64)
+    except (BadInput, OverflowError) as error:
+        raise BadFrame("malformed", str(error)) from error
+    return GroupAssignment(
+        group.name, group.agent, group.params, body, rows, group.robot_names, keys, group.act_every_ticks
     )
-    rows = group.rows
-    if rows.ndim != 1 or not len(rows) or rows[0] < 0 or (rows[1:] <= rows[:-1]).any():
-        raise ValueError("rows: robots by rising numbers")
-    if len(group.robot_names) != len(rows) or group.keys.shape != rows.shape:
-        raise ValueError("robot_names, keys: one for each of the rows")
-    if type(values["params"]) is not dict or not all(type(name) is str for name in group.params):
-        raise ValueError("params: a map")
-    return group
-
-
-def _text(value: object) -> str:
-    if type(value) is not str:
-        raise TypeError(f"a text, not {str(value)[:40]}")
-    return value
-
-
-def _texts(values: Any) -> tuple[str, ...]:
-    if type(values) is not list:
-        raise TypeError(f"a list of texts, not {str(values)[:40]}")
-    return tuple(_text(value) for value in cast("list[object]", values))
-
-
-def _whole(value: object) -> int:
-    if type(value) is not int or not 0 < value < 2**31:
-        raise ValueError(f"a whole number above 0, not {str(value)[:40]}")
-    return value
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:

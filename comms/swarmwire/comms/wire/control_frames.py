@@ -9,7 +9,7 @@ import msgpack
 
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.wire.frames import unpacked
+from swarmwire.comms.wire.frames import typed, unpacked
 
 CONTROL_VERSION = 1
 MAX_BYTES = 64 * 1024  # of a request
@@ -49,7 +49,7 @@ def encode_request(request: ControlRequest) -> bytes:
 def decode_request(data: bytes) -> ControlRequest:
     """The request in these bytes; BadInput states the expectation in one line."""
     try:
-        values = _map_of(data, MAX_BYTES)
+        values = typed(dict[str, Any], unpacked(data, MAX_BYTES), "request")
     except BadFrame as fault:
         raise BadInput("", "", f"expected a request: {fault}") from None
     if type(values.get("v")) is not int or values["v"] != CONTROL_VERSION:
@@ -72,7 +72,7 @@ def encode_reply(reply: Mapping[str, Any]) -> bytes:
 
 def decode_reply(data: bytes) -> dict[str, Any]:
     """The reply in these bytes; BadFrame if they hold none."""
-    reply = _map_of(data, MAX_REPLY_BYTES)
+    reply = typed(dict[str, Any], unpacked(data, MAX_REPLY_BYTES), "reply")
     if type(reply.get("v")) is not int or reply["v"] != CONTROL_VERSION:
         raise BadFrame("malformed", f"version {reply.get('v')!r} of control, expected {CONTROL_VERSION}")
     return reply
@@ -97,13 +97,6 @@ def _value(do: str, value: object) -> Any:
             return table
     expected = 'expected a table as in a scenario, such as { do = "kill", robots = { count = 3 } }'
     raise BadInput("", "event", f"{expected}; got {_shown(cast('object', value))}")
-
-
-def _map_of(data: bytes, max_bytes: int) -> dict[str, Any]:
-    body: object = unpacked(data, max_bytes)
-    if type(body) is not dict or not all(type(name) is str for name in cast("dict[object, object]", body)):
-        raise BadFrame("malformed", "expected a map with texts as keys")
-    return cast("dict[str, Any]", body)
 
 
 def _shown(value: object) -> str:

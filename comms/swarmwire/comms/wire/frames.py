@@ -10,9 +10,10 @@ seventy times as much memory.
 
 from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import msgpack
+import msgspec
 import numpy as np
 from msgpack.exceptions import UnpackException
 
@@ -26,6 +27,8 @@ DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 BOOL = DTYPES["|b1"]
 UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
 MAX_ITEMS = 500_000  # lists, maps and their items: some 40 MB; each array of a frame is one item
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,19 @@ def unpacked(data: bytes, max_bytes: int) -> Any:
         return msgpack.unpackb(data) if len(data) <= UNCOUNTED_BYTES else _counted(data)
     except (ValueError, UnpackException) as error:
         raise BadFrame("malformed", f"no msgpack: {error}") from error
+
+
+def typed(kind: type[T], value: object, key: str) -> T:
+    """A value of maps, lists and plain values as an instance of a type; BadFrame for a value of another type.
+
+    The error has the path of the value that does not fit, which begins with `key`, and the expectation. A dataclass
+    ignores unknown keys, a `Struct` can refuse them. A truth value is no number; NaN is one, unless it has bounds.
+    """
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        fault, _, path = str(error).partition(" - at `$")
+        raise BadFrame("malformed", f"{key}{path.rstrip('`')}: {fault[0].lower()}{fault[1:]}") from None
 
 
 def _counted(data: bytes) -> Any:

@@ -5,19 +5,19 @@ the memory of a world and on the other runners: messages beyond them are refused
 reach the world. They do not bound the runner's share of the machine: see docs/security.md.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, cast
+from typing import Annotated, Any
 
 import msgpack
+from msgspec import Meta
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, unpacked
+from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, typed, unpacked
 
 MAX_JOIN_BYTES = 1024 * 1024
-SHA256 = re.compile(r"[0-9a-f]{64}", re.ASCII)
+Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 
 
 @dataclass(frozen=True)
@@ -91,38 +91,7 @@ class SessionInfo:
     @classmethod
     def decode(cls, data: bytes) -> "SessionInfo":
         """The session info in these bytes; BadFrame if they hold none, "version" if they are of another version."""
-        values = versioned(data, frames.MAX_BYTES)  # with the names of all robots
-        try:
-            groups = tuple(_group(group) for group in values["groups"])
-            factor = None if values["real_time"] is None else float(values["real_time"])
-            return cls(**_typed(values, _SESSION_TYPES), real_time=factor, groups=groups)
-        except (KeyError, TypeError, ValueError) as error:
-            raise BadFrame("malformed", f"expected an offer: {error}") from error
-
-
-_SESSION_TYPES: Mapping[str, type] = {
-    "run": str,
-    "scenario": str,
-    "scenario_sha256": str,
-    "swarmwire": str,
-    "rate_hz": int,
-}
-_GROUP_TYPES: Mapping[str, type] = {"name": str, "agent": str, "agent_sha256": str, "robots": int}
-
-
-def _group(values: Any) -> GroupInfo:
-    free: Any = values["free"]
-    if type(free) is not list or not all(type(name) is str for name in cast("list[object]", free)):
-        raise TypeError("free is no list of texts")
-    return GroupInfo(**_typed(values, _GROUP_TYPES), free=tuple(cast("list[str]", free)))
-
-
-def _typed(values: Mapping[str, Any], types: Mapping[str, type]) -> dict[str, Any]:
-    """The values of these names, each of its type; TypeError or KeyError otherwise."""
-    for name, kind in types.items():
-        if type(values[name]) is not kind:
-            raise TypeError(f"{name} is no {kind.__name__}")
-    return {name: values[name] for name in types}
+        return typed(cls, versioned(data, frames.MAX_BYTES), "offer")  # with the names of all robots
 
 
 @dataclass(frozen=True)
@@ -136,10 +105,10 @@ class JoinRequest:
         scenario_sha256: of the expected scenario; None: any.
     """
 
-    robots: int | None = None
-    names: tuple[str, ...] | None = None
-    agents: Mapping[str, str] | None = None
-    scenario_sha256: str | None = None
+    robots: Annotated[int, Meta(ge=1)] | None = None
+    names: Annotated[tuple[str, ...], Meta(min_length=1)] | None = None
+    agents: Mapping[str, Sha256] | None = None
+    scenario_sha256: Sha256 | None = None
 
     def encode(self) -> bytes:
         """The request as bytes."""
@@ -148,39 +117,16 @@ class JoinRequest:
     @classmethod
     def decode(cls, data: bytes) -> "JoinRequest":
         """The request of these bytes; BadFrame if they are none, "version" if they are of another version."""
-        values = versioned(data)
-        robots, names, agents = values.get("robots"), values.get("names"), cast("object", values.get("agents"))
-        scenario: object = values.get("scenario_sha256")
-        if robots is not None and (type(robots) is not int or robots < 1):
-            raise BadFrame("malformed", "robots: expected a number of at least 1")
-        if names is not None and not (type(names) is list and names and _texts(cast("list[object]", names))):
-            raise BadFrame("malformed", "names: expected a list of names of robots")
-        if robots is not None and names is not None:
+        request = typed(cls, versioned(data), "request")
+        if request.robots is not None and request.names is not None:
             raise BadFrame("malformed", "expected robots or names, not both")
-        if agents is not None and (type(agents) is not dict or not _hashes(cast("dict[object, object]", agents))):
-            raise BadFrame("malformed", "agents: expected the sha256 of an agent by group")
-        if scenario is not None and not (isinstance(scenario, str) and SHA256.fullmatch(scenario)):
-            raise BadFrame("malformed", "scenario_sha256: expected 64 hexadecimal digits")
-        robot_names = None if names is None else tuple(cast("list[str]", names))
-        return cls(robots, robot_names, cast("dict[str, str] | None", agents), scenario)
+        return request
 
 
 def versioned(data: bytes, max_bytes: int = MAX_JOIN_BYTES) -> dict[str, Any]:
     """The map in these bytes, of this version; BadFrame otherwise."""
-    body: object = unpacked(data, max_bytes)
-    if type(body) is not dict or not _texts([*cast("dict[object, object]", body)]):
-        raise BadFrame("malformed", "expected a map")
-    version = cast("dict[str, object]", body).get("v")
+    body = typed(dict[str, Any], unpacked(data, max_bytes), "message")
+    version = body.get("v")
     if type(version) is not int or version != VERSION:
         raise BadFrame("version", f"expected version {VERSION} of the frames, got {version!r}")
-    return cast("dict[str, Any]", body)
-
-
-def _texts(items: list[object]) -> bool:
-    return all(type(item) is str for item in items)
-
-
-def _hashes(by_group: dict[object, object]) -> bool:
-    return _texts([*by_group]) and all(
-        isinstance(hash_, str) and SHA256.fullmatch(hash_) for hash_ in by_group.values()
-    )
+    return body

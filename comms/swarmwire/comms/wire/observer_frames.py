@@ -8,9 +8,10 @@ import zlib
 from dataclasses import asdict, fields, is_dataclass
 from math import inf, isfinite
 from types import NoneType, UnionType
-from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
+from msgspec import Meta
 
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.bodies.body import Body, body_from_mapping
@@ -22,7 +23,7 @@ from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import MAX_STATE, GroupReadings, Readings
 from swarmwire.comms.truth import EventRecord, Obstacle, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import Frame, checked_array
+from swarmwire.comms.wire.frames import Frame, checked_array, typed
 
 OBSERVED_VERSION = 1  # of the frames for observers
 _MAY_BE_INFINITE = ".height_m"  # of an obstacle
@@ -30,7 +31,8 @@ _RECEPTIONS = tuple(
     field.name for field in fields(ReceptionRecords) if field.name not in ("rssi_dbm", "payload", "payloads")
 )
 _COUNTS = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
-_EVENT_TYPES = [int, float, str, bool, str, bool]  # serial, at_s, do, ended, part, singly
+_Events = list[tuple[int, float, str, bool, str, bool]]  # serial, at_s, do, ended, part, singly
+_States: Any = Annotated[tuple[Annotated[str, Meta(max_length=MAX_STATE)], ...], Meta(min_length=1)]
 
 
 def encode_scene(scene: ObservedRun) -> bytes:
@@ -190,7 +192,7 @@ def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
     check_version(frame, "truth")
     static = scene.static
     n = static.arenas * static.robots
-    states = _states(frame)
+    states: tuple[str, ...] = typed(_States, frame.values.get("states"), "states")
     state = checked_array(frame, "state", "<i8", (n,))
     _check_range("state", state, len(states))
     leds = checked_array(frame, "leds", "<i8", (n, static.max_leds))
@@ -228,15 +230,6 @@ def _at_least(value: object, minimum: int, name: str) -> int:
 def _check_range(name: str, array: AnyArray, end: int, first: int = 0) -> None:
     if ((array < first) | (array >= end)).any():
         raise BadFrame("malformed", f"{name}: expected {first} to {end - 1}")
-
-
-def _states(frame: Frame) -> tuple[str, ...]:
-    value: object = frame.values.get("states")
-    if type(value) is list:
-        states = cast("list[object]", value)
-        if states and all(type(state) is str and len(state) <= MAX_STATE for state in states):
-            return tuple(cast("list[str]", states))
-    raise BadFrame("malformed", "states: expected a list of texts")
 
 
 def _edges(frame: Frame, n: int) -> AnyArray | None:
@@ -277,21 +270,14 @@ def _receptions(frame: Frame, static: Static) -> ReceptionRecords | None:
 
 
 def _events(frame: Frame, n: int) -> tuple[EventRecord, ...]:
-    value: object = frame.values.get("events")
-    if type(value) is not list:
-        raise BadFrame("malformed", "events: expected a list")
-    events = cast("list[object]", value)
+    events = typed(_Events, frame.values.get("events"), "events")
     if not events:
         return ()
     changed = checked_array(frame, "events", "|b1", (len(events), n))
-    return tuple(_event(item, row) for item, row in zip(events, changed, strict=True))
-
-
-def _event(item: object, changed: AnyArray) -> EventRecord:
-    if type(item) is list and [type(part) for part in cast("list[object]", item)] == _EVENT_TYPES:
-        serial, at_s, do, ended, failing_part, singly = cast("tuple[int, float, str, bool, str, bool]", item)
-        return EventRecord(serial, at_s, do, ended, changed, failing_part, singly)
-    raise BadFrame("malformed", "events: expected serial, at_s, do, ended, part and singly of each")
+    return tuple(
+        EventRecord(serial, at_s, do, ended, row, failing_part, singly)
+        for (serial, at_s, do, ended, failing_part, singly), row in zip(events, changed, strict=True)
+    )
 
 
 def _readings(frame: Frame, static: Static) -> Readings:

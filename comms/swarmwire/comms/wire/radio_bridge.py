@@ -8,18 +8,19 @@ import math
 import struct
 import threading
 from collections import deque
-from dataclasses import asdict, dataclass, fields
-from typing import Generic, NamedTuple, TypeVar, cast
+from typing import Annotated, Generic, NamedTuple, TypeVar
 
 import msgpack
 import numpy as np
+from msgspec import Meta, Struct
+from msgspec.structs import asdict
 
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import MAX_BYTES, VERSION
+from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, typed
 from swarmwire.comms.wire.join import versioned
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
@@ -32,14 +33,13 @@ POSE_BYTES = _POSE_LAYOUT.size
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class BridgeInfo:
+class BridgeInfo(Struct, frozen=True, forbid_unknown_fields=True):
     """The facts of the world's radio medium for one robot."""
 
-    row: int  # of the robot in the world
+    row: Annotated[int, Meta(ge=0)]  # of the robot in the world
     robots: tuple[str, ...]  # all robots of its arena, by index
-    rate_hz: int  # ticks of the world per second
-    max_payload_bytes: int
+    rate_hz: Annotated[int, Meta(ge=1)]  # ticks of the world per second
+    max_payload_bytes: Annotated[int, Meta(ge=0)]
     measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
     needs: tuple[str, ...]  # the needs of agents that the medium meets
 
@@ -52,17 +52,7 @@ class BridgeInfo:
         """The info in these bytes; BadFrame if they hold none, "version" if they are of another version."""
         values = versioned(data, MAX_BYTES)  # with the names of all robots
         del values["v"]
-        if values.keys() != {field.name for field in fields(cls)}:
-            raise BadFrame("malformed", "expected the terms of a medium")
-        for name in ("row", "rate_hz", "max_payload_bytes"):
-            if type(values[name]) is not int or values[name] < (name == "rate_hz"):
-                raise BadFrame("malformed", f"{name}: expected a whole number")
-        for name in ("robots", "measures", "needs"):
-            texts = values[name]
-            if type(texts) is not list or not all(type(text) is str for text in cast("list[object]", texts)):
-                raise BadFrame("malformed", f"{name}: expected a list of texts")
-            values[name] = tuple(cast("list[str]", texts))
-        return cls(**values)
+        return typed(cls, values, "info")
 
 
 def encode_bridged(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:

@@ -99,8 +99,8 @@ def test_a_long_value_is_shown_by_its_beginning(value, shown):
         ({"v": 1, "do": "end", "event": True}, "event: expected the number of an event, got True"),
         ({"v": 1, "do": "event", "event": "kill"}, "event: expected a table as in a scenario"),
         ({"v": 1, "do": "event", "event": {"do": "kill", 1: 2}}, "expected"),
-        ([1], "expected a map"),
-        (["v"], "expected a map"),
+        ([1], "expected a request"),
+        (["v"], "expected a request"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(asked, line):

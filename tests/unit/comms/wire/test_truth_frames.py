@@ -225,14 +225,14 @@ def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
 
 
 EVENT = [0, 0.0, "kill", False, "", False]
-WRONG_EVENTS = [7, [], EVENT[:5], [*EVENT, 0], [0, 0, *EVENT[2:]], [*EVENT[:5], 1], [*EVENT[:3], 1, *EVENT[4:]]]
+WRONG_EVENTS = [7, [], EVENT[:5], [*EVENT, 0], [0, "0", *EVENT[2:]], [*EVENT[:5], 1], [*EVENT[:3], 1, *EVENT[4:]]]
 
 
 @pytest.mark.parametrize("events", [None, {}, "kill", *([wrong] for wrong in WRONG_EVENTS)], ids=str)
 def test_events_that_are_none_are_refused(events):
     frame = frames.decode(encode_truth(quiet(events=(EventRecord(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
     assert frame.values["events"] == [EVENT]
-    with pytest.raises(BadFrame, match="events: expected"):
+    with pytest.raises(BadFrame, match="^malformed: events.*: expected"):
         decode_truth(replace(frame, values={**frame.values, "events": events}), SCENE)
 
 

@@ -17,7 +17,7 @@ PI = {
 
 
 def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
-    assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "numpy"]
+    assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "msgspec", "numpy"]
     assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
     assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
     with pytest.raises(BadInput, match="^packages: not-there: "):

@@ -1,10 +1,14 @@
 """The hand-shake with runners, in lockstep and in real time: what does not fit is counted and changes nothing."""
 
+import re
+from typing import Any
+
 import msgpack
 import numpy as np
 import pytest
 
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.world.backends.join_policy import JoinRefused
@@ -42,15 +46,43 @@ def test_an_assignment_comes_over_whole() -> None:
 
 
 @pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        ({"rows": [1.0, 4]}, "assignment.groups[0].rows[0]: expected `int`, got `float`"),
+        ({"rows": [True, 4]}, "assignment.groups[0].rows[0]: expected `int`, got `bool`"),
+        ({"rows": [-1, 4]}, "assignment.groups[0].rows[0]: expected `int` >= 0"),
+        ({"rows": [2**63, 4]}, "assignment.groups[0].rows[0]: expected `int` <= 9223372036854775807"),
+        ({"rows": []}, "assignment.groups[0].rows: expected `array` of length >= 1"),
+        ({"rows": [4, 4]}, "rows: expected robots by rising numbers"),
+        ({"rows": [4]}, "expected one for each of the rows"),
+        ({"keys": [1]}, "expected one for each of the rows"),
+        ({"keys": [1, 2**64]}, "too large"),
+        ({"keys": [1, -1]}, "assignment.groups[0].keys[1]: expected `int` >= 0"),
+        ({"params": {1: 2}}, "expected `str`, got `int`"),
+        ({"body": {}}, "assignment: "),
+        ({"act_every_ticks": 0}, "assignment.groups[0].act_every_ticks: expected `int` >= 1"),
+        ({"act_every_ticks": 2**31}, "assignment.groups[0].act_every_ticks: expected `int`"),
+    ],
+    ids=str,
+)
+def test_what_is_no_assignment_is_refused(changed: dict[str, Any], fault: str) -> None:
+    mapping = assignment(group("a.b:C", [1, 4])).as_mapping()
+    mapping["groups"][0] |= changed
+    with pytest.raises(BadFrame, match=re.escape(fault)) as caught:
+        Assignment.from_mapping(mapping)
+    assert caught.value.fault == "malformed"
+
+
+@pytest.mark.parametrize(
     ("bad", "why"),
     [
         *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
         (bytes(MAX_JOIN_BYTES + 1), "oversized"),
         *((request(version), f"expected version {frames.VERSION}") for version in (0, frames.VERSION + 1, "1", None)),
-        *((request(robots=robots), "robots: expected a number") for robots in (0, -1, 1.5, "3", True)),
-        *((request(names=names), "names: expected a list") for names in ("flock-0", [1], {})),
+        *((request(robots=robots), "request.robots: expected `int") for robots in (0, -1, 1.5, "3", True)),
+        *((request(names=names), "request.names") for names in ("flock-0", [1], {})),
         (request(robots=1, names=["flock-0"]), "not both"),
-        *((request(agents=agents), "agents: expected") for agents in ([], {"flock": "beef"}, {"flock": 3})),
+        *((request(agents=agents), "request.agents") for agents in ([], {"flock": "beef"}, {"flock": 3})),
         (request(scenario_sha256="0" * 63), "scenario_sha256: expected"),
     ],
     ids=repr,
