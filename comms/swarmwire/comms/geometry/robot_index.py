@@ -1,8 +1,9 @@
 """Spatial indexes of robots: uniform grids over the arenas, so that kernels read near robots only. Compiled.
 
-`Grid` clamps positions outside the arena to the border cells. `Cells` wraps them: cell (i, j) stands for all places
-(i + k nx, j + l ny). So robots that leave an open arena spread over all cells too, and a torus needs no other index.
-Positions in a cell must still be compared.
+`Cells` wraps positions: cell (i, j) stands for all places (i + k nx, j + l ny). So robots that leave an open arena
+spread over all cells too, and a torus needs no other index. Sensors, engines and placement use it. `Grid` clamps
+positions outside the arena to the border cells. The radio keeps it, since the order of its links decides the order in
+which powers are added, and so their last bits. Positions in a cell must still be compared.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,8 +15,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import kernel, njit
 
-MAX_CELLS_PER_SIDE = 512  # of a `Grid`, in each arena
-MAX_PER_SIDE = 512  # of `Cells`, in each arena
+MAX_CELLS_PER_SIDE = 512  # in each arena
 SLACK = 1.0 + 1e-9  # rounding may separate two objects at just the reach
 
 
@@ -96,7 +96,7 @@ class Cells(NamedTuple):
 
 def cells_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: int) -> Cells:
     """Empty cells for `items` items, each at least `cell_m` wide: nearer items lie in the 3 x 3 cells around."""
-    nx, ny = (min(max(int(extent / (cell_m * SLACK)), 1), MAX_PER_SIDE) for extent in size_m)
+    nx, ny = (min(max(int(extent / (cell_m * SLACK)), 1), MAX_CELLS_PER_SIDE) for extent in size_m)
     start = np.zeros(arenas * ny * nx + 1, np.int64)
     return Cells(nx, ny, nx / size_m[0], ny / size_m[1], start, np.zeros(items, np.int64))
 
@@ -113,6 +113,18 @@ def row_of(cells, y):
     """The row of the coordinate y, 0 to ny - 1."""
     row = int(np.floor(y * cells.per_y + 0.5 * cells.ny))
     return row if 0 <= row < cells.ny else row % cells.ny
+
+
+@kernel(from_python=True)
+def cells_around(around, cells, arena, x, y):
+    """Write the cells around a place, its own included, into `around` (9,); how many: none comes twice."""
+    column, row, count = column_of(cells, x), row_of(cells, y), 0
+    for j in range(min(cells.ny, 3)):
+        first = (arena * cells.ny + (row + j - 1) % cells.ny) * cells.nx
+        for i in range(min(cells.nx, 3)):
+            around[count] = first + (column + i - 1) % cells.nx
+            count += 1
+    return count
 
 
 @kernel(from_python=True)

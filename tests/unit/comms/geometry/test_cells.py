@@ -10,10 +10,10 @@ from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
 from swarmwire.comms.geometry.robot_index import (
     MAX_CELLS_PER_SIDE,
-    MAX_PER_SIDE,
     Grid,
     build,
     cell_of,
+    cells_around,
     cells_over,
     column_of,
     is_empty,
@@ -39,6 +39,11 @@ def test_all_within_reach_are_in_the_cells_around(
     columns, rows = (i[:, None] - i) % cells.nx, (j[:, None] - j) % cells.ny
     around = np.isin(columns, (0, 1, cells.nx - 1)) & np.isin(rows, (0, 1, cells.ny - 1))
     assert not np.any(near & ~around)
+    listed = np.empty(9, np.int64)
+    for robot in range(60):
+        cell = listed[: cells_around(listed, cells, 2, x[robot], y[robot])] - 2 * cells.ny * cells.nx
+        assert len(cell) == len(set(cell.tolist()))
+        assert np.array_equal(np.isin(j * cells.nx + i, cell), around[robot])
     assert 0 <= i.min() <= i.max() < cells.nx
     assert 0 <= j.min() <= j.max() < cells.ny
 
@@ -63,7 +68,7 @@ def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas
 @pytest.mark.parametrize("reach_m", [1e-6, 1e6])
 def test_there_are_neither_too_many_cells_nor_none(reach_m: float) -> None:
     cells = cells_over((100.0, 50.0), reach_m, 1, 1)
-    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MAX_PER_SIDE
+    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MAX_CELLS_PER_SIDE
 
 
 def test_arenas_that_are_over_have_nobody_in_their_cells() -> None:

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.discs import engine as discs_engine
 from swarmwire.world.engines.discs.contacts import CIRCLE, POLYGON, gap_to_polygon
 from swarmwire.world.engines.discs.engine import ROBOT, DiscsEngine
-from swarmwire.world.engines.discs.neighbours import fixed_near, obstacle_cells, pairs_near
+from swarmwire.world.engines.discs.neighbours import fixed_near, pairs_near
 from tests.support.world.engines.conformance import R, asked, made, packed
 
 
@@ -68,7 +69,7 @@ def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
     obstacles = tuple(some_obstacles(20 + 7 * arena, side_m, arena) for arena in range(arenas))
     arrays = obstacle_arrays(obstacles)
     state = np.zeros((arenas * n, 6))
-    state[:, :2] = rng.uniform(-0.5 * side_m, 0.5 * side_m, (arenas * n, 2))
+    state[:, :2] = rng.uniform(-0.7 * side_m, 0.7 * side_m, (arenas * n, 2))  # some have left an open arena
     robots = np.zeros(arenas * n, ROBOT)
     robots["radius_m"] = np.tile(rng.uniform(0.03, 0.15, n), arenas)
     robots["bottom_m"] = np.tile(np.where(np.arange(n) % 2, 0.0, 0.1), arenas)
@@ -82,7 +83,7 @@ def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
     wanted = np.argwhere((apart <= 2.0 * margin_m) & (row[:, None] < row) & together)
     assert np.array_equal(pairs, wanted)
 
-    cells = obstacle_cells(arrays, (side_m, side_m), 0.15 + margin_m)
+    cells = obstacles_within(arrays, (side_m, side_m), 0.15 + margin_m, torus=False).cells
     things = fixed_near(robots, state, running, (side_m, side_m), False, arrays, cells, margin_m)
     listed = {tuple(thing) for thing in things.tolist()}
     count = {CIRCLE: 0, POLYGON: 0}

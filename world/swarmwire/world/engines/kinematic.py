@@ -13,11 +13,13 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry.robot_index import cells_over
 from swarmwire.comms.kernels import kernel
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import EngineConfig
 from swarmwire.world.engines.position_correction import PositionCorrections, any_near, overlaps, push_out, shortest
 
+CELLS_PER_ROBOT = 4
 SUBSTEP_OF_RADIUS = 0.25  # near obstacles a tick is split into moves of at most this share of the radius: no jumps
 
 
@@ -37,6 +39,9 @@ class KinematicEngine:
         self._tick_s, self._wheel_base_m = config.tick_s, config.motors.wheel_base_m
         self._disc = config.radius_m, config.bottom_m, config.top_m
         self._corrections = PositionCorrections(config)
+        per_robot_m = float(np.sqrt(config.size_m[0] * config.size_m[1] / (CELLS_PER_ROBOT * n)))
+        cell_m = max(2.0 * float(config.radius_m.max()), per_robot_m)
+        self._cells = cells_over(config.size_m, cell_m, arenas, arenas * n)
         self._running: BoolArray = np.ones(arenas, np.bool_)
         self._held: BoolArray = np.zeros((arenas, n), np.bool_)
         self._touching = np.empty(0, np.int64)
@@ -48,7 +53,7 @@ class KinematicEngine:
         path_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
         correction = self._corrections.within(float(radius_m.max()) + path_m)
         _move(correction, *bodies, target, self._tick_s, self._running, self.state, self.travel_m, self._held)
-        overlapping = overlaps(self.state, *self._disc, self._held, self._running, correction)
+        overlapping = overlaps(self.state, *self._disc, self._held, self._running, correction, self._cells)
         overlapping_before, self._touching = self._touching, overlapping
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, overlapping_before, target.shape[1] + 1, onsets)

@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.comms.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.geometry.robot_index import Cells, cell_of, column_of, row_of
+from swarmwire.comms.geometry.robot_index import Cells, cells_around, column_of, row_of, sort
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.world.engines.engine import EngineConfig
 
@@ -169,7 +169,7 @@ def _out_of_polygon(side, start, stop, x, y, radius_m):
 
 
 @njit()
-def overlaps(state, radius_m, bottom_m, top_m, held, running, correction):
+def overlaps(state, radius_m, bottom_m, top_m, held, running, correction, cells):
     """Rising codes, as `count_began` has them, of pairs of robots that overlap, and of robots that were pushed.
 
     Args:
@@ -180,37 +180,30 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction):
         held: (arenas, n) pushed out of something fixed.
         running: (arenas,) others are left out.
         correction: the arena's extents, and whether it wraps.
+        cells: for the robots, each at least as wide as a robot; to be filled.
     """
     arenas, n = held.shape
-    bodies, widest_m = n + 1, 2.0 * radius_m.max()
-    max_cells = 2 * int(np.ceil(np.sqrt(n)))  # cells along a side: some four for each robot
-    nx = min(max(int(2.0 * correction.half_x_m / widest_m), 1), max_cells)
-    ny = min(max(int(2.0 * correction.half_y_m / widest_m), 1), max_cells)
-    cell_x, cell_y = 2.0 * correction.half_x_m / nx, 2.0 * correction.half_y_m / ny
-    head, next_robot = np.empty((ny, nx), np.int64), np.empty(n, np.int64)
+    bodies, around = n + 1, np.empty(9, np.int64)
+    sort(cells, state, running)
     codes, count = np.empty(arenas * n, np.int64), 0
     for arena in range(arenas):
         if not running[arena]:
             continue
-        head[:] = -1
         for i in range(n):
             x, y = state[arena, i, 0], state[arena, i, 1]
-            column = cell_of(x, -correction.half_x_m, cell_x, nx)
-            row = cell_of(y, -correction.half_y_m, cell_y, ny)
-            for v in range(_first_cell(row, ny, correction.wraps), _last_cell(row, ny, correction.wraps) + 1):
-                for u in range(_first_cell(column, nx, correction.wraps), _last_cell(column, nx, correction.wraps) + 1):
-                    j = head[_wrap_cell(v, ny), _wrap_cell(u, nx)]
-                    while j >= 0:
-                        dx = shortest(x - state[arena, j, 0], correction.half_x_m, correction.wraps)
-                        dy = shortest(y - state[arena, j, 1], correction.half_y_m, correction.wraps)
-                        apart = radius_m[i] + radius_m[j]
-                        same_height = bottom_m[i] < top_m[j] and bottom_m[j] < top_m[i]
-                        if same_height and dx * dx + dy * dy < apart * apart:
-                            codes = _room_for(codes, count)
-                            codes[count] = (arena * bodies + j) * bodies + i
-                            count += 1
-                        j = next_robot[j]
-            next_robot[i], head[row, column] = head[row, column], i
+            for at in range(cells_around(around, cells, arena, x, y)):
+                for k in range(cells.start[around[at]], cells.start[around[at] + 1]):
+                    j = cells.item[k]
+                    if j >= i:
+                        break
+                    dx = shortest(x - state[arena, j, 0], correction.half_x_m, correction.wraps)
+                    dy = shortest(y - state[arena, j, 1], correction.half_y_m, correction.wraps)
+                    apart = radius_m[i] + radius_m[j]
+                    same_height = bottom_m[i] < top_m[j] and bottom_m[j] < top_m[i]
+                    if same_height and dx * dx + dy * dy < apart * apart:
+                        codes = _room_for(codes, count)
+                        codes[count] = (arena * bodies + j) * bodies + i
+                        count += 1
             if held[arena, i]:
                 codes = _room_for(codes, count)
                 codes[count] = (arena * bodies + i) * bodies + n
@@ -218,28 +211,6 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction):
     codes = codes[:count].copy()
     codes.sort()
     return codes
-
-
-@njit()
-def _wrap_cell(cell, cells):
-    """The cell within the arena, for an index that may lie beyond the border."""
-    return cell + cells if cell < 0 else cell - cells if cell >= cells else cell
-
-
-@njit()
-def _first_cell(cell, cells, wraps):
-    """The first neighbour cell along an axis; on a torus it may lie beyond the border."""
-    if wraps:
-        return cell - 1 if cells > 2 else cell
-    return max(cell - 1, 0)
-
-
-@njit()
-def _last_cell(cell, cells, wraps):
-    """The last neighbour cell along an axis; no cell comes twice."""
-    if wraps:
-        return cell + 1 if cells > 1 else cell
-    return min(cell + 1, cells - 1)
 
 
 @njit()

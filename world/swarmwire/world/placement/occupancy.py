@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import obstacle_arrays, sides_of
-from swarmwire.comms.geometry.robot_index import MAX_CELLS_PER_SIDE, cell_of
+from swarmwire.comms.geometry.robot_index import Cells, cells_around, cells_over
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.maps import Layout
@@ -50,7 +50,10 @@ def extent(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
 
 
 class Occupancy(NamedTuple):
-    """The obstacles and robots in an arena so far. Robots by cell: head[cell], then next_robot[robot], until -1."""
+    """The obstacles and robots in an arena so far. Robots by cell: head[cell], then next_robot[robot], until -1.
+
+    The lists are linked, since robots are added one by one.
+    """
 
     half_x_m: float  # of the arena
     half_y_m: float
@@ -59,8 +62,8 @@ class Occupancy(NamedTuple):
     polygon: FloatArray  # (polygons, 4) x, y, radius of a circle around each, and its height
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `sides_of` has them
-    cell_m: float
-    head: IntArray  # (ny, nx) last robot put into a cell
+    cells: Cells  # their places; its lists are empty
+    head: IntArray  # (cells,) last robot put into a cell
     next_robot: IntArray  # (robots,) the robot put there before
     robot: FloatArray  # (robots, 5) x, y, radius, height of its lower and of its upper side
 
@@ -138,20 +141,13 @@ def _disc_clear_here(occupancy, x, y, disc):
 @njit()
 def disc_clear_of_robots(occupancy, x, y, disc):
     """Whether a disc at x, y keeps clear of all robots whose height it shares."""
-    ny, nx = occupancy.head.shape
-    column = cell_of(x, -occupancy.half_x_m, occupancy.cell_m, nx)
-    row = cell_of(y, -occupancy.half_y_m, occupancy.cell_m, ny)
-    # On a torus the last cell may be cut, so that two cells hold what one would.
-    cells = 2 if occupancy.wraps else 1
-    for j in range(row - cells, row + cells + 1):
-        for i in range(column - cells, column + cells + 1):
-            if not occupancy.wraps and not (0 <= j < ny and 0 <= i < nx):
-                continue
-            other = occupancy.head[j % ny, i % nx]
-            while other >= 0:
-                if _too_near(occupancy, x, y, disc, occupancy.robot[other]):
-                    return False
-                other = occupancy.next_robot[other]
+    around = np.empty(9, np.int64)
+    for at in range(cells_around(around, occupancy.cells, 0, x, y)):
+        other = occupancy.head[around[at]]
+        while other >= 0:
+            if _too_near(occupancy, x, y, disc, occupancy.robot[other]):
+                return False
+            other = occupancy.next_robot[other]
     return True
 
 
@@ -239,7 +235,7 @@ class PlacedObstacles:
         """
         width, height = self._size_m
         max_radius_m = max((group.body.radius_m for group in groups), default=max(width, height))
-        cell_m = max(2.0 * max_radius_m + gap_m, max(width, height) / MAX_CELLS_PER_SIDE)
+        cells = cells_over(self._size_m, 2.0 * max_radius_m + gap_m, 1, 0)
         robots = groups[-1].stop if groups else 0
         circle, side_start = self._circle[: self._circles], self._side_start[: self._polygons + 1]
         if lights:
@@ -253,8 +249,8 @@ class PlacedObstacles:
             polygon=self._polygon[: self._polygons],
             side_start=side_start,
             side=self._side[: side_start[-1]],
-            cell_m=cell_m,
-            head=np.full((int(np.ceil(height / cell_m)), int(np.ceil(width / cell_m))), -1, np.int64),
+            cells=cells,
+            head=np.full(cells.ny * cells.nx, -1, np.int64),
             next_robot=np.full(robots, -1, np.int64),
             robot=np.zeros((robots, 5)),
         )

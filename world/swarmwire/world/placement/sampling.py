@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.geometry.robot_index import cell_of
+from swarmwire.comms.geometry.robot_index import column_of, row_of
 from swarmwire.comms.kernels import njit
 from swarmwire.world.placement.occupancy import (
     Disc,
@@ -107,7 +107,6 @@ def put_robots(
 
     `fixed` (stop - start, 2) holds the only candidate of each; without rows candidates are drawn from the region.
     """
-    ny, nx = occupancy.head.shape
     for robot in range(start, stop):
         is_free = False
         for attempt in range(1 if len(fixed) else MAX_CANDIDATES):
@@ -124,10 +123,7 @@ def put_robots(
         if not is_free:
             return robot
         occupancy.robot[robot] = x, y, disc.radius_m, disc.bottom_m, disc.top_m
-        cell = (
-            cell_of(y, -occupancy.half_y_m, occupancy.cell_m, ny),
-            cell_of(x, -occupancy.half_x_m, occupancy.cell_m, nx),
-        )
+        cell = row_of(occupancy.cells, y) * occupancy.cells.nx + column_of(occupancy.cells, x)
         occupancy.next_robot[robot] = occupancy.head[cell]
         occupancy.head[cell] = robot
     return -1

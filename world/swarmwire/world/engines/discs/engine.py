@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.geometry.obstacle_index import obstacles_within
 from swarmwire.world.engines.discs.contacts import CONTACT, contact_islands, contacts_of
-from swarmwire.world.engines.discs.neighbours import fixed_near, obstacle_cells, pairs_near
+from swarmwire.world.engines.discs.neighbours import fixed_near, pairs_near
 from swarmwire.world.engines.discs.step import advance, needed_margin_m
 from swarmwire.world.engines.engine import EngineConfig
 
@@ -107,7 +108,8 @@ class DiscsEngine:
     def _set_margin(self, margin_m: float) -> None:
         self._margin_m = margin_m
         # The cell of a robot's middle lists what its rim may reach.
-        self._cells = obstacle_cells(self._config.obstacles, self._config.size_m, self._max_radius_m + margin_m)
+        config, reach_m = self._config, self._max_radius_m + margin_m
+        self._cells = obstacles_within(config.obstacles, config.size_m, reach_m, torus=False).cells
 
     def _list_near(self, fastest_mps: float) -> None:
         """List the things near each robot, with a margin that lasts for at least one tick."""
