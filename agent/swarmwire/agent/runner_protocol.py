@@ -1,23 +1,23 @@
 """The runner's side of the protocol, without any I/O: bytes and the world's token in, events and bytes out.
 
-    state      move           next      when
-    searching  world appears  joining   the world's liveliness token is there
-    joining    joins          joined    the reply to `join` assigns robots: `Assigned`
-    joined     is ready       ready     `ready`: the agents are made
-    ready      sends          ready     `send`: packets between ticks, after `PacketsBetween`
-    ready      is asked       acting    a frame "tick": `Tick`
-    acting     answers        ready     `answer`
-    with robots fails         failed    `fail`: only the end of the run is awaited
-    with robots leaves        leaving   `leave`: a frame "end" confirms it
-    all        ends           ended     a frame "end", or the token vanished: `Ended`
+    state      move      next     by
+    searching  finds     joining  `world_present(True)`
+    joining    joins     joined   `receive_assignment`, with the world's reply to the request of `join`
+    joined     is ready  ready    `ready`, once the agents are made
+    ready      is asked  acting   the event `Tick`
+    acting     answers   ready    `answer`
+    ready      sends     ready    `send`, at the event `PacketsBetween`
+    these 3    fails     failed   `fail`; the runner stays until the world ends the run
+    and failed leaves    leaving  `leave`; the runner stays until the world confirms it
+    all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
 
 The caller passes on all that has arrived, then takes events from `next_event` until there are none. So of the frames
-"tick" that wait, the runner acts on the newest. In lockstep there is only one. Each `Tick` has exactly one answer.
+"tick" that wait, a runner acts on the newest; in lockstep there is only one. Each `Tick` has exactly one answer.
 Frames "packets", which come between ticks, are events in their order.
 
-A frame from before the assignment, malformed, out of order or replaced by a newer one is counted and dropped; the next
-answer reports the count. A call that the state does not allow raises RuntimeError and changes nothing. The world's side
-is `RunnerRegistry`, with `Lockstep` and `RealTime`.
+A frame that comes before the assignment, is malformed, is out of order or is replaced by a newer one is counted and
+dropped; the next answer reports the count. A call that the state does not allow raises RuntimeError and changes
+nothing. The world's side is `RunnerRegistry`, with `Lockstep` and `RealTime`.
 """
 
 import math
@@ -37,13 +37,13 @@ from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
 State = Literal["searching", "joining", "joined", "ready", "acting", "failed", "leaving", "ended"]
-Move = Literal["world appears", "joins", "is ready", "sends", "is asked", "answers", "fails", "leaves", "ends"]
+Move = Literal["finds", "joins", "is ready", "is asked", "answers", "sends", "fails", "leaves", "ends"]
 
 MOVES: dict[State, dict[Move, State]] = {
-    "searching": {"world appears": "joining", "ends": "ended"},
+    "searching": {"finds": "joining", "ends": "ended"},
     "joining": {"joins": "joined", "ends": "ended"},
     "joined": {"is ready": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
-    "ready": {"sends": "ready", "is asked": "acting", "fails": "failed", "leaves": "leaving", "ends": "ended"},
+    "ready": {"is asked": "acting", "sends": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
     "acting": {"answers": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
     "failed": {"leaves": "leaving", "ends": "ended"},
     "leaving": {"ends": "ended"},
@@ -125,7 +125,7 @@ class RunnerProtocol:
         if not present:
             self._end(Ended("left" if self.state == "leaving" else "gone"))
         elif self.state == "searching":
-            self._move("world appears")
+            self._move("finds")
 
     def join(self, options: JoinOptions) -> bytes:
         """The request for robots."""

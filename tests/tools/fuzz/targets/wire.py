@@ -16,7 +16,7 @@ from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, enc
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.realtime import RealTime, RealTimeAllocation
 from swarmwire.world.backends.registry import RunnerRegistry
 from tests.support.agent.hosts import PLAYERS
 from tests.support.agent.runners import joining
@@ -121,14 +121,18 @@ class WorldFrames(FrameTarget):
 def _state(roster: Any) -> Any:
     """All that a frame might change."""
     slots = [
-        (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), len(getattr(slot, "asked", ())))
+        (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), _unanswered(slot))
         for slot in roster._allocations
     ]
     if isinstance(roster, RealTime):
-        arrays = (roster._asked_ns, roster._stopped, roster._drive, roster._command, roster.late)
-        kept = (roster._sent, roster._notes, roster._leds, roster._own, roster._values)
+        arrays = (roster._pending_since_ns, roster._stopped, roster._drive, roster._command, roster.late)
+        kept = (roster._sent, roster._notes, roster._leds, roster._actuator_commands, roster._values)
         return slots, [array.tobytes() for array in arrays], [len(one) for one in kept], dict(roster._numbers)
     return slots, sorted(roster._by_runner), roster._tick
+
+
+def _unanswered(slot: Any) -> int:
+    return len(slot.unanswered) if isinstance(slot, RealTimeAllocation) else 0
 
 
 class RunnerFrames(FrameTarget):
