@@ -4,7 +4,7 @@ docs/runner-states.svg is the world's side, of `world.backends.allocation`; docs
 side, of `agent.runner_protocol`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from docs.pictures.svg import arc, arrow, box, page, text
@@ -12,6 +12,7 @@ from swarmwire.agent import runner_protocol
 from swarmwire.world.backends import allocation
 
 DOCS = Path(__file__).parents[1]
+Moves = Mapping[str, Mapping[str, str]]
 Places = Mapping[str, tuple[float, float]]
 WORLD: Places = {
     "free": (70.0, 150.0),
@@ -37,17 +38,18 @@ RISE = 0.2  # of an arrow back, for its length
 
 def draw(to: Path = DOCS / "runner-states.svg") -> None:
     """Write the figure of the world's side."""
-    shapes = _states(allocation.MOVES, WORLD)
+    moves: Moves = {state: {**of} for state, of in allocation.MOVES.items()}
+    shapes = _states(moves, WORLD)
     to.write_text(page("The states of the robots that one runner plays", 680, 320, shapes), encoding="utf-8")
 
 
 def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
     """Write the figure of the runner's side, without the moves that lead nowhere and those that all states have."""
-    moves = {
+    moves: dict[str, dict[str, str]] = {
         state: {move: after for move, after in of.items() if after not in ("ended", state)}
         for state, of in runner_protocol.MOVES.items()
     }
-    shared = dict(set.intersection(*(set(moves[state].items()) for state in WITH_ROBOTS)))
+    shared = _shared(moves, WITH_ROBOTS)
     for state in WITH_ROBOTS:
         moves[state] = {move: after for move, after in moves[state].items() if move not in shared}
     (left, y), (right, _), margin = RUNNER[WITH_ROBOTS[0]], RUNNER[WITH_ROBOTS[-1]], HALF_WIDTH + 12.0
@@ -59,7 +61,13 @@ def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
     to.write_text(page("The states of a runner", 760, 265, shapes), encoding="utf-8")
 
 
-def _states(moves: Mapping[str, Mapping[str, str]], places: Places) -> list[str]:
+def _shared(moves: Moves, states: Sequence[str]) -> dict[str, str]:
+    """The moves that all these states have, to the same state."""
+    first, *others = (moves[state] for state in states)
+    return {move: after for move, after in first.items() if all(of.get(move) == after for of in others)}
+
+
+def _states(moves: Moves, places: Places) -> list[str]:
     """Every state of the table once, every move from it an arrow."""
     shapes = [
         shape
