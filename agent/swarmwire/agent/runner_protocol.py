@@ -26,6 +26,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
@@ -112,7 +113,9 @@ class RunnerProtocol:
         self.state: State = "searching"
         self.dropped = self.missed = 0
         self._agents: Mapping[str, str] = {}
-        self._assignment: Assignment | None = None
+        self._rows: dict[str, IntArray] = {}  # by group; empty before the assignment
+        self._measures: tuple[str, ...] = ()
+        self._period = 1  # of the ticks in which any group acts
         self._newest: Tick | None = None  # not acted on yet
         self._last_tick = self._open_tick = -1  # of the frames, and of the tick to answer
         self._packets: deque[PacketsReceived] = deque()
@@ -143,7 +146,9 @@ class RunnerProtocol:
         if memory is not None and not isinstance(memory, bytes):
             raise BadFrame("malformed", "memory: expected a frame")
         assigned = Assigned(assignment, None if memory is None else frames.decode(memory))
-        self._assignment = assignment
+        self._rows = {group.name: group.rows for group in assignment.groups}
+        self._measures = assignment.measures or ()
+        self._period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         self._move("joins")
         return assigned
 
@@ -151,16 +156,16 @@ class RunnerProtocol:
         """Take a frame from the world; one that does not fit is counted and dropped."""
         try:
             frame = frames.decode(data)
-            if self._assignment is None or self.state == "ended":
+            if not self._rows or self.state == "ended":
                 raise BadFrame("unexpected_kind", frame.kind)
             if frame.kind == "end":
                 self._end(self._ended_by(frame))
             elif self.state in ("failed", "leaving"):
                 raise BadFrame("unexpected_kind", frame.kind)
             elif frame.kind == "packets":
-                self._receive_packets(frame, self._assignment)
+                self._receive_packets(frame)
             else:
-                self._receive_tick(frame, self._assignment)
+                self._receive_tick(frame)
         except BadFrame:
             self.dropped += 1
 
@@ -214,18 +219,16 @@ class RunnerProtocol:
         self._drop_waiting()
         return frames.encode("leave", -1, {})
 
-    def _receive_tick(self, frame: Frame, assignment: Assignment) -> None:
-        period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
-        if frame.kind != "tick" or frame.tick <= self._last_tick or frame.tick % period:
+    def _receive_tick(self, frame: Frame) -> None:
+        if frame.kind != "tick" or frame.tick <= self._last_tick or frame.tick % self._period:
             raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
-        rows = {group.name: group.rows for group in assignment.groups}
-        readings, received, tx_status = decode_tick(frame, assignment.measures or (), rows.keys())
-        check_rows(readings, received, rows)
+        readings, received, tx_status = decode_tick(frame, self._measures, self._rows.keys())
+        check_rows(readings, received, self._rows)
         self.dropped += self._newest is not None
         self._newest, self._last_tick = Tick(frame.tick, readings, received, tx_status), frame.tick
 
-    def _receive_packets(self, frame: Frame, assignment: Assignment) -> None:
-        at_ns, number, received, tx_status = decode_packets(frame, assignment.measures or ())
+    def _receive_packets(self, frame: Frame) -> None:
+        at_ns, number, received, tx_status = decode_packets(frame, self._measures)
         self.missed += max(0, number - self._next_number)
         self._next_number = number + 1
         self._packets.append(PacketsReceived(received, tx_status))
