@@ -27,7 +27,7 @@ def main(endpoint: str, run_id: str, agent: str, certs: str, *names: str) -> Non
 
 def _play(endpoint: str, run_id: str, name: str, network: Network | None) -> None:
     with closed_after(open_runner(endpoint, 30.0, network)) as session:
-        runner.play(session, Keys(run_id), name, runner.TickInbox(), lambda: runner.NEXT_FREE)
+        runner.play(session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE)
 
 
 def _network(certs: Path, name: str) -> Network:

@@ -1,34 +1,89 @@
-"""Draws docs/runner-states.svg from the table of state transitions in `world.backends.allocation`."""
+"""Draws the states of a runner from the tables of moves of both sides of the protocol.
 
+docs/runner-states.svg is the world's side, of `world.backends.allocation`; docs/runner-protocol.svg is the runner's
+side, of `agent.runner_protocol`.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from docs.pictures.svg import arc, arrow, box, page, text
-from swarmwire.world.backends.allocation import MOVES, Move, State
+from swarmwire.agent import runner_protocol
+from swarmwire.world.backends import allocation
 
-TO = Path(__file__).parents[1] / "runner-states.svg"
-PLACES: dict[State, tuple[float, float]] = {
+DOCS = Path(__file__).parents[1]
+Moves = Mapping[str, Mapping[str, str]]
+Places = Mapping[str, tuple[float, float]]
+WORLD: Places = {
     "free": (70.0, 150.0),
     "joined": (240.0, 150.0),
     "ready": (410.0, 150.0),
     "waiting": (600.0, 150.0),
     "dead": (410.0, 280.0),
 }
+RUNNER: Places = {
+    "searching": (60.0, 90.0),
+    "joining": (200.0, 90.0),
+    "joined": (360.0, 90.0),
+    "ready": (520.0, 90.0),
+    "acting": (690.0, 90.0),
+    "failed": (420.0, 210.0),
+    "leaving": (610.0, 210.0),
+    "ended": (60.0, 210.0),
+}
+WITH_ROBOTS = ("joined", "ready", "acting")  # in one frame, from which the moves start that all of them have
 HALF_WIDTH, HALF_HEIGHT = 46.0, 20.0  # of a state's box
 RISE = 0.2  # of an arrow back, for its length
 
 
-def draw(to: Path = TO) -> None:
-    """Write the figure: every state of the table once, every move from it an arrow."""
-    shapes = [shape for state, moves in MOVES.items() for move in moves for shape in _arrow(state, move)]
-    for state in MOVES:
-        x, y = PLACES[state]
-        shapes.append(box(x - HALF_WIDTH, y - HALF_HEIGHT, 2 * HALF_WIDTH, 2 * HALF_HEIGHT, "#dbeafe"))
-        shapes.append(text(x, y + 5, state, 14, anchor="middle", bold=True))
+def draw(to: Path = DOCS / "runner-states.svg") -> None:
+    """Write the figure of the world's side."""
+    moves: Moves = {state: {**of} for state, of in allocation.MOVES.items()}
+    shapes = _states(moves, WORLD)
     to.write_text(page("The states of the robots that one runner plays", 680, 320, shapes), encoding="utf-8")
 
 
-def _arrow(state: State, move: Move) -> list[str]:
-    (x, y), (to_x, to_y) = PLACES[state], PLACES[MOVES[state][move]]
+def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
+    """Write the figure of the runner's side, without the moves that lead nowhere and those that all states have."""
+    moves: dict[str, dict[str, str]] = {
+        state: {move: after for move, after in of.items() if after not in ("ended", state)}
+        for state, of in runner_protocol.MOVES.items()
+    }
+    shared = _shared(moves, WITH_ROBOTS)
+    for state in WITH_ROBOTS:
+        moves[state] = {move: after for move, after in moves[state].items() if move not in shared}
+    (left, y), (right, _), margin = RUNNER[WITH_ROBOTS[0]], RUNNER[WITH_ROBOTS[-1]], HALF_WIDTH + 12.0
+    shapes = [box(left - margin, y - 66.0, right - left + 2 * margin, 98.0, "#f1f5f9")]
+    for move, after in sorted(shared.items()):
+        x, to_y = RUNNER[after]
+        shapes += [arrow(x, y + 32.0, x, to_y - HALF_HEIGHT), text(x + 9, 0.5 * (y + to_y) + 10.0, move)]
+    shapes += [*_states(moves, RUNNER), text(10.0, 250.0, "from every state: the world ends the run, or is gone")]
+    to.write_text(page("The states of a runner", 760, 265, shapes), encoding="utf-8")
+
+
+def _shared(moves: Moves, states: Sequence[str]) -> dict[str, str]:
+    """The moves that all these states have, to the same state."""
+    first, *others = (moves[state] for state in states)
+    return {move: after for move, after in first.items() if all(of.get(move) == after for of in others)}
+
+
+def _states(moves: Moves, places: Places) -> list[str]:
+    """Every state of the table once, every move from it an arrow."""
+    shapes = [
+        shape
+        for state, of in moves.items()
+        for move, after in of.items()
+        for shape in _arrow(places, state, move, after)
+    ]
+    for state in moves:
+        x, y = places[state]
+        shapes.append(box(x - HALF_WIDTH, y - HALF_HEIGHT, 2 * HALF_WIDTH, 2 * HALF_HEIGHT, "#dbeafe"))
+        shapes.append(text(x, y + 5, state, 14, anchor="middle", bold=True))
+    return shapes
+
+
+def _arrow(places: Places, state: str, move: str, after: str) -> list[str]:
+    (x, y), (to_x, to_y) = places[state], places[after]
     top, middle_x = y - HALF_HEIGHT, 0.5 * (x + to_x)
     if to_y > y:  # down, to the nearer part of the box
         end_x, end_y = to_x + 0.2 * (x - to_x), to_y - HALF_HEIGHT
@@ -43,3 +98,4 @@ def _arrow(state: State, move: Move) -> list[str]:
 
 if __name__ == "__main__":
     draw()
+    draw_protocol()

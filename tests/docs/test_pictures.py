@@ -19,7 +19,9 @@ def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypat
     assert b"<svg" in (tmp_path / f"{name}.svg").read_bytes()[:1000]
 
 
-@pytest.mark.parametrize("draw", [parts.draw, robots.draw, runner_states.draw, tick_figure.draw])
+@pytest.mark.parametrize(
+    "draw", [parts.draw, robots.draw, runner_states.draw, runner_states.draw_protocol, tick_figure.draw]
+)
 def test_a_figure_of_the_design_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
     draw(tmp_path / "figure.svg")
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()[:1000]

@@ -4,19 +4,16 @@ The robots are split among `runners` parts. Each part is the protocol code of a 
 is the lockstep of real runs. Only zenoh and the processes are missing. Answers arrive in another order in every tick.
 """
 
-from collections.abc import Iterator
-from types import SimpleNamespace
+from functools import partial
 
 import numpy as np
-import zenoh
 
-from swarmwire.agent.runner import TickInbox, answers, assigned_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.world.backends.allocation import split
 from swarmwire.world.backends.lockstep import Lockstep
+from tests.support.agent.runners import EncodedRunner
 
 
 class EncodedBackend:
@@ -26,17 +23,16 @@ class EncodedBackend:
         """`backwards` gives the first runner the last robots."""
         parts = split(assignment, runners)
         self._lockstep = Lockstep(parts[::-1] if backwards else parts)
-        self._runners: dict[str, tuple[TickInbox, Iterator[bytes]]] = {}
+        self._runners: dict[str, EncodedRunner] = {}
         self._order = np.random.default_rng(1)
         self._parts = len(parts)
 
     def start(self) -> None:
         """Let each runner join, decode its robots and make its agents."""
         for number in range(self._parts):
-            name, inbox = f"r{number}", TickInbox()
-            assignment, memory = assigned_robots(self._lockstep.join(name, JoinRequest().encode()))
-            self._runners[name] = inbox, answers(assignment, memory, inbox)
-            self._lockstep.answer(name, next(self._runners[name][1]))
+            name = f"r{number}"
+            runner = self._runners[name] = EncodedRunner(partial(self._lockstep.join, name))
+            self._lockstep.answer(name, runner.ready)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
@@ -44,9 +40,7 @@ class EncodedBackend:
         """One frame to every runner, one answer from each, in a random order."""
         answered: list[tuple[str, bytes]] = []
         for name, data in self._lockstep.open_tick(tick, readings, received, tx_status):
-            inbox, its = self._runners[name]
-            inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
-            answered.append((name, next(its)))
+            answered.append((name, self._runners[name].answer(data)))
         for at in self._order.permutation(len(answered)):
             self._lockstep.answer(*answered[at])
         return self._lockstep.take()

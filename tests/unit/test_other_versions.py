@@ -12,7 +12,6 @@ from swarmwire.agent import API_VERSION
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
-from swarmwire.agent.runner import assigned_robots
 from swarmwire.comms.config import check_format
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.run_views import ObservedRun
@@ -31,6 +30,7 @@ from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.real_log.about import read_about_robot
 from swarmwire.metrics.verify.verify import verify
 from swarmwire.world.scenario.file import load_scenario
+from tests.support.agent.runners import assigned_robots
 
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": ("scenario.toml", load_scenario),

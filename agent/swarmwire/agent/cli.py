@@ -14,8 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn
 
-from swarmwire.agent.joining import ABOUT as JOIN
-from swarmwire.agent.joining import add_join, join_parsed
+from swarmwire.agent.join_command import ABOUT as JOIN
+from swarmwire.agent.join_command import add_join, join_parsed
 from swarmwire.agent.on_robot.safety import SIGNALS, StopFlag, by_signals
 from swarmwire.agent.on_robot.settings import (
     AGENT,

@@ -9,8 +9,8 @@ import pytest
 import zenoh
 
 from swarmwire.agent import joining as joining_module
-from swarmwire.agent.joining import Joining, join
-from swarmwire.agent.runner import TickInbox
+from swarmwire.agent.joining import JoinSettings, join
+from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import BadInput, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire import frames
@@ -36,7 +36,7 @@ def ticks_of(*numbers: int) -> list[bytes]:
 def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
-    ended = join(Joining(world.endpoint, name="r", **keys), TickInbox(), said.append)
+    ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), said.append)
     return ended.how, ended.why, said
 
 
@@ -57,10 +57,10 @@ def test_a_runner_asks_is_given_robots_answers_every_tick_and_ends_with_the_run(
         assert (asked.robots, asked.names, asked.agents) == (2, None, {"flock": OFFERED.agent_sha256})
 
 
-def test_a_runner_that_is_let_go_is_told_why() -> None:
+def test_a_runner_that_is_removed_is_told_why() -> None:
     with made_up_world() as world:
         world.to_send = [frames.encode("end", -1, {}, {"why": "it was silent"})]
-        assert played(world)[:2] == ("let go", "it was silent")
+        assert played(world)[:2] == ("removed", "it was silent")
 
 
 def test_an_agent_that_fails_is_told_to_the_world_before_the_runner_ends() -> None:
@@ -148,9 +148,9 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):
-            join(Joining(endpoint, name="r"), TickInbox(), print)
+            join(JoinSettings(endpoint, name="r"), Arrivals(), print)
     with pytest.raises(RunnerLost, match=f"nobody answers at {endpoint}") as lost:
-        join(Joining(endpoint, name="r", connect_s=SHORT_S), TickInbox(), print)
+        join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), print)
     assert isinstance(lost.value.__cause__, zenoh.ZError)
 
 
@@ -166,11 +166,11 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
 )
 def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict[str, Any], expected: str) -> None:
     with pytest.raises(BadInput, match=expected):
-        join(Joining(**{"endpoint": "tcp/127.0.0.1:1", **keys}), TickInbox(), print)
+        join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), print)
 
 
 def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:
     certified = Network(ca=Path("ca.pem"), certificate=Path("lab/alice.pem"), key=Path("lab/alice.key"))
-    assert Joining("tcp/127.0.0.1:1", network=certified).runner == "alice"
-    made_up = {Joining("tcp/127.0.0.1:1").runner for _ in range(2)}
+    assert JoinSettings("tcp/127.0.0.1:1", network=certified).runner == "alice"
+    made_up = {JoinSettings("tcp/127.0.0.1:1").runner for _ in range(2)}
     assert len(made_up) == 2

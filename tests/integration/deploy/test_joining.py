@@ -106,7 +106,7 @@ CASES = {
         told="lost a",
         counts={"runners_lost": 1},
         reason=NO_ANSWER,
-        ends={"a": (1, f"the world let it go: {NO_ANSWER}")},
+        ends={"a": (1, f"the world removed the runner: {NO_ANSWER}")},
     ),
     "in the background of a script, where Ctrl-C is ignored": Case(
         on_loss="stop",
@@ -154,7 +154,7 @@ CASES = {
         settings=(LONG, "run.watchdog_s=0.5", "run.runner_timeout_s=1"),
         counts={"runners_lost": 1},
         reason=NO_ANSWER,
-        ends={"a": (1, f"the world let it go: {NO_ANSWER}")},
+        ends={"a": (1, f"the world removed the runner: {NO_ANSWER}")},
         stopped=range(5),
     ),
 }

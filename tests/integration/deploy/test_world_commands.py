@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.agent.joining import Joining, join
-from swarmwire.agent.runner import TickInbox
+from swarmwire.agent.joining import JoinSettings, join
+from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
 from tests.support.deploy.commands import LOSSY, called, swarmwire
@@ -161,4 +161,4 @@ def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why)
 
 def test_where_nobody_listens_it_says_so():
     with pytest.raises(RunnerLost, match="nobody answers at tcp/127.0.0.1:1$"):
-        join(Joining("tcp/127.0.0.1:1", name="a", connect_s=0.2), TickInbox(), print)
+        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.agent.joining import Joining, join
-from swarmwire.agent.runner import TickInbox
+from swarmwire.agent.joining import JoinSettings, join
+from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
@@ -106,7 +106,7 @@ def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():
         endpoint = listens_at(world)[0]
         token = world.liveliness().declare_token(Keys("3f2a").world)
         with pytest.raises(BadInput, match=r"--run: expected one of the runs at .*: 3f2a, got 1234"):
-            join(Joining(endpoint, run="1234", name="a"), TickInbox(), print)
+            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), print)
         with pytest.raises(RunnerLost, match="told nothing of its run"):  # this one is asked
-            join(Joining(endpoint, run="3f2a", name="a"), TickInbox(), print)
+            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), print)
         token.undeclare()

@@ -5,16 +5,13 @@ import signal
 import subprocess
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
-
-import zenoh
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
-from swarmwire.agent.runner import TickInbox, answers, assigned_robots
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
@@ -29,6 +26,7 @@ from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss, RunnerEvent
+from tests.support.agent.runners import EncodedRunner
 from tests.support.deploy.commands import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)
@@ -154,7 +152,7 @@ class EncodedJoiners:
         terms = JoinPolicy(open=True, start_with=0, memory=kept if on_loss in KEPT else None)
         self.roster = Lockstep([assignment], on_loss, terms)
         self._script = script
-        self._runners: dict[str, tuple[TickInbox, Iterator[bytes]]] = {}
+        self._runners: dict[str, EncodedRunner] = {}
 
     def start(self) -> None:
         for line in self._script[-1]:
@@ -175,10 +173,9 @@ class EncodedJoiners:
     def _do(self, what: str, name: str, robots: str = "") -> None:
         if what == "join":
             asked = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
-            given = self.roster.join(name, JoinRequest(**(asked if robots else {})).encode())
-            inbox = TickInbox()
-            self._runners[name] = inbox, answers(*assigned_robots(given), inbox)
-            self._deliver(self.roster.answer(name, next(self._runners[name][1])))
+            request = JoinRequest(**(asked if robots else {}))
+            runner = self._runners[name] = EncodedRunner(partial(self.roster.join, name), request)
+            self._deliver(self.roster.answer(name, runner.ready))
         elif what == "leave":
             self.roster.answer(name, frames.encode("leave", -1, {}))
             del self._runners[name]
@@ -189,9 +186,7 @@ class EncodedJoiners:
     def _deliver(self, out: Sequence[tuple[str, bytes]]) -> None:
         for name, data in out:
             if name in self._runners:
-                inbox, its = self._runners[name]
-                inbox.put_frame(SimpleNamespace(payload=zenoh.ZBytes(data)))
-                self._deliver(self.roster.answer(name, next(its)))
+                self._deliver(self.roster.answer(name, self._runners[name].answer(data)))
 
     def counts(self) -> dict[str, int]:
         return self.roster.counts()

@@ -1,210 +1,209 @@
-"""A runner's inbox: it acts on the newest frame only, and counts what it passes over."""
+"""A runner at a made-up session: how it finds its world, joins, plays and leaves; and what its agents answer."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import msgpack
-import numpy as np
 import pytest
 import zenoh
 
 from swarmwire.agent import runner
-from swarmwire.agent.runner import NEXT_FREE, TickInbox, assigned_robots
-from swarmwire.comms.errors import BadFrame, RunnerLost
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
+from swarmwire.agent.runner_agents import RunnerAgents
+from swarmwire.agent.runner_protocol import Ended
+from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import MEASURES, assignment, group, readings, received_from
+from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, spec, words
+from tests.support.agent.runners import joining
+
+KEYS = Keys("run1")
+END = frames.encode("end", -1, {})
 
 
-@dataclass
-class Bytes:
+def reply(agent: str, memory: bytes | None = None) -> bytes:
+    robots = assignment(group(spec(agent), [0])).as_mapping()
+    return msgpack.packb({**robots, "v": frames.VERSION, "memory": memory})
+
+
+def tick(number: int) -> bytes:
+    return encode_tick(number, {"flock": readings(number, [0])}, SILENCE, NO_TX_STATUSES)
+
+
+class Payload(NamedTuple):
     data: bytes
 
     def to_bytes(self) -> bytes:
         return self.data
 
-
-@dataclass
-class Sample:
-    payload: Bytes
+    def to_string(self) -> str:
+        return self.data.decode()
 
 
-def inbox_of(*arrived: Any) -> TickInbox:
-    inbox = TickInbox()
-    for item in arrived:
-        inbox._arrived.put(item if isinstance(item, bool) else Sample(Bytes(item)))
-    return inbox
+class Sample(NamedTuple):
+    payload: Payload
+    kind: zenoh.SampleKind = zenoh.SampleKind.PUT
 
 
-def tick(number: int) -> bytes:
-    return encode_tick(number, {"flock": readings(number, [0])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+class Reply(NamedTuple):
+    ok: Sample | None
+    err: Sample | None = None
 
 
-ASSIGNMENT = assignment(group("unused:Agent", [0]))
-END = frames.encode("end", -1, {})
+class FakeSession:
+    """A session, its liveliness and its publisher in one; the world is a list of what it sends after each frame.
 
+    The world's token appears with the `found`-th subscription to it.
+    """
 
-def test_of_frames_that_wait_the_newest_is_acted_on_and_the_others_are_counted() -> None:
-    inbox = inbox_of(True, tick(0), tick(1), tick(2))
-    ticks = inbox.ticks(ASSIGNMENT)
-    assert next(ticks)[0] == 2
-    assert inbox.dropped == 2
-    strange = encode_tick(9, {"others": readings(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
-    of_others = encode_tick(9, {"flock": readings(9, [1])}, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
-    for data in (tick(2), tick(1), b"\xc1", strange, of_others, tick(3), tick(5), tick(4)):
-        inbox.put_frame(Sample(Bytes(data)))
-    assert next(ticks)[0] == 5
-    assert inbox.dropped == 2 + 7
-    inbox.put_frame(Sample(Bytes(tick(6))))
-    assert next(ticks)[0] == 6
-    assert inbox.dropped == 9
+    def __init__(self, *then: bytes, replies: Sequence[Reply] = (Reply(Sample(Payload(reply("Counter")))),)) -> None:
+        self.found, self.declared, self.undeclared = 1, 0, 0
+        self.put_to_world: list[frames.Frame] = []
+        self.before_reply: tuple[bytes, ...] = ()
+        self.on_put: Callable[[frames.Frame], object] = lambda _: None
+        self.then, self._replies = list(then), replies
+        self._frame: Any = None
 
-
-def test_nothing_is_acted_on_once_the_run_is_over() -> None:
-    assert list(inbox_of(tick(0), END).ticks(ASSIGNMENT)) == []
-    assert list(inbox_of(tick(0), tick(1), False).ticks(ASSIGNMENT)) == []
-
-
-def packets(number: int, tick_number: int = 0) -> bytes:
-    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
-    return encode_packets(tick_number, 1_000 * number, number, received_from(sent, [0]), NO_TX_STATUSES)
-
-
-def test_packets_between_ticks_are_kept_at_once_and_told_of_when_nothing_newer_waits() -> None:
-    inbox, kept = inbox_of(True, tick(0)), list[int]()
-
-    def receive(received: ReceivedPackets, _: TxStatuses) -> None:
-        kept.append(received.payloads.row(0)[2])
-
-    told = inbox.ticks(ASSIGNMENT, receive)
-    assert next(told)[0] == 0
-    for data in (packets(0), packets(1)):
-        inbox.put_frame(Sample(Bytes(data)))
-    assert next(told) == (0, 1_000)
-    assert kept == [0, 1]
-    for data in (packets(2), tick(1), packets(3, 1)):
-        inbox.put_frame(Sample(Bytes(data)))
-    assert next(told)[0] == 1  # with the packets that are there: the step reads all of them
-    assert kept == [0, 1, 2, 3]
-    inbox.put_frame(Sample(Bytes(END)))
-    assert list(told) == []
-    assert (inbox.dropped, inbox.missed) == (0, 0)
-
-
-def test_frames_with_packets_that_never_came_are_counted() -> None:
-    inbox = inbox_of(True, packets(2), packets(3), packets(7), frames.encode("packets", 0, {}))
-    assert next(inbox.ticks(ASSIGNMENT)) == (0, 7_000)
-    assert (inbox.missed, inbox.dropped) == (2 + 3, 1)
-
-
-def test_what_came_before_the_robots_were_given_is_forgotten_but_not_that_the_world_is_gone() -> None:
-    inbox = inbox_of(True, END, tick(0))
-    inbox.forget_frames()
-    inbox.put_frame(Sample(Bytes(tick(1))))
-    assert next(inbox.ticks(ASSIGNMENT))[0] == 1
-    assert inbox.dropped == 2
-    gone = inbox_of(True, END, False)
-    gone.forget_frames()
-    assert list(gone.ticks(ASSIGNMENT)) == []
-    assert gone.ended.how == "gone"
-
-
-def test_why_a_runner_ended_is_told() -> None:
-    let_go = frames.encode("end", -1, {}, {"why": "no answer for 3 s"})
-    for arrived, ended in ((END, ("over", "")), (let_go, ("let go", "no answer for 3 s"))):
-        inbox = inbox_of(arrived)
-        assert list(inbox.ticks(ASSIGNMENT)) == []
-        assert inbox.ended == ended
-    inbox = inbox_of(tick(0))
-    ticks = inbox.ticks(ASSIGNMENT)
-    assert next(ticks)[0] == 0
-    inbox.leave()
-    assert list(ticks) == []
-    assert inbox.ended.how == "left"
-    inbox.put_frame(Sample(Bytes(END)))
-    inbox.wait_for_farewell()
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"groups": None},
-        {"groups": [3]},
-        {"rate_hz": 0},
-        {"measures": [1]},
-        {"memory": "text"},
-        {"memory": b"\xc1"},
-        {"v": frames.VERSION - 1},
-        *({"groups": [{**ASSIGNMENT.as_mapping()["groups"][0], **one}]} for one in (
-            {"rows": [[1, 2]]}, {"rows": [-1]}, {"rows": [2**63]}, {"rows": ["x"]}, {"robot_names": []},
-            {"keys": [1, 2]}, {"keys": [-1]}, {"params": []}, {"body": {}}, {"act_every_ticks": 0}, {"agent": 3},
-        )),
-    ],
-    ids=repr,
-)  # fmt: skip
-def test_robots_that_a_world_cannot_give_are_refused(wrong: dict[str, Any]) -> None:
-    given = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None}
-    assert assigned_robots(msgpack.packb(given))[0].robot_names == ("flock-0",)
-    with pytest.raises(BadFrame):
-        assigned_robots(msgpack.packb({**given, **wrong}))
-
-
-class Deaf:
-    """A session of which all but the `received`-th subscriber are told nothing of the world's token."""
-
-    def __init__(self, received: int) -> None:
-        self.received, self.declared, self.undeclared = received, 0, 0
-
-    def liveliness(self) -> "Deaf":
+    def liveliness(self) -> "FakeSession":
         return self
 
-    def declare_subscriber(self, _key: str, callback: Any, *, history: bool) -> "Deaf":
-        assert history
-        self.declared += 1
-        if self.declared == self.received:
-            callback(Token())
+    def declare_token(self, _key: str) -> None:
+        """Nobody looks."""
+
+    def declare_subscriber(self, key: str, callback: Any, *, history: bool = False) -> "FakeSession":
+        if key == KEYS.world:
+            assert history
+            self.declared += 1
+            if self.declared == self.found:
+                callback(Sample(Payload(b"")))
+        else:
+            self._frame = callback
         return self
 
     def undeclare(self) -> None:
         self.undeclared += 1
 
+    def get(self, key: str, *, payload: bytes, timeout: float) -> Sequence[Reply]:
+        assert (key, bool(payload), timeout > 0.0) == (KEYS.join("r7"), True, True)
+        for data in self.before_reply:
+            self._frame(Sample(Payload(data)))
+        return self._replies
 
-class Token:
-    kind = zenoh.SampleKind.PUT
+    def declare_publisher(self, key: str, **_qos: Any) -> "FakeSession":
+        assert key == KEYS.answer("r7")
+        return self
+
+    def put(self, data: bytes) -> None:
+        self.put_to_world.append(frames.decode(data))
+        self.on_put(self.put_to_world[-1])
+        if self.then:
+            self._frame(Sample(Payload(self.then.pop(0))))
 
 
-@pytest.mark.parametrize(("received", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
-def test_a_runner_that_is_told_nothing_of_its_world_asks_again(
-    received: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
+def played(session: Any, arrivals: Arrivals | None = None) -> Ended:
+    return play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE)
+
+
+def kinds(session: FakeSession) -> list[tuple[str, int]]:
+    return [(frame.kind, frame.tick) for frame in session.put_to_world]
+
+
+def test_a_runner_answers_each_tick_until_the_run_is_over() -> None:
+    session = FakeSession(tick(0), tick(1), END)
+    session.before_reply = (tick(5), END)  # for a lost runner of the same name
+    assert played(session) == Ended("over")
+    assert kinds(session) == [("ready", -1), ("actions", 0), ("actions", 1)]
+    assert session.put_to_world[1].values["dropped"] == 2
+
+
+def test_a_runner_that_leaves_waits_for_the_confirmation() -> None:
+    session, arrivals = FakeSession(tick(0)), Arrivals()
+    session.on_put = lambda frame: arrivals.leave() if frame.kind == "actions" else None
+    session.then.extend((tick(1), END))  # the tick is under way, and no longer answered
+    assert played(session, arrivals) == Ended("left")
+    assert kinds(session) == [("ready", -1), ("actions", 0), ("leave", -1)]
+
+
+def test_a_runner_that_is_to_leave_while_it_joins_leaves_once_it_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "FAREWELL_TIMEOUT_S", 0.01)  # and nobody confirms
+    session, arrivals = FakeSession(), Arrivals()
+    play(session, KEYS, "r7", arrivals, lambda: NEXT_FREE, lambda _: arrivals.leave())  # pyright: ignore[reportArgumentType]
+    assert kinds(session) == [("ready", -1), ("leave", -1)]
+
+
+def test_a_runner_that_is_to_leave_before_it_has_found_its_world_is_interrupted() -> None:
+    session, arrivals = FakeSession(), Arrivals()
+    arrivals.leave()
+    with pytest.raises(KeyboardInterrupt):
+        played(session, arrivals)
+    assert session.put_to_world == []
+
+
+@pytest.mark.parametrize(("found", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
+def test_a_runner_without_a_report_of_its_world_asks_again(
+    found: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.04)
     monkeypatch.setattr(runner, "POLL_S", 0.01)
-    session = Deaf(received)
-    watched = runner._watched_world(session, Keys("run1"), TickInbox())  # pyright: ignore[reportArgumentType]
-    assert (watched is None) == (received > 4)
+    session = FakeSession(END)
+    session.found = found
+    if found > 4:
+        with pytest.raises(RunnerLost, match="there is no run run1, or it does not let r7 in"):
+            played(session)
+    else:
+        assert played(session) == Ended("over")
     assert (session.declared, session.undeclared) == (declared, undeclared)
 
 
-class NoAnswer:
-    """A session and an answer in one: a query whose time is up, as zenoh tells of it."""
-
-    ok = None
-
-    def __init__(self) -> None:
-        self.err = self.payload = self
-
-    def get(self, _key: str, *, payload: bytes, timeout: float) -> list["NoAnswer"]:
-        assert payload
-        assert timeout
-        return [self]
-
-    def to_string(self) -> str:
-        return "Timeout"
-
-
-def test_a_world_that_takes_too_long_to_answer_is_named_as_what_is_wrong() -> None:
-    with pytest.raises(RunnerLost, match="the world did not answer to join within") as lost:
-        runner._join(NoAnswer(), Keys("run1"), "r7", NEXT_FREE)  # pyright: ignore[reportArgumentType]
+@pytest.mark.parametrize(
+    ("replies", "why"),
+    [
+        ((Reply(None, Sample(Payload(b"Timeout"))),), "the world did not answer to join within"),
+        ((Reply(None, Sample(Payload(b"no robots are free"))),), "no robots are free"),
+        ((), "the world did not answer to join"),
+        ((Reply(Sample(Payload(b"\xc1"))),), "the world's answer to join is none"),
+    ],
+)
+def test_a_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequence[Reply], why: str) -> None:
+    with pytest.raises(RunnerLost, match=why) as lost:
+        played(FakeSession(replies=replies))
     assert lost.value.runner == "r7"
+
+
+@pytest.mark.parametrize("agent", ["Failing", "Nowhere"])
+def test_agents_that_fail_are_reported_in_a_frame_that_awaits_the_end(agent: str) -> None:
+    session = FakeSession(*map(tick, range(9)), END, replies=(Reply(Sample(Payload(reply(agent)))),))
+    session.on_put = lambda frame: session.then.__setitem__(slice(None), [END]) if frame.kind == "failed" else None
+    assert played(session) == Ended("over")
+    failed = session.put_to_world[-1]
+    assert (failed.kind, failed.values["robots"]) == ("failed", "flock-0")
+    assert "Traceback" in failed.values["traceback"]
+
+
+def test_agents_read_packets_between_ticks_and_answer_them() -> None:
+    session = FakeSession(
+        tick(0),
+        encode_packets(0, 1_000, 0, received_from(words(1, 2), [0]), NO_TX_STATUSES),
+        END,
+        replies=(Reply(Sample(Payload(reply("Echo")))),),
+    )
+    assert played(session) == Ended("over")
+    assert kinds(session) == [("ready", -1), ("actions", 0), ("sent", 0)]
+    assert session.put_to_world[-1].arrays["sent"].shape == (2, 2)
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool) -> None:
+    protocol = joining()
+    assigned = protocol.receive_assignment(reply("VectorCounter", encode_memory({}) if keeps else None))
+    agents = RunnerAgents(protocol, assigned)
+    agents.handle(assigned)
+    protocol.receive_frame(tick(0))
+    event = protocol.next_event()
+    assert event is not None
+    assert not isinstance(event, Ended)
+    answer = frames.decode(agents.handle(event) or b"")
+    assert ("memory/flock/rows" in answer.arrays) == keeps

@@ -47,13 +47,14 @@ def join_command(
       swarmwire join tls/10.0.0.5:7447 --robots 5 --certs lab-certs --name r1
     """
     # Imported here: zenoh takes a moment, which --help and typing errors should not.
-    from swarmwire.agent.joining import Joining, join_and_report, names_in
+    from swarmwire.agent.join_command import join_and_report, names_in
+    from swarmwire.agent.joining import JoinSettings
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.purposes import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, files=(ca, certificate, key), insecure=insecure)
     code = join_and_report(
-        Joining(
+        JoinSettings(
             endpoint=endpoint,
             robots=robots,
             names=None if names is None else names_in(names),

@@ -10,6 +10,7 @@ from typing import Any
 import zenoh
 
 from swarmwire.agent import runner
+from swarmwire.agent.runner_protocol import JoinOptions
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.join import JoinRequest
@@ -104,6 +105,6 @@ class GuardedWorld:
         return {}
 
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
-        asked = runner.Asked(JoinRequest(names=robots))
+        options = JoinOptions(JoinRequest(names=robots))
         with self.session_of(name) as session:
-            runner.play(session, self.keys, name, runner.TickInbox(), lambda: asked)
+            runner.play(session, self.keys, name, runner.Arrivals(), lambda: options)

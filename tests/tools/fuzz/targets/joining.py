@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from swarmwire.agent.agent import NoAgent
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.agent.runner import assigned_robots
+from swarmwire.agent.runner_agents import make_executor
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
@@ -23,6 +23,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.scenario.file import scenario_from
+from tests.support.agent.runners import assigned_robots
 from tests.tools.fuzz.mutations import JSON, TEXTS, one_in, pick
 from tests.tools.fuzz.small_run import SCENARIO, small_run
 from tests.tools.fuzz.target import DocumentTarget, check_line
@@ -119,7 +120,7 @@ class Assignments(DocumentTarget):
         return [msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one}) for part, one in memories]
 
     def feed(self, case: bytes) -> None:
-        AgentExecutor(*assigned_robots(case))
+        make_executor(assigned_robots(case))
 
 
 class Control(DocumentTarget):

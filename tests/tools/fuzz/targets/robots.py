@@ -107,7 +107,7 @@ class Epuck2Answers(ByteTarget):
                 link.receive(0.0)
         except DriverLost:
             refused = "lost"
-        driver._take(link)
+        driver._read_newest(link)
         for name, value in driver._readings.of(driver._newest_sensors, driver.measures).items():
             if value.dtype != np.float64:
                 raise AssertionError(f"{name} of {value.dtype}")

@@ -2,11 +2,12 @@
 
 from typing import Any, NamedTuple
 
+import msgpack
 import numpy as np
 from hypothesis.strategies import DrawFn
 
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.agent.runner import TickInbox
+from swarmwire.agent.runner_protocol import Ended, PacketsBetween, PacketsReceived, Tick
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import Readings
@@ -15,9 +16,10 @@ from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, enc
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.realtime import RealTime
+from swarmwire.world.backends.realtime import RealTime, RealTimeAllocation
 from swarmwire.world.backends.registry import RunnerRegistry
 from tests.support.agent.hosts import PLAYERS
+from tests.support.agent.runners import joining
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.small_run import RUNNERS, joined, readings_of, small_run
 from tests.tools.fuzz.target import FrameTarget
@@ -119,48 +121,22 @@ class WorldFrames(FrameTarget):
 def _state(roster: Any) -> Any:
     """All that a frame might change."""
     slots = [
-        (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), len(getattr(slot, "asked", ())))
+        (slot.runner, slot.state, id(getattr(slot, "actions", None)), id(slot.memory), _unanswered(slot))
         for slot in roster._allocations
     ]
     if isinstance(roster, RealTime):
-        arrays = (roster._asked_ns, roster._stopped, roster._drive, roster._command, roster.late)
-        kept = (roster._sent, roster._notes, roster._leds, roster._own, roster._values)
+        arrays = (roster._pending_since_ns, roster._stopped, roster._drive, roster._command, roster.late)
+        kept = (roster._sent, roster._notes, roster._leds, roster._actuator_commands, roster._values)
         return slots, [array.tobytes() for array in arrays], [len(one) for one in kept], dict(roster._numbers)
     return slots, sorted(roster._by_runner), roster._tick
 
 
-class QueueEmpty(Exception):
-    """The inbox has taken in all that arrived."""
-
-
-class Payload(NamedTuple):
-    data: bytes
-
-    def to_bytes(self) -> bytes:
-        return self.data
-
-
-class Sample(NamedTuple):
-    payload: Payload
-
-
-class Arrivals:
-    """In place of the inbox's queue: it raises QueueEmpty where the queue would wait."""
-
-    def __init__(self, data: bytes) -> None:
-        self._items = [Sample(Payload(data))]
-
-    def empty(self) -> bool:
-        return not self._items
-
-    def get(self) -> Sample:
-        if not self._items:
-            raise QueueEmpty
-        return self._items.pop()
+def _unanswered(slot: Any) -> int:
+    return len(slot.unanswered) if isinstance(slot, RealTimeAllocation) else 0
 
 
 class RunnerFrames(FrameTarget):
-    """Frames to a runner: tick, packets, end. The agents can act on those that its inbox takes."""
+    """Frames to a runner: tick, packets, end. The agents can act on those that its protocol takes."""
 
     name = "runner-frames"
     quick = 250
@@ -174,27 +150,37 @@ class RunnerFrames(FrameTarget):
         self.shapes = _shapes(decoded[0])
         between = encode_packets(11, 1_150_000_000, 3, run.received, run.tx_status)
         end = frames.encode("end", -1, {}, {"why": "it sent far more than it was asked for"})
+        self.robots = msgpack.packb({**run.parts[0].as_mapping(), "v": frames.VERSION, "memory": None})
         return [*run.frames["one"][-3:], between, end]
 
     def feed(self, case: bytes) -> str | None:
-        inbox, part, refused = TickInbox(), self.run.parts[0], None
-        inbox._arrived = Arrivals(case)
-        host = self.host = self.host or AgentExecutor(part)
-        try:
-            for inputs in inbox.ticks(part, host.receive):
-                self.host = None  # its agents may now remember what no world sends
-                refused = self._act(host, inputs)
-        except QueueEmpty:
-            return "dropped" if inbox.dropped else refused
-        return inbox.ended.how
+        protocol, refused = joining(), None
+        protocol.receive_assignment(self.robots)
+        protocol.ready()
+        protocol.receive_frame(case)
+        host = self.host = self.host or AgentExecutor(self.run.parts[0])
+        while (event := protocol.next_event()) is not None:
+            if isinstance(event, Ended):
+                return event.how
+            self.host = None  # its agents may now remember what no world sends
+            refused = self._act(host, event)
+        return "dropped" if protocol.dropped else refused
 
-    def _act(self, host: AgentExecutor, inputs: Any) -> str | None:
+    def _act(self, host: AgentExecutor, event: Tick | PacketsReceived | PacketsBetween) -> str | None:
         """Only the agents' own code may fail, or all that misses a reading that the world does not give."""
         try:
-            host.on_receive(*inputs) if len(inputs) == 2 else host.act(*inputs)
+            match event:
+                case Tick():
+                    host.act(*event)
+                case PacketsReceived():
+                    host.receive(*event)
+                case PacketsBetween():
+                    host.on_receive(*event)
         except AgentFailed as error:
             lines = [line for line in error.traceback.splitlines() if line.startswith('  File "')]
-            if str(PLAYERS) not in lines[-1] and (len(inputs) == 2 or _shapes(inputs[1]) == self.shapes):
+            if str(PLAYERS) not in lines[-1] and (
+                not isinstance(event, Tick) or _shapes(event.readings) == self.shapes
+            ):
                 raise AssertionError(error.traceback[-1500:]) from error
             return "the agents fail"
         return None

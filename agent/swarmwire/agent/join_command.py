@@ -1,0 +1,117 @@
+"""The command `swarmwire-agent join`: flags, signals, messages and exit codes around `joining.join`."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED
+
+if TYPE_CHECKING:
+    from swarmwire.agent.joining import JoinSettings
+    from swarmwire.agent.runner import Arrivals
+
+ABOUT = """Play robots of a run that a world elsewhere has opened with `swarmwire world`.
+
+The agent is the one that is installed here; its file must be the same as the world's."""
+
+
+def add_join(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of `swarmwire-agent join`."""
+    command.add_argument("endpoint", metavar="ENDPOINT", help="where the world listens: tls/10.0.0.5:7447")
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--robots", type=int, metavar="N", help="so many; else all that are free, or the next part")
+    which.add_argument("--names", metavar="A,B", help="these robots")
+    command.add_argument(
+        "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; else as the scenario names it"
+    )
+    command.add_argument("--scenario", type=Path, metavar="FILE", help="join only a run of exactly this scenario")
+    command.add_argument("--name", help="the runner's; else its certificate's, or one made up")
+    command.add_argument("--run", metavar="ID", help="which run, if there are several")
+    command.add_argument("--ca", type=Path, metavar="FILE", help="certificate that signed all others")
+    command.add_argument("--certificate", type=Path, metavar="FILE", help="the runner's certificate")
+    command.add_argument("--key", type=Path, metavar="FILE", help="its private key")
+    command.add_argument("--insecure", action="store_true", help="go without certificates beyond this machine")
+
+
+def join_parsed(parsed: argparse.Namespace) -> int:
+    """Run `swarmwire-agent join`; returns the exit code."""
+    # Imported here, as below: zenoh loads slowly, and the agent of a robot may not use it.
+    from swarmwire.agent.joining import JoinSettings
+    from swarmwire.comms.wire.network import Network
+
+    network = Network(
+        ca=parsed.ca,
+        certificate=parsed.certificate,
+        key=parsed.key,
+        insecure=parsed.insecure,
+    )
+    return join_and_report(
+        JoinSettings(
+            endpoint=parsed.endpoint,
+            robots=parsed.robots,
+            names=None if parsed.names is None else names_in(parsed.names),
+            agents=tuple(parsed.agent or ()),
+            scenario=parsed.scenario,
+            name=parsed.name,
+            run=parsed.run,
+            network=network,
+        )
+    )
+
+
+def names_in(text: str) -> tuple[str, ...]:
+    """The names of a list such as "flock-0,flock-3"."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def join_and_report(settings: "JoinSettings") -> int:
+    """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`."""
+    from swarmwire.agent.joining import join
+    from swarmwire.agent.runner import Arrivals
+
+    if replace(settings.network, connect=(settings.endpoint,)).warning is not None:
+        _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
+    arrivals = Arrivals()
+    with _leaving_by_signals(arrivals):
+        ended = join(settings, arrivals, _say)
+    _say(_END_TEXTS[ended.how] + (f": {ended.why}" if ended.why else ""))
+    return _EXIT_CODES[ended.how]
+
+
+_END_TEXTS = {
+    "over": "the run is over",
+    "left": "left the run",
+    "removed": "the world removed the runner",
+    "gone": "the world is gone, or out of reach",
+}
+_EXIT_CODES = {"over": ENDED, "left": INTERRUPTED, "removed": FAILED, "gone": FAILED}
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
+@contextmanager
+def _leaving_by_signals(arrivals: "Arrivals") -> Generator[None]:
+    """Within this context, the first Ctrl-C or stop signal leaves the run; a second Ctrl-C ends at once."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: now for number in numbers if (now := signal.getsignal(number)) != signal.SIG_IGN}
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        arrivals.leave()
+        if signal.SIGINT in before:  # a background job of a shell script ignores it
+            signal.signal(signal.SIGINT, before[signal.SIGINT])
+
+    for number in before:
+        signal.signal(number, leave)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,261 @@
+"""The runner's side of the protocol, without any I/O: bytes and the world's token in, events and bytes out.
+
+    state      move      next     by
+    searching  finds     joining  `world_present(True)`
+    joining    joins     joined   `receive_assignment`, with the world's reply to the request of `join`
+    joined     is ready  ready    `ready`, once the agents are made
+    ready      is asked  acting   the event `Tick`
+    acting     answers   ready    `answer`
+    ready      sends     ready    `send`, at the event `PacketsBetween`
+    these 3    fails     failed   `fail`; the runner stays until the world ends the run
+    and failed leaves    leaving  `leave`; the runner stays until the world confirms it
+    all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
+
+The caller passes on all that has arrived, then takes events from `next_event` until there are none. So of the frames
+"tick" that wait, a runner acts on the newest; in lockstep there is only one. Each `Tick` has exactly one answer.
+Frames "packets", which come between ticks, are events in their order.
+
+A frame that comes before the assignment, is malformed, is out of order or is replaced by a newer one is counted and
+dropped; the next answer reports the count. A call that the state does not allow raises RuntimeError and changes
+nothing. The world's side is `RunnerRegistry`, with `Lockstep` and `RealTime`.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.agent_memory import Memory
+from swarmwire.comms.wire.frames import Frame
+from swarmwire.comms.wire.join import JoinRequest, versioned
+from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
+
+State = Literal["searching", "joining", "joined", "ready", "acting", "failed", "leaving", "ended"]
+Move = Literal["finds", "joins", "is ready", "is asked", "answers", "sends", "fails", "leaves", "ends"]
+
+MOVES: dict[State, dict[Move, State]] = {
+    "searching": {"finds": "joining", "ends": "ended"},
+    "joining": {"joins": "joined", "ends": "ended"},
+    "joined": {"is ready": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
+    "ready": {"is asked": "acting", "sends": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
+    "acting": {"answers": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
+    "failed": {"leaves": "leaving", "ends": "ended"},
+    "leaving": {"ends": "ended"},
+    "ended": {},
+}
+
+
+@dataclass(frozen=True)
+class JoinOptions:
+    """The request of a runner for robots, and its own agents."""
+
+    request: JoinRequest = field(default_factory=JoinRequest)
+    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group, in place of the world's
+
+
+class Assigned(NamedTuple):
+    """The robots of the runner, and the memory of earlier agents of them; None: the world keeps no memory."""
+
+    assignment: Assignment
+    memory: Frame | None
+
+
+class Tick(NamedTuple):
+    """The newest tick: its readings, and the packets and statuses since the runner's robots acted last."""
+
+    tick: int
+    readings: Readings
+    received: ReceivedPackets
+    tx_status: TxStatuses
+
+
+class PacketsReceived(NamedTuple):
+    """Packets and statuses that came between ticks; they wait for the next step, or for `PacketsBetween`."""
+
+    received: ReceivedPackets
+    tx_status: TxStatuses
+
+
+class PacketsBetween(NamedTuple):
+    """No newer tick waits, so the agents may read the packets received so far, at this time, and send others."""
+
+    tick: int
+    at_ns: int
+
+
+class Ended(NamedTuple):
+    """The end of a runner: the run is over, it left, the world removed it, or the world is gone."""
+
+    how: Literal["over", "left", "removed", "gone"]
+    why: str = ""  # the world's reason, if it removed the runner
+
+
+Event = Tick | PacketsReceived | PacketsBetween | Ended
+
+
+class RunnerProtocol:
+    """The protocol of one runner, from its search for the world to its end.
+
+    Attributes:
+        state: the state; `MOVES` has the moves from it.
+        dropped: dropped frames since the last answer.
+        missed: frames "packets" that never arrived, since the last frame "sent".
+    """
+
+    def __init__(self) -> None:
+        self.state: State = "searching"
+        self.dropped = self.missed = 0
+        self._agents: Mapping[str, str] = {}
+        self._rows: dict[str, IntArray] = {}  # by group; empty before the assignment
+        self._measures: tuple[str, ...] = ()
+        self._period = 1  # of the ticks in which any group acts
+        self._newest: Tick | None = None  # not acted on yet
+        self._last_tick = self._open_tick = -1  # of the frames, and of the tick to answer
+        self._packets: deque[PacketsReceived] = deque()
+        self._between: PacketsBetween | None = None
+        self._next_number = 0  # of the frames "packets"
+        self._ended: Ended | None = None
+
+    def world_present(self, present: bool) -> None:
+        """The world's liveliness token appeared or vanished."""
+        if not present:
+            self._end(Ended("left" if self.state == "leaving" else "gone"))
+        elif self.state == "searching":
+            self._move("finds")
+
+    def join(self, options: JoinOptions) -> bytes:
+        """The request for robots."""
+        self._require("joins")
+        self._agents = options.agents
+        return options.request.encode()
+
+    def receive_assignment(self, data: bytes) -> Assigned:
+        """The robots in the world's reply to the request; BadFrame if it assigns none."""
+        self._require("joins")
+        reply = versioned(data, frames.MAX_BYTES)
+        assignment, memory = Assignment.from_mapping(reply).with_agents(self._agents), reply.get("memory")
+        if not assignment.groups:
+            raise BadFrame("malformed", "groups: expected at least one")
+        if memory is not None and not isinstance(memory, bytes):
+            raise BadFrame("malformed", "memory: expected a frame")
+        assigned = Assigned(assignment, None if memory is None else frames.decode(memory))
+        self._rows = {group.name: group.rows for group in assignment.groups}
+        self._measures = assignment.measures or ()
+        self._period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
+        self._move("joins")
+        return assigned
+
+    def receive_frame(self, data: bytes) -> None:
+        """Take a frame from the world; one that does not fit is counted and dropped."""
+        try:
+            frame = frames.decode(data)
+            if not self._rows or self.state == "ended":
+                raise BadFrame("unexpected_kind", frame.kind)
+            if frame.kind == "end":
+                self._end(self._ended_by(frame))
+            elif self.state in ("failed", "leaving"):
+                raise BadFrame("unexpected_kind", frame.kind)
+            elif frame.kind == "packets":
+                self._receive_packets(frame)
+            else:
+                self._receive_tick(frame)
+        except BadFrame:
+            self.dropped += 1
+
+    def next_event(self) -> Event | None:
+        """The next event; None: the runner has to wait for an arrival, or to answer. `Ended` is last, and stays."""
+        if self.state != "ready":
+            return self._ended
+        if self._packets:
+            return self._packets.popleft()
+        if self._newest is None:
+            between, self._between = self._between, None
+            return between
+        tick, self._newest, self._between = self._newest, None, None
+        self._open_tick = tick.tick
+        self._move("is asked")
+        return tick
+
+    def ready(self) -> bytes:
+        """The agents are made: a frame "ready"."""
+        self._move("is ready")
+        return frames.encode("ready", -1, {})
+
+    def answer(self, actions: Actions, memory: Memory | None = None) -> bytes:
+        """The answer to the last `Tick`: a frame "actions", with the agents' memory if the world keeps any."""
+        self._require("answers")
+        data = encode_actions(self._open_tick, actions, self.dropped, memory)
+        self.dropped = 0
+        self._move("answers")
+        return data
+
+    def send(self, tick: int, sent: SentPackets) -> bytes:
+        """Packets that the agents sent at `PacketsBetween`: a frame "sent"."""
+        self._require("sends")
+        data = encode_sent(tick, sent, self.missed)
+        self.missed = 0
+        return data
+
+    def fail(self, robots: str, traceback: str) -> bytes:
+        """The agents of these robots failed: a frame "failed". The world has to read it before the token vanishes."""
+        data = frames.encode("failed", -1, {}, {"robots": robots, "traceback": traceback})
+        self._move("fails")
+        self._drop_waiting()
+        return data
+
+    def leave(self) -> bytes | None:
+        """Leave the run: a frame "leave". Without robots, or if it is called again, the runner ends at once: None."""
+        if "leaves" not in MOVES[self.state]:
+            self._end(Ended("left"))
+            return None
+        self._move("leaves")
+        self._drop_waiting()
+        return frames.encode("leave", -1, {})
+
+    def _receive_tick(self, frame: Frame) -> None:
+        if frame.kind != "tick" or frame.tick <= self._last_tick or frame.tick % self._period:
+            raise BadFrame("wrong_tick", f"{frame.kind} {frame.tick}")
+        readings, received, tx_status = decode_tick(frame, self._measures, self._rows.keys())
+        check_rows(readings, received, self._rows)
+        self.dropped += self._newest is not None
+        self._newest, self._last_tick = Tick(frame.tick, readings, received, tx_status), frame.tick
+
+    def _receive_packets(self, frame: Frame) -> None:
+        at_ns, number, received, tx_status = decode_packets(frame, self._measures)
+        self.missed += max(0, number - self._next_number)
+        self._next_number = number + 1
+        self._packets.append(PacketsReceived(received, tx_status))
+        self._between = PacketsBetween(frame.tick, at_ns)
+
+    def _ended_by(self, frame: Frame) -> Ended:
+        if self.state == "leaving":
+            return Ended("left")
+        why = frame.values.get("why")
+        return Ended("removed", why) if isinstance(why, str) else Ended("over")
+
+    def _end(self, ended: Ended) -> None:
+        if self.state != "ended":
+            self._drop_waiting()
+            self._move("ends")
+            self._ended = ended
+
+    def _drop_waiting(self) -> None:
+        """Drop the frames that wait to be acted on."""
+        self.dropped += len(self._packets) + (self._newest is not None)
+        self._packets.clear()
+        self._newest = self._between = None
+
+    def _require(self, move: Move) -> None:
+        if move not in MOVES[self.state]:
+            raise RuntimeError(f"a runner that is {self.state} has no move {move!r}")
+
+    def _move(self, move: Move) -> None:
+        self._require(move)
+        self.state = MOVES[self.state][move]
