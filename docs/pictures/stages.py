@@ -9,13 +9,12 @@ import numpy as np
 from docs.pictures.radio.sheet import line_color, panels, say
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.sensors.sensor import Field, Noise, RangedSensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save
 from swarmwire.metrics.drawing.looks import FAINT
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import Field, Noise
 
 TO = Path(__file__).parents[1] / "stages.svg"
 TICK_S, TICKS = 0.1, 60

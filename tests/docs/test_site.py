@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,16 @@ import pytest
 from typer.main import get_command
 
 from swarmwire import agent, deploy
-from swarmwire.agent import behaviours, readings, testing
+from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
 from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.registry import METRICS
@@ -91,9 +91,9 @@ def test_the_events_have_a_section_each(site):
 
 def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
     named = code(site, "sensors")
-    kinds = [kind for kind in vars(readings).values() if is_dataclass(kind) and kind.__module__ == readings.__name__]
-    read = {name for kind in kinds for name in (*vars(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
-    assert read - {"spec", "vector_sum", "of"} <= named
+    kinds = [getattr(Sensors, name).many for name in SENSOR_SPECS]
+    read = {name for kind in kinds for name in (*dir(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
+    assert read - {"spec", "vector_sum"} <= named
     assert {*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
     assert {f"[sensors.{name}]" for name in SENSOR_SPECS} <= named
     assert {of.name for kind in SENSOR_SPECS.values() for of in fields(kind)} <= named

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import ProximityReading
 from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.sensors.rays import ProximityReading
 
 
 @dataclass(slots=True)  # not frozen: a step makes many of them, and a frozen one takes four times as long

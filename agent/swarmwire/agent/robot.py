@@ -6,19 +6,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packet, TxStatus
-from swarmwire.agent.readings import BumperReading, CameraReading, CustomReading
-from swarmwire.agent.robots import Draw, forward_and_turn
-from swarmwire.agent.sensors import Sensors
+from swarmwire.agent.robots import Draw, RobotHandle, forward_and_turn
 from swarmwire.agent.step_context import StepContext
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.bodies.drives import rgb_of
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
 from swarmwire.comms.packets import TxResult
+from swarmwire.comms.sensors.sensor import CustomReading, SensorProperty
 
 M = TypeVar("M", bound=Message)
 
 
-class Robot(Sensors[float]):
+class Robot(RobotHandle[float]):
     """One robot in one tick. Sensors raise NotDeclared unless the agent's `needs` name them."""
 
     __slots__ = ("_draw", "_row", "radio")
@@ -37,16 +36,6 @@ class Robot(Sensors[float]):
                 self._context.keys[self._row : self._row + 1], self._context.tick, self._context.first_draw
             )
         return self._draw
-
-    @property
-    def bumper(self) -> BumperReading:
-        """Bumper: pressed, whether the body touched anything in the tick before."""
-        return BumperReading(bool(self._number("bumper", "pressed")))
-
-    @property
-    def camera(self) -> CameraReading:
-        """LEDs of other robots in view."""
-        return CameraReading.of(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sensor(self, name: str) -> CustomReading:
         """The reading of a custom sensor: each field is an attribute, a float or an array (width,)."""
@@ -91,11 +80,11 @@ class Robot(Sensors[float]):
         """
         self._context.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
-    def _number(self, sensor: str, field: str) -> float:
-        return self._context.field(sensor, field).item(self._row)
-
-    def _numbers(self, sensor: str, field: str) -> FloatArray:
-        return self._context.field(sensor, field)[self._row]
+    def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
+        row = self._row
+        columns = self._context.columns(sensor)
+        values = [column.item(row) if column.ndim == 1 else column[row] for column in columns]
+        return sensor.one(*values, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.one(*values)
 
 
 class RadioPort:

@@ -10,17 +10,43 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import BumperReadings, CameraReadings, CustomReading
-from swarmwire.agent.sensors import Sensors
 from swarmwire.agent.step_context import StepContext
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import rgb_of
+from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.packets import TxStatuses
+from swarmwire.comms.sensors import Sensors
+from swarmwire.comms.sensors.sensor import CustomReading, SensorProperty
 
 M = TypeVar("M", bound=Message)
 N = TypeVar("N", float, FloatArray)
+
+
+class RobotHandle(Sensors[N]):
+    """A view of one tick of one group: time, body, and the sensors of one robot, or of n robots with a leading axis."""
+
+    __slots__ = ("_context",)
+
+    def __init__(self, context: StepContext) -> None:
+        self._context = context
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start of the run, at this tick."""
+        return to_s(self._context.time_ns)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps."""
+        return to_s(self._context.period_ns)
+
+    @property
+    def body(self) -> Body:
+        """Geometry and limits of the body."""
+        return self._context.group.body
 
 
 class Draws:
@@ -62,7 +88,7 @@ class Draw:
         return float(self._rows.normal(purpose, mean, deviation)[0])
 
 
-class Robots(Sensors[FloatArray]):
+class Robots(RobotHandle[FloatArray]):
     """n robots of one group in one tick; arrays have a leading axis n. Sensors that `needs` lacks raise NotDeclared."""
 
     __slots__ = ("draw", "radio")
@@ -76,16 +102,6 @@ class Robots(Sensors[FloatArray]):
     def n(self) -> int:
         """Number of robots that act in this tick in this process; it is not the size of the swarm."""
         return self._context.n
-
-    @property
-    def bumper(self) -> BumperReadings:
-        """Bumpers: pressed (n,), 1 or 0."""
-        return BumperReadings(self._number("bumper", "pressed"))
-
-    @property
-    def camera(self) -> CameraReadings:
-        """LEDs of other robots in view: distance_m, bearing_rad and colour (n, most_blobs), count (n,)."""
-        return CameraReadings(*(self._numbers("camera", name) for name in ("distance_m", "bearing_rad", "colour")))
 
     def sensor(self, name: str) -> CustomReading:
         """The reading of a custom sensor: each field is an attribute, (n,) or (n, width)."""
@@ -148,11 +164,9 @@ class Robots(Sensors[FloatArray]):
         """
         self._context.note(slice(None) if rows is None else self._context.mask(rows), state, value)
 
-    def _number(self, sensor: str, field: str) -> FloatArray:
-        return self._context.field(sensor, field)
-
-    def _numbers(self, sensor: str, field: str) -> FloatArray:
-        return self._context.field(sensor, field)
+    def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
+        columns = self._context.columns(sensor)
+        return sensor.many(*columns, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.many(*columns)
 
 
 class RadioRows:

@@ -15,6 +15,7 @@ from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import IncompatibleBody
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.sensors.sensor import SensorProperty
 from swarmwire.comms.tick_io import (
     NO_ACTUATOR_COMMANDS,
     NO_LED_CHANGES,
@@ -71,10 +72,11 @@ class StepContext:
         self._packets: dict[type[Message], Packets[Any]] = {}
         self._lists: ReceivedLists | None = None
 
-    def field(self, sensor: str, name: str) -> FloatArray:
-        """A field of a sensor, (n, …); NotDeclared if the agent's needs do not name the sensor."""
-        self._require(sensor)
-        return self.readings.fields[f"{sensor}.{name}"]
+    def columns(self, sensor: SensorProperty[Any, Any]) -> list[FloatArray]:
+        """The fields of a built-in sensor, (n, …) each; NotDeclared if the agent's needs do not name the sensor."""
+        self._require(sensor.name)
+        fields = self.readings.fields
+        return [fields[column] for column in sensor.columns]
 
     def fields(self, sensor: str) -> dict[str, FloatArray]:
         """All fields of a sensor, (n, …) each, by name; NotDeclared if the agent's needs do not name the sensor."""

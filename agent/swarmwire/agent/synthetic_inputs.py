@@ -14,9 +14,6 @@ import numpy as np
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.custom import CustomSensorSpec
-from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.bodies.sensor_specs import CameraSpec, GroundSpec
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import (
     NO_TX_STATUSES,
@@ -110,57 +107,16 @@ def inputs(trial: Trial) -> Iterator[tuple[SyntheticInputs, Callable[[SentPacket
 
 
 def _readings(body: Body, key: int, tick: int, rows: IntArray) -> dict[str, FloatArray]:
-    n, fields = len(rows), dict[str, FloatArray]()
-    if body.proximity is not None:
-        value = _uniform(key, tick, "proximity", (n, len(body.proximity.angles_deg)))
-        fields["proximity.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
-    if body.compass is not None:
-        fields["compass.heading_rad"] = (_uniform(key, tick, "compass", (n,)) * 2.0 - 1.0) * np.pi
-    if body.odometry is not None:
-        for side in ("left_m", "right_m"):
-            fields[f"odometry.{side}"] = tick * 0.01 + _uniform(key, tick, side, (n,)) * 0.01
-    if body.light is not None:
-        fields["light.value"] = _uniform(key, tick, "light", (n, len(body.light.angles_deg)))
-    if "bumper" in body.sensors:
-        fields["bumper.pressed"] = np.round(_uniform(key, tick, "bumper", (n,)))
-    if "positioning" in body.sensors:
-        for axis in ("x_m", "y_m"):
-            fields[f"positioning.{axis}"] = _uniform(key, tick, axis, (n,)) * 4.0 - 2.0
-    if "imu" in body.sensors:
-        for name in ("forward_mps2", "left_mps2", "turn_radps"):
-            fields[f"imu.{name}"] = _uniform(key, tick, name, (n,)) * 2.0 - 1.0
-    if "battery" in body.sensors:
-        charge = _uniform(key, tick, "battery", (n,))
-        fields["battery.charge"], fields["battery.voltage_v"] = charge, 3.4 + 0.8 * charge
+    n = len(rows)
+
+    def draw(purpose: str, width: int) -> FloatArray:
+        return _uniform(key, tick, purpose, (n, width) if width else (n,))
+
+    readings: dict[str, FloatArray] = {}
     for name, spec in body.sensors.items():
-        if isinstance(spec, CustomSensorSpec):
-            for field, width in spec.fields.items():
-                fields[f"{name}.{field}"] = _uniform(key, tick, f"{name}.{field}", (n, width) if width else (n,))
-    fields.update(_around_and_below(body, key, tick, n))
-    return fields
-
-
-def _around_and_below(body: Body, key: int, tick: int, n: int) -> dict[str, FloatArray]:
-    """Readings of infrared, scan, ground sensors and camera."""
-    fields = dict[str, FloatArray]()
-    if body.infrared is not None:
-        value = _uniform(key, tick, "infrared", (n, len(body.infrared.angles_deg)))
-        fields["infrared.value"] = np.maximum(value * 2.0 - 1.0, 0.0)
-    if body.scan is not None:
-        share = _uniform(key, tick, "scan", (n, body.scan.rays))
-        fields["scan.range_m"] = np.where(share < 0.8, share * body.scan.range_m, np.inf)
-    ground, camera = body.sensors.get("ground"), body.sensors.get("camera")
-    if isinstance(ground, GroundSpec):
-        fields["ground.shade"] = _uniform(key, tick, "ground", (n, len(ground.points_m)))
-    if isinstance(camera, CameraSpec):
-        shape = n, camera.most_blobs
-        none = np.arange(camera.most_blobs) >= _uniform(key, tick, "blobs", (n, 1)) * camera.most_blobs
-        nearest_first = np.sort(_uniform(key, tick, "distance", shape), axis=1)
-        bearing = (_uniform(key, tick, "bearing", shape) * 2.0 - 1.0) * np.pi
-        colour = np.floor(_uniform(key, tick, "colour", shape) * BRIGHTEST)
-        for name, column in (("distance_m", nearest_first), ("bearing_rad", bearing), ("colour", colour)):
-            fields[f"camera.{name}"] = np.where(none, np.nan, column)
-    return fields
+        columns = zip(spec.reading_fields(), spec.synthetic(name, tick, draw), strict=True)
+        readings |= {f"{name}.{field.name}": column for field, column in columns}
+    return readings
 
 
 def _uniform(key: int, tick: int, purpose: str, shape: tuple[int, ...]) -> FloatArray:

@@ -23,7 +23,7 @@ from reference.fields import field_table
 from reference.keys import key_tables
 from reference.metrics import metric_details, metric_table
 from reference.presets import preset_sources, preset_table
-from reference.sensors import sensor_tables
+from reference.sensors import reading_table, sensor_tables
 
 TABLES: dict[str, Callable[..., str]] = {
     "behaviour": behaviour_details,
@@ -42,6 +42,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "metrics": metric_table,
     "preset-sources": preset_sources,
     "presets": preset_table,
+    "readings": reading_table,
     "sensors": sensor_tables,
 }
 

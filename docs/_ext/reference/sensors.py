@@ -1,12 +1,32 @@
-"""The sensors that a body may have, with the keys of each in a data sheet."""
+"""The sensors that a body may have: the fields of their readings, and the keys of each in a data sheet."""
 
+from collections.abc import Iterator
 from dataclasses import fields
-from inspect import getdoc
+from functools import cached_property
+from inspect import getdoc, getmembers
 
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
-from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
+from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec
+from swarmwire.deploy.catalogue.units import unit_of
+
+
+def reading_table() -> str:
+    """The fields of each sensor's readings, and the values that its class derives from them."""
+    return table(
+        ("need", "field", "shape", "unit", "meaning", "lost"), (row for name in SENSOR_SPECS for row in _rows(name))
+    )
+
+
+def _rows(name: str) -> Iterator[tuple[str, ...]]:
+    need = code(name)
+    for of in SENSOR_SPECS[name].example().reading_fields():
+        yield need, code(of.name), of.shape, of.unit, sentence(of.meaning), f"{of.blank:g}"
+        need = " "
+    for of, value in getmembers(getattr(Sensors, name).many):
+        if isinstance(value, property | cached_property):
+            yield need, code(of), "", unit_of(of), sentence(getdoc(value) or ""), ""
 
 
 def sensor_tables() -> str:

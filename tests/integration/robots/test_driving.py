@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
+from swarmwire.comms.sensors import SENSOR_SPECS
 from tests.support.robots.made_up_readings import readings
 from tests.support.robots.rig import Rig
 from tests.support.robots.rigs import ON_ONE_RIG, RIGS

@@ -7,8 +7,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import BatterySpec, GroundSpec
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec
 from tests.support.robots.rig import Fields
 
 _SHARE = st.floats(0.0, 1.0)

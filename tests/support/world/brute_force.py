@@ -14,8 +14,7 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Boundary, Group, Light, Obstacle
-from swarmwire.world.sensors import Scene
-from swarmwire.world.sensors.sensor import led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_places_m
 
 Point = tuple[float, float]
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")

@@ -6,13 +6,13 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.sensors.sensor import SensorSpec
 from swarmwire.comms.truth import Group, Obstacle
-from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_places_m
 
 
 def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: float = 10.0, **more: Any) -> Scene:
@@ -47,7 +47,7 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
 def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> Staged:
     """A sense of all robots of a scene, by this sheet, with all its stages."""
     group = Group("a", body, 0, looked_at.state.shape[1])
-    return Staged(name, SENSORS[name](looked_at, group, spec), spec, looked_at.keys, group, looked_at.tick_s)
+    return Staged(name, sensor_of(name, spec, looked_at, group), spec, looked_at.keys, group, looked_at.tick_s)
 
 
 def read(looked_at: Scene, body: Body, name: str, spec: SensorSpec, tick: int = 0) -> dict[str, FloatArray]:

@@ -23,9 +23,9 @@ from swarmwire.agent.fields import (
     steered,
 )
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.readings import ProximityReading
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Payloads, ReceivedPackets
+from swarmwire.comms.sensors.rays import ProximityReading
 
 angles = st.floats(-np.pi, np.pi)
 

@@ -8,13 +8,14 @@ import pytest
 
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import agent_group
-from swarmwire.agent.readings import Blob
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.bodies.sensor_specs import BatterySpec, ImuSpec
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
+from swarmwire.comms.sensors.camera import Blob
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.sensors.simple import BatterySpec
 from tests.support.agent.hosts import MEASURES, group, readings
 
 

@@ -13,7 +13,6 @@ from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
 from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
@@ -21,6 +20,7 @@ from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
+from swarmwire.comms.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.entry import Entry
 from swarmwire.deploy.catalogue.find import find
 from swarmwire.deploy.catalogue.kinds import KINDS

@@ -12,8 +12,6 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import CustomSensorSpec
-from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.ground import ground_of
@@ -25,16 +23,15 @@ from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.annotations import LatestValues, States
-from swarmwire.world.custom.loading import CustomActuators, made_sensor
-from swarmwire.world.custom.sensors import CheckedSensor
+from swarmwire.world.custom.actuators import CustomActuators
 from swarmwire.world.engines.physics import Physics, engines_of
 from swarmwire.world.placement.maps import Layout, read_layout
 from swarmwire.world.placement.placement import Placed, place
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.sensors import SENSORS, Scene
+from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import Sensor, led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_places_m
 
 _wrap_angle = njit()(wrap_angle)
 
@@ -272,12 +269,6 @@ def _sensors(
                 expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             spec = group.body.sensors[need]
-            truth = _truth(need, spec, scene, group)
+            truth = sensor_of(need, spec, scene, group)
             made[group.name][need] = Staged(need, truth, spec, scene.keys, group, scene.tick_s, scene.running)
     return made
-
-
-def _truth(name: str, spec: SensorSpec, scene: Scene, group: Group) -> Sensor:
-    if isinstance(spec, CustomSensorSpec):
-        return CheckedSensor(name, made_sensor(spec), spec, scene, group)
-    return SENSORS[name](scene, group, spec)

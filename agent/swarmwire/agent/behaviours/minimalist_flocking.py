@@ -10,11 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.behaviours._common import check_not_negative, check_share
-from swarmwire.agent.readings import InfraredReading, ProximityReading
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import RayArraySpec
+from swarmwire.comms.sensors.rays import InfraredReading, ProximityReading, RayArraySpec
 
 LEFT, STRAIGHT, RIGHT = 1, 0, -1
 EITHER = 2  # a side that is still to be drawn

@@ -1,8 +1,8 @@
 """Bodies: kinds of robot, each read from a TOML file and checked; `bodies/` holds the bundled ones.
 
 A body file with `like = "epuck"` starts from that body, table by table, and states the differences only; without a
-name of its own the body has the name of its file. The specs of its sensors, its drive, its LEDs and its custom sensors
-and actuators are in the other modules of this package.
+name of its own the body has the name of its file. The specs of its drive, its LEDs and its custom sensors and actuators
+are in the other modules of this package, those of its sensors in `swarmwire.comms.sensors`.
 """
 
 import tomllib
@@ -25,13 +25,15 @@ from swarmwire.comms.bodies.custom import (
     read_custom_sensor_spec,
 )
 from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import CompassSpec, OdometrySpec
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
-from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import did_you_mean, parameter
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors import SENSOR_SPECS
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.sensor import SensorSpec
+from swarmwire.comms.sensors.simple import CompassSpec, OdometrySpec
 
 S = TypeVar("S", bound=SensorSpec)
 HERE = Path()
@@ -63,32 +65,32 @@ class Body:
     @cached_property
     def proximity(self) -> ProximitySpec | None:
         """The spec of the proximity sensors; None: no such sensor, here and below."""
-        return self._spec(ProximitySpec)
+        return self.spec_of(ProximitySpec)
 
     @cached_property
     def compass(self) -> CompassSpec | None:
         """The spec of the compass."""
-        return self._spec(CompassSpec)
+        return self.spec_of(CompassSpec)
 
     @cached_property
     def odometry(self) -> OdometrySpec | None:
         """The spec of the wheel encoders."""
-        return self._spec(OdometrySpec)
+        return self.spec_of(OdometrySpec)
 
     @cached_property
     def light(self) -> LightSpec | None:
         """The spec of the light sensors."""
-        return self._spec(LightSpec)
+        return self.spec_of(LightSpec)
 
     @cached_property
     def infrared(self) -> InfraredSpec | None:
         """The spec of the passive infrared sensors."""
-        return self._spec(InfraredSpec)
+        return self.spec_of(InfraredSpec)
 
     @cached_property
     def scan(self) -> ScanSpec | None:
         """The spec of the laser scanner."""
-        return self._spec(ScanSpec)
+        return self.spec_of(ScanSpec)
 
     @cached_property
     def actuator_places(self) -> dict[str, slice]:
@@ -100,7 +102,8 @@ class Body:
             start += spec.width
         return slices
 
-    def _spec(self, kind: type[S]) -> S | None:
+    def spec_of(self, kind: type[S]) -> S | None:
+        """The spec of this kind of sensor; None if the body has none."""
         return next((spec for spec in self.sensors.values() if isinstance(spec, kind)), None)
 
     @property
@@ -277,12 +280,9 @@ def fault_of_body(body: Body) -> tuple[str, str] | None:
 
 def unsupported_sensors(drive: object, altitude_m: object) -> Mapping[str, str]:
     """The sensors that a body with this kind of drive at this altitude cannot have, each with the reason."""
-    reasons: dict[str, str] = {}
-    if drive == "holonomic":
-        reasons["odometry"] = "expected a drive with wheels: holonomic has no wheels"
-    if isinstance(altitude_m, int | float) and altitude_m > 0:
-        reasons["ground"] = f"expected altitude_m = 0: it looks at the floor right below, not from {altitude_m:g} m"
-    return reasons
+    at_m = float(altitude_m) if isinstance(altitude_m, int | float) else 0.0
+    reasons = {name: kind.unsupported(drive, at_m) for name, kind in SENSOR_SPECS.items()}
+    return {name: reason for name, reason in reasons.items() if reason}
 
 
 def _fault_of_leds(leds: Leds, radius_m: float, height_m: float) -> tuple[str, str] | None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import check_plain, parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
+from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec
 
 MAX_WIDTH = 10_000  # numbers in a field, or of an actuator, for one robot
 
@@ -27,6 +27,10 @@ class CustomSensorSpec(RangedSensorSpec):
     )
     params: dict[str, Any] = parameter(help="keys of the class, as in the body file; agents do not get them")
     fields: dict[str, int] = parameter(help="the class's fields and their widths; 0: a number per robot")
+
+    def reading_fields(self) -> tuple[Field, ...]:
+        """As `SensorSpec.reading_fields`: names and widths, without the noise and the ranges of the class."""
+        return tuple(Field(name, width) for name, width in self.fields.items())
 
 
 def custom_sensor_spec(value: object, where: str, key: str, beside: Path) -> CustomSensorSpec:

@@ -8,13 +8,15 @@ from typing import Any
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import bounds_of
+from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
+from swarmwire.deploy.catalogue.sensors import reading_table
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.custom.loading import made_actuator, made_sensor
+from swarmwire.world.custom.actuators import made_actuator
 from swarmwire.world.scenario.bodies import read_body
+from swarmwire.world.sensors.loading import made_sensor
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 
@@ -33,12 +35,7 @@ def _body(body: Body, named: str) -> Entry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
-    sensors = [
-        _custom_sensor(name, of)
-        if isinstance(of, CustomSensorSpec)
-        else _sheet(f"sensor: {name}", type(of), asdict(of))
-        for name, of in body.sensors.items()
-    ]
+    sensors = [table for name, of in body.sensors.items() for table in _sensor(name, of)]
     actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]
     return Entry(
         kind="body",
@@ -64,9 +61,13 @@ def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTabl
     return ParameterTable(title, tuple(_with_values(parameters_of_dataclass(kind), values)), "value")
 
 
-def _custom_sensor(name: str, sheet: CustomSensorSpec) -> ParameterTable:
-    shared = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet))
-    return _own(f"sensor: {name}, which reads {', '.join(sheet.fields)}", sheet.kind, made_sensor(sheet), shared)
+def _sensor(name: str, sheet: SensorSpec) -> tuple[ParameterTable, ParameterTable]:
+    """The keys of a sensor, and the fields of its readings."""
+    title, reading = f"sensor: {name}", f"reading: {name}"
+    if not isinstance(sheet, CustomSensorSpec):
+        return _sheet(title, type(sheet), asdict(sheet)), reading_table(sheet.reading_fields(), reading)
+    shared, own = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet)), made_sensor(sheet)
+    return _own(title, sheet.kind, own, shared), reading_table(own.fields, reading)
 
 
 def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:

@@ -5,18 +5,20 @@ import math
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.bodies.ranging_specs import LightSpec, RayArraySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import (
+from swarmwire.comms.sensors.camera import CameraSpec
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import RayArraySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.sensor import SensorSpec
+from swarmwire.comms.sensors.simple import (
     BatterySpec,
     BumperSpec,
-    CameraSpec,
     CompassSpec,
     GroundSpec,
-    ImuSpec,
     OdometrySpec,
     PositioningSpec,
 )
-from swarmwire.comms.bodies.spec import SensorSpec
 
 
 def facts_of(body: Body) -> list[tuple[str, str]]:

@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, RayArraySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import BumperSpec, GroundSpec
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec, RayArraySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.simple import BumperSpec, GroundSpec
 from swarmwire.metrics.drawing.looks import INK, LIGHT, LIGHT_EDGE, OBSTACLE_EDGE, PAPER, SMALL_PT, Look
 
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import ProximitySpec
+from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.metrics.drawing.body_facts import facts_of
 from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, TITLE_PT

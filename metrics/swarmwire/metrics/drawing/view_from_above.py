@@ -4,7 +4,7 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
-from swarmwire.comms.bodies.ranging_specs import RayArraySpec
+from swarmwire.comms.sensors.rays import RayArraySpec
 from swarmwire.metrics.drawing.body_parts import draw_parts
 from swarmwire.metrics.drawing.looks import (
     CURVE,

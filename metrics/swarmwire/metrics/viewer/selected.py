@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.viewer.colors import LIGHT, MARK, packed
 from swarmwire.metrics.viewer.rows import RerunRows

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, body_from_mapping, body_names, load_body, merged
-from swarmwire.comms.bodies.ranging_specs import ProximitySpec
-from swarmwire.comms.bodies.sensor_specs import PositioningSpec
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.simple import PositioningSpec
 
 WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
 

@@ -11,10 +11,11 @@ from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, ActuatorCommands
-from swarmwire.world.custom.loading import made_actuator, made_sensor
+from swarmwire.world.custom.actuators import made_actuator
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.sensors.loading import made_sensor
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded
 

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.custom import Field, Noise
-from swarmwire.world.custom.loading import fitted
+from swarmwire.world.scenario.bodies import fitted
 from tests.support.world import custom_code
 
 UNKNOWN: Any = "gaussian"

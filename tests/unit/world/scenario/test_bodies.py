@@ -8,10 +8,10 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.custom import loading
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body, sheet_path
 from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.sensors import loading
 
 
 def test_a_name_has_no_file_and_a_sheet_lies_beside_the_scenario(tmp_path):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.simple import BatterySpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler

@@ -9,8 +9,8 @@ import pytest
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.bodies.sensor_specs import CameraSpec
 from swarmwire.comms.draws import normal, purpose
+from swarmwire.comms.sensors.camera import CameraSpec
 from swarmwire.comms.truth import Obstacle
 from tests.support.world.scenes import read, scene
 

@@ -1,47 +1,43 @@
 """What holds of every sense there is, with all that can go wrong with it: an arena alone, seldom looked at, failed."""
 
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from swarmwire.comms.bodies.sensors import SENSOR_SPECS
-from swarmwire.comms.bodies.spec import RangedSensorSpec
+from swarmwire.comms.plugins import NotLoaded
+from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec
 from swarmwire.world.scenario.file import scenario_from
-from swarmwire.world.sensors import SENSORS
+from swarmwire.world.sensors.loading import truth_of
+from swarmwire.world.sensors.sensor import BuiltInSensor
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded
 
-STAGES = "rate_hz = 4.0\ndelay_s = 0.15\ndrop_out = 0.2\n"
-OUTLIER = "outlier = 0.1\nstep = 0.01\n"
-RING = "angles_deg = [0, 90, 200]\n"
-SEEING = RING + 'range_m = 0.5\nresponse = { kind = "rational", a = 0.01, b = 0.001, reach_m = 0.5 }\nnoise = 0.1\n'
-KEYS = {
-    "proximity": SEEING,
-    "infrared": SEEING,
-    "light": RING + "noise = 0.1\n",
-    "compass": "noise_rad = 0.1\n",
-    "positioning": "noise_m = 0.1\n",
-    "odometry": "slip = 0.1\nwheel_error_std = 0.1\nstep_m = 0.001\n",
-    "bumper": "",
-    "imu": "noise_mps2 = 0.1\nbias_std_mps2 = 0.1\ndrift_mps2 = 0.1\nnoise_radps = 0.1\ndrift_radps = 0.1\n",
-    "battery": "capacity_wh = 0.01\nidle_w = 1.0\ndrive_w_per_mps = 10.0\nnoise = 0.1\nnoise_v = 0.1\n",
-    "scan": "rays = 12\nrange_m = 1.0\n",
-    "ground": "points_m = [[0.0, 0.01], [0.01, 0.0]]\nnoise = 0.1\n",
-    "camera": "height_m = 0.2\naperture_deg = 70.0\nmost_blobs = 4\n",
+STAGES: dict[str, Any] = {"rate_hz": 4.0, "delay_s": 0.15, "drop_out": 0.2}
+OUTLIER: dict[str, Any] = {"outlier": 0.1, "step": 0.01}
+SPECS = {
+    name: replace(kind.example(), **STAGES, **(OUTLIER if issubclass(kind, RangedSensorSpec) else {}))
+    for name, kind in SENSOR_SPECS.items()
 }
-OWN = f'[sensors.own]\nkind = "{Path(__file__).parents[3] / "support" / "world" / "custom_code.py"}:Alone"\n{STAGES}'
-NAMES = (*KEYS, "own")
+OWN = f"{Path(__file__).parents[3] / 'support' / 'world' / 'custom_code.py'}:Alone"
+NAMES = (*SPECS, "own")
 
 
 def body() -> str:
-    """A sheet with all senses."""
-    tables = [
-        f"[sensors.{name}]\n{keys}{STAGES}{OUTLIER if issubclass(SENSOR_SPECS[name], RangedSensorSpec) else ''}"
-        for name, keys in KEYS.items()
-    ]
-    return "\n".join(['like = "epuck"', *tables, OWN])
+    """A sheet with an example of every sensor."""
+    tables = {**{name: asdict(spec) for name, spec in SPECS.items()}, "own": {"kind": OWN, **STAGES}}
+    return "\n".join(['like = "epuck"', *(f"sensors.{name} = {toml(table)}" for name, table in tables.items())])
+
+
+def toml(value: Any) -> str:
+    """An inline value of TOML."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+    return json.dumps(value)
 
 
 def world(folder: Path, seeds: tuple[int, ...] = (1,), every: int = 1) -> World:
@@ -72,8 +68,32 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return read
 
 
-def test_every_sense_is_here() -> None:
-    assert KEYS.keys() == SENSOR_SPECS.keys() == SENSORS.keys()
+@pytest.mark.parametrize("name", SENSOR_SPECS)
+def test_the_fields_of_a_spec_are_those_of_its_reading_its_truth_and_its_synthetic_values(name: str) -> None:
+    spec, declared = SPECS[name], getattr(Sensors, name)
+    fields = spec.reading_fields()
+    assert declared.columns == tuple(f"{name}.{field.name}" for field in fields)
+    assert truth_of(declared.spec) is not BuiltInSensor
+    made = spec.synthetic(name, 3, lambda _, width: np.full((5, width) if width else 5, 0.25))
+    for field, values, blank in zip(fields, made, spec.blank(name, 5).values(), strict=True):
+        assert values.shape == blank.shape == ((5, field.width) if field.width else (5,))
+        finite = values[np.isfinite(values)]
+        assert ((field.low <= finite) & (finite <= field.high)).all()
+        assert bool(field.per) == bool(field.width)
+        assert field.help
+
+
+def test_a_declaration_without_its_truth_is_refused() -> None:
+    class Lost(SensorSpec):
+        truth = "swarmwire.world.sensors.imu:Lost"
+
+    class Other(SensorSpec):
+        truth = "swarmwire.world.sensors.sensor:Scene"
+
+    with pytest.raises(NotLoaded, match="holds no such name: 'Lost'"):
+        truth_of(Lost)
+    with pytest.raises(TypeError, match="expected a BuiltInSensor"):
+        truth_of(Other)
 
 
 @pytest.mark.parametrize("name", NAMES)

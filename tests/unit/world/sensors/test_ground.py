@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.bodies.sensor_specs import GroundSpec
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.sensors.simple import GroundSpec
 from tests.support.world.scenes import read, scene
 
 EPUCK = load_body("epuck")

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import ImuSpec
 from swarmwire.comms.draws import normal, purpose
-from swarmwire.world.sensors import Scene
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.world.sensors.sensor import Scene
 from tests.support.world.scenes import scene, staged
 
 EPUCK = load_body("epuck")

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.ranging_specs import InfraredSpec, ProximitySpec, ResponseCurve
+from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.samples import posed

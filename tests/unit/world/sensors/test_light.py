@@ -12,8 +12,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.truth import Light, Obstacle
-from swarmwire.world.sensors import Scene
 from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.sensor import Scene
 from tests.support.world.scenes import scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import PositioningSpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.simple import PositioningSpec
 from swarmwire.world.world import World
 from tests.support.world.samples import posed
 from tests.support.world.scenes import read, scene

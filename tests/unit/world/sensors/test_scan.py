@@ -8,9 +8,9 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.scan import ScanSpec
 from tests.support.world.scenes import read, scene
 
 FOOTBOT = load_body("footbot")

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import CameraSpec
+from swarmwire.comms.sensors.camera import CameraSpec
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.truth import Boundary
-from swarmwire.world.sensors import SENSORS
+from swarmwire.world.sensors.loading import sensor_of
 from tests.support.world import brute_force
 from tests.support.world.brute_force import FOOTBOT, Sample, sample
 
@@ -22,7 +24,7 @@ RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.6)
 
 def truth(of: Sample, name: str, spec: Any) -> tuple[FloatArray, ...]:
     """The truth of all groups side by side, a row per robot of each arena."""
-    fields = zip(*(SENSORS[name](of.scene, group, spec).truth(0) for group in of.groups), strict=True)
+    fields = zip(*(sensor_of(name, spec, of.scene, group).truth(0) for group in of.groups), strict=True)
     return tuple(np.concatenate(field, axis=1).reshape(-1, field[0].shape[2]) for field in fields)
 
 

@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import InfraredSpec, LightSpec, ProximitySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import CameraSpec
+from swarmwire.comms.sensors.camera import CameraSpec
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.comms.truth import Light as Lamp
-from swarmwire.world.sensors import SENSORS, Scene
-from swarmwire.world.sensors.sensor import Sensor
+from swarmwire.world.sensors.loading import sensor_of
+from swarmwire.world.sensors.sensor import Scene, Sensor
 from tests.support.world.brute_force import FOOTBOT
 from tests.support.world.scenes import scene
 
@@ -34,7 +36,7 @@ def seen(poses: Any, name: str, lamps: Any, size_m: float = 3.0) -> tuple[FloatA
     """What foot-bots at these poses sense of one another and of lamps, in the open."""
     lights = tuple(Lamp(x, y, 1.0) for x, y in lamps)
     looked_at = scene(poses, FOOTBOT, size_m=size_m, boundary="open", colour=0x00FF00, lights=lights)
-    sensor = SENSORS[name](looked_at, Group("a", FOOTBOT, 0, len(poses)), SENSOR_SPECS[name])
+    sensor = sensor_of(name, SENSOR_SPECS[name], looked_at, Group("a", FOOTBOT, 0, len(poses)))
     return tuple(field[0] for field in sensor.truth(0))
 
 
@@ -89,10 +91,10 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tupl
         obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
     )
     group = Group("a", FOOTBOT, 3, 9)
-    together = SENSORS[name](many, group, SENSOR_SPECS[name]).truth(0)
+    together = sensor_of(name, SENSOR_SPECS[name], many, group).truth(0)
     for arena in np.flatnonzero(running):
         alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
-        for one, other in zip(SENSORS[name](alone, group, SENSOR_SPECS[name]).truth(0), together, strict=True):
+        for one, other in zip(sensor_of(name, SENSOR_SPECS[name], alone, group).truth(0), together, strict=True):
             assert np.array_equal(one[0], other[arena], equal_nan=True)
 
 
@@ -111,10 +113,10 @@ def test_an_obstacle_that_was_pushed_is_seen_where_it_is(name: str) -> None:
 
     group, pushed = Group("a", FOOTBOT, 0, 12), (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0))
     looked_at, expected = around(pillar, box, moves=True), around(*pushed)
-    sensor = SENSORS[name](looked_at, group, SENSOR_SPECS[name])
+    sensor = sensor_of(name, SENSOR_SPECS[name], looked_at, group)
     before = truth(sensor)
     for have, now in zip(looked_at.obstacles, expected.obstacles, strict=True):
         have[...] = now
     after = truth(sensor)
-    assert np.array_equal(after, truth(SENSORS[name](expected, group, SENSOR_SPECS[name])), equal_nan=True)
+    assert np.array_equal(after, truth(sensor_of(name, SENSOR_SPECS[name], expected, group)), equal_nan=True)
     assert not np.array_equal(before, after, equal_nan=True)

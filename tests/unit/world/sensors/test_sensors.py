@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.ranging_specs import ProximitySpec
-from swarmwire.comms.bodies.sensor_specs import CompassSpec, OdometrySpec
 from swarmwire.comms.draws import normal, purpose
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.simple import CompassSpec, OdometrySpec
 from swarmwire.comms.truth import Group, Obstacle
-from swarmwire.world.sensors import Scene
+from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.rays import ProximitySensor
+from swarmwire.world.sensors.sensor import Scene
 from swarmwire.world.world import World
 from tests.support.world.samples import SENSORS, commanded, posed
 from tests.support.world.scenes import read, scene, staged
@@ -26,7 +27,9 @@ EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 def proximity(looked_at: Scene, body: Body, **spec: Any) -> ProximitySensor:
     assert body.proximity is not None
     group = Group("a", body, 0, len(looked_at.radius_m))
-    return ProximitySensor(looked_at, group, replace(body.proximity, **spec))
+    sensor = sensor_of("proximity", replace(body.proximity, **spec), looked_at, group)
+    assert isinstance(sensor, ProximitySensor)
+    return sensor
 
 
 def values(looked_at: Scene, body: Body) -> FloatArray:

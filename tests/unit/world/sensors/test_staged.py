@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.spec import SensorSpec
+from swarmwire.comms.sensors.sensor import Field, Noise, SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import Field, Noise
 
 KEYS = np.array([7, 8], np.uint64)
 GROUP = Group("a", load_body("epuck"), 2, 5)

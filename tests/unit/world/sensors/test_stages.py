@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.draws import normal, purpose, uniform
+from swarmwire.comms.sensors.sensor import Field, Noise
 from swarmwire.world.sensors.pipeline import Stages
-from swarmwire.world.sensors.sensor import Field, Noise
 
 KEYS = np.array([7, 8], np.uint64)
 ROBOTS = np.arange(3, 8)

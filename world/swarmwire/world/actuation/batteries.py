@@ -8,8 +8,8 @@ from math import inf
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.kernels import njit
+from swarmwire.comms.sensors.simple import BatterySpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of
 
@@ -27,9 +27,7 @@ class Batteries:
     def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
         """Charged as their data sheets say."""
         sizes = [group.stop - group.start for group in groups]
-        specs = [
-            next((s for s in group.body.sensors.values() if isinstance(s, BatterySpec)), MAINS) for group in groups
-        ]
+        specs = [group.body.spec_of(BatterySpec) or MAINS for group in groups]
         self.any = any(spec is not MAINS for spec in specs)
         self.charge: FloatArray = np.tile(np.repeat([spec.start for spec in specs], sizes), (arenas, 1))
         draw = [(spec.idle_w, spec.drive_w_per_mps, spec.led_w) for spec in specs]

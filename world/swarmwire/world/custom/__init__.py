@@ -1,8 +1,8 @@
 """Custom sensors and actuators: all names that a user's class needs."""
 
 from swarmwire.comms.config import parameter
+from swarmwire.comms.sensors.sensor import Field, Noise
 from swarmwire.world.custom.actuators import CustomActuator
-from swarmwire.world.custom.sensors import CustomSensor
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import CustomSensor, Scene
 
 __all__ = ["CustomActuator", "CustomSensor", "Field", "Noise", "Scene", "parameter"]

@@ -1,12 +1,25 @@
-"""Custom actuators: the base class, and how the world runs it."""
+"""Custom actuators: the base class, the loading of a user's class, and the actuators of all groups of a run.
 
+`CustomActuators` holds them: agents set them, and they act in each tick.
+"""
+
+import traceback
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomActuatorSpec
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.tick_io import ActuatorCommands
 from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.loading import asked, entry_point, made
 from swarmwire.world.sensors.sensor import Scene
+
+ACTUATORS = "swarmwire.actuators"  # group of entry points
 
 
 class CustomActuator(ABC):
@@ -42,3 +55,80 @@ class CustomActuator(ABC):
         """Arena and index in the arena of robot rows, any shape: `self.scene.state[self.at(rows)]` are their states."""
         arena, robot = np.divmod(rows, self.scene.state.shape[1])
         return arena, robot
+
+
+def made_actuator(spec: CustomActuatorSpec) -> CustomActuator:
+    """A new instance of the class of a spec that is fitted."""
+    return made(CustomActuator, spec.kind, spec.params, "", "")
+
+
+def fitted_actuator(spec: CustomActuatorSpec, where: str, key: str) -> CustomActuatorSpec:
+    """The spec with the width of its class; BadInput names what is wrong."""
+    spec = replace(spec, kind=entry_point(spec.kind, ACTUATORS))
+    own = made(CustomActuator, spec.kind, spec.params, where, key)
+    width: Any = asked(own, "width", where, key)
+    if type(width) is not int or not 1 <= width <= MAX_WIDTH:
+        raise BadInput(
+            where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDTH}; {type(own).__name__} has {width!r}"
+        )
+    return replace(spec, width=width)
+
+
+class CustomActuators:
+    """The actuators of the user's own; `any` tells whether there are some.
+
+    Attributes:
+        not_there: (arenas,) numbers set for places that the robots' bodies do not have.
+    """
+
+    def __init__(self, groups: Sequence[Group], scene: Scene) -> None:
+        """Each is started; CustomCodeFailed if one raises."""
+        self._scene = scene
+        self._fitted: list[tuple[str, CustomActuator, slice]] = []
+        for group in groups:
+            for name, spec in group.body.actuators.items():
+                own = made_actuator(spec)
+                own.scene, own.group = scene, group
+                what = f"the actuator {name} of {group.name} ({spec.kind})"
+                self._fitted.append((what, own, group.body.actuator_places[name]))
+                _call(what, own.start)
+        self.any = bool(self._fitted)
+        arenas, robots = len(scene.keys), len(scene.radius_m)
+        places = [sum(spec.width for spec in group.body.actuators.values()) for group in groups]
+        self._places = np.tile(np.repeat(places, [group.stop - group.start for group in groups]), arenas)
+        self._index: IntArray = np.tile(np.arange(robots, dtype=np.int64), arenas)
+        self.not_there: IntArray = np.zeros(arenas, np.int64)
+        self._robots, self._ticks = robots, 0
+
+    def act(self, actuations: ActuatorCommands, alive: BoolArray) -> None:
+        """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
+        rows, place = actuations.rows, actuations.place
+        there = place < self._places[rows]
+        np.add.at(self.not_there, rows[~there] // self._robots, 1)
+        there &= alive[rows]
+        asked = np.full((len(alive), self._places.max(initial=0)), np.nan)
+        asked[rows[there], place[there]] = actuations.value[there]
+        for what, own, places in self._fitted:
+            here = (self._index >= own.group.start) & (self._index < own.group.stop)
+            values = asked[:, places]
+            set_ = np.flatnonzero(here & ~np.isnan(values).any(axis=1))
+            _call(what, own.act, self._ticks, set_, values[set_])
+            self._check(what)
+        self._ticks += 1
+
+    def _check(self, what: str) -> None:
+        """After each of them: later nobody could tell whose number made poses nan."""
+        for name, values in (("target", self._scene.target), ("charge", self._scene.charge)):
+            finite = np.isfinite(values)
+            if not finite.all():
+                arena, robot = np.argwhere(~finite)[0, :2]
+                value = values[arena, robot].tolist()
+                said = f"expected finite numbers in scene.{name}, got {value} of robot {robot} in arena {arena}"
+                raise CustomCodeFailed(what, f"act: {said}")
+
+
+def _call(what: str, method: Any, *args: Any) -> None:
+    try:
+        method(*args)
+    except (Exception, SystemExit) as error:
+        raise CustomCodeFailed(what, traceback.format_exc()) from error

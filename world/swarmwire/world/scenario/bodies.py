@@ -1,6 +1,7 @@
 """The body of each group: a bundled one, or a custom model file beside the scenario."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,9 @@ from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.world.custom.loading import fitted
+from swarmwire.world.custom.actuators import fitted_actuator
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario
+from swarmwire.world.sensors.loading import fitted_sensor
 
 
 def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
@@ -78,6 +80,16 @@ def read_body(path: Path, where: str, key: str) -> Body:
     if "robots" in spec:
         raise BadInput(str(path), "", "expected a body's sheet, got a scenario; swarmwire check and draw take one")
     return _fitted(spec, path)
+
+
+def fitted(body: Body, where: str) -> Body:
+    """The body with the fields and widths of the classes of its custom sensors and actuators.
+
+    BadInput names what is wrong.
+    """
+    sensors = {name: fitted_sensor(spec, where, f"sensors.{name}") for name, spec in body.sensors.items()}
+    actuators = {name: fitted_actuator(spec, where, f"actuators.{name}") for name, spec in body.actuators.items()}
+    return replace(body, sensors=sensors, actuators=actuators)
 
 
 def _fitted(spec: dict[str, Any], path: Path) -> Body:

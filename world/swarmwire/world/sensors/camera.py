@@ -8,18 +8,19 @@ far LED above a low body.
 
 # pyright: basic, reportUnknownMemberType=false
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.sensor_specs import CameraSpec
 from swarmwire.comms.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
-from swarmwire.comms.truth import Group
+from swarmwire.comms.sensors.camera import CameraSpec
+from swarmwire.comms.sensors.sensor import Field
 from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import BuiltInSensor
 
 NEVER = (np.inf, -np.inf)
 END = 1.0 - 1e-6  # share of the way: the body that carries a LED does not hide it
@@ -90,18 +91,20 @@ class Mirror(NamedTuple):
     nearby: IntArray  # (obstacles,) buffer
 
 
-class CameraSensor:
+class CameraSensor(BuiltInSensor[CameraSpec]):
     """Sensor `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
 
-    def __init__(self, scene: Scene, group: Group, spec: CameraSpec) -> None:
-        blobs, noise = spec.most_blobs, Noise("normal", 0.0, spec.noise_relative)
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """As the spec declares them, with the range at the body's altitude."""
+        distance, *others = self.spec.reading_fields()
+        return replace(distance, high=self.spec.reach_m(self.group.body.altitude_m)), *others
+
+    def start(self) -> None:
+        """Index what the camera may see."""
+        scene, group, spec = self.scene, self.group, self.spec
         reach_m = spec.reach_m(group.body.altitude_m)
-        self.fields = (
-            Field("distance_m", blobs, noise, spec.step, low=0.0, high=reach_m),
-            Field("bearing_rad", blobs, angle=True),
-            Field("colour", blobs),
-        )
-        self._scene, self._shape = scene, (len(scene.keys), group.stop - group.start, blobs)
+        self._shape = len(scene.keys), group.stop - group.start, spec.most_blobs
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
@@ -112,7 +115,7 @@ class CameraSensor:
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The blobs that every robot of the group sees."""
         blobs = tuple(np.full(self._shape, np.nan) for _ in range(3))
-        scene = self._scene
+        scene = self.scene
         _watch(blobs, self._robots, self._obstacles.now(), self._mirror, scene.leds, scene.led_places_m)
         return blobs
 

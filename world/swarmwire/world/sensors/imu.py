@@ -10,28 +10,22 @@ bias begins as a normal draw per robot and field, and takes a normal step of dri
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensor_specs import ImuSpec
 from swarmwire.comms.draws import normal as normals
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.world.sensors.sensor import BuiltInSensor
 
 BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")
 
 
-class ImuSensor:
+class ImuSensor(BuiltInSensor[ImuSpec]):
     """Sensor `imu`: forward_mps2, left_mps2 and turn_radps (n,), in the body's frame; 0 but for errors in tick 0."""
 
-    def __init__(self, scene: Scene, group: Group, spec: ImuSpec) -> None:
-        self._scene, self._group = scene, group
-        acceleration, turn = Noise("normal", spec.noise_mps2), Noise("normal", spec.noise_radps)
-        self.fields = (
-            Field("forward_mps2", noise=acceleration, step=spec.step),
-            Field("left_mps2", noise=acceleration, step=spec.step),
-            Field("turn_radps", noise=turn, step=spec.step),
-        )
+    def start(self) -> None:
+        """Draw the biases."""
+        scene, group, spec = self.scene, self.group, self.spec
         robots = np.arange(group.start, group.stop)
         spread = np.array([spec.bias_std_mps2, spec.bias_std_mps2, spec.bias_std_radps])
         drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(3), BIAS)
@@ -43,7 +37,7 @@ class ImuSensor:
 
     def follow(self, tick: int) -> None:
         """Feel the tick before, and let the bias drift."""
-        scene, start = self._scene, self._group.start
+        scene, start = self.scene, self.group.start
         of, arenas = (self._felt, self._before, self._bias, self._drift), (scene.keys, scene.running)
         _feel(*of, scene.state, start, *arenas, tick, scene.tick_s)
 

@@ -8,14 +8,13 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.ranging_specs import LightSpec
 from swarmwire.comms.geometry.obstacle_index import ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
-from swarmwire.comms.truth import Group
+from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.world.sensors.rays import ObstacleIndices, nearest, robot_index_of
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import BuiltInSensor
 
 MARGIN_M = 1e-9  # a line along the border of two cells passes through both
 RANGE_INTENSITIES = 2.5  # the range of a light, in multiples of its intensity
@@ -88,7 +87,7 @@ def _rows(cells, column, margin_m, x, y, to_x, to_y):
     return _cell(low - margin_m, cells.per_y, cells.ny), _cell(high + margin_m, cells.per_y, cells.ny)
 
 
-class LightSensor:
+class LightSensor(BuiltInSensor[LightSpec]):
     """Sensor `light`: value (n, sensors), 0 dark to 1, photocells around the body. Noise is uniform, new each reading.
 
     A cell at the angle dphi from a light at distance d of intensity I (m) responds with
@@ -100,10 +99,9 @@ class LightSensor:
     or another robot at the same height.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: LightSpec) -> None:
-        self._scene, self._group, self._spec = scene, group, spec
-        noise = Noise("uniform", spec.noise)
-        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
+    def start(self) -> None:
+        """List the lights, and index what may hide them."""
+        scene = self.scene
         lights = [(a, light) for a, arena_lights in enumerate(scene.lights) for light in arena_lights]
         self._arena = np.array([a for a, _ in lights], np.int64)
         self._light = np.array([(light.x_m, light.y_m, light.intensity_m) for _, light in lights], np.float64).reshape(
@@ -117,7 +115,7 @@ class LightSensor:
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The noise-free response of every photocell of the group; it may exceed 1 where lights add up."""
-        scene, group, angle = self._scene, self._group, self._spec.angle_rad
+        scene, group, angle = self.scene, self.group, self.spec.angle_rad
         value = np.zeros((len(scene.keys), group.stop - group.start, len(angle)))
         geometry = self._robots, self._widest_m, self._obstacles.now()
         _shine(value, group.start, angle, *geometry, self._arena, self._light)

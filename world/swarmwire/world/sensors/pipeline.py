@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.bodies.spec import RangedSensorSpec, SensorSpec
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
 from swarmwire.comms.kernels import njit
+from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.sensor import Field, Following, Sensor
+from swarmwire.world.sensors.sensor import Sensor
 
 NOISE, OUTLIER, OUTLIER_VALUE, DROP_OUT = range(4)  # indices of `purposes`
 FULL_TURN = 2.0 * np.pi
@@ -202,8 +202,9 @@ class Staged:
         self.failed: BoolArray | None = None
         self._sensor, self._keys, self._running, self._group = sensor, keys, running, group
         outlier = spec.outlier if isinstance(spec, RangedSensorSpec) else 0.0
-        self._stages = [Stages(name, field, outlier, spec.drop_out) for field in sensor.fields]
-        self._fields = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in sensor.fields]
+        self._fields = tuple(sensor.fields)
+        self._stages = [Stages(name, field, outlier, spec.drop_out) for field in self._fields]
+        self._columns = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in self._fields]
         self._per_tick = spec.rate_hz * tick_s  # readings; 0: one in each tick
         self._delay = ceil(spec.delay_s / tick_s - ROUNDING)  # ticks
         self._samples = self._delay > 0 or 0.0 < self._per_tick < 1.0
@@ -218,19 +219,20 @@ class Staged:
         else:
             values = self._measure(tick)
         if self.failed is not None:
-            for value, field in zip(values, self._sensor.fields, strict=True):
+            for value, field in zip(values, self._fields, strict=True):
                 value[self.failed] = field.blank
-        return {key: value.reshape(shape) for (key, shape), value in zip(self._fields, values, strict=True)}
+        return {key: value.reshape(shape) for (key, shape), value in zip(self._columns, values, strict=True)}
 
     def follow(self, tick: int) -> None:
         """Update the sensor in a tick in which the group does not act."""
         if self._samples:
             self._sample(tick)
-        elif isinstance(self._sensor, Following):
+        else:
             self._sensor.follow(tick)
 
     def _measure(self, tick: int) -> Reading:
-        values = self._sensor.truth(tick)
+        truth = self._sensor.truth(tick)
+        values = (truth,) if isinstance(truth, np.ndarray) else tuple(truth)
         for value, stages in zip(values, self._stages, strict=True):
             stages.apply(value, self._keys, self._group.start, tick, self._running)
         return values
@@ -239,16 +241,14 @@ class Staged:
         """Measure if a reading is due, and show the newest reading that is old enough."""
         if self._is_due(tick):
             self._waiting.append((tick + self._delay, self._measure(tick)))
-        elif isinstance(self._sensor, Following):
+        else:
             self._sensor.follow(tick)
         while self._waiting and self._waiting[0][0] <= tick:
             self._shown = self._waiting.popleft()[1]
 
     def _blank(self) -> Reading:
         shape = len(self._keys), self._group.stop - self._group.start
-        return tuple(
-            np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._sensor.fields
-        )
+        return tuple(np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._fields)
 
     def _is_due(self, tick: int) -> bool:
         per_tick = self._per_tick

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.comms.geometry.obstacle_index import ObstacleIndex, obstacles_near, obstacles_within, ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
 from swarmwire.comms.kernels import kernel
+from swarmwire.comms.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 
 CELLS_PER_ROBOT = 8  # so that few robots share a cell where they gather in a corner of a large arena
 RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
@@ -278,16 +278,15 @@ def _answer(distance, rays):
     return min(max(value, 0.0), 1.0)
 
 
-class ProximitySensor:
+class ProximitySensor(BuiltInSensor[ProximitySpec]):
     """Sensor `proximity`: value (n, rays), 0 to 1, the response to the nearest robot, obstacle or wall on each ray.
 
     Rays start at the rim. Noise is uniform, and new in every reading.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: ProximitySpec) -> None:
-        self._sight = RayArraySight(scene, group, spec, active=True)
-        noise = Noise("uniform", spec.noise)
-        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
+    def start(self) -> None:
+        """Index what the rays may meet."""
+        self._sight = RayArraySight(self.scene, self.group, self.spec, active=True)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The noise-free response of every ray of every robot of the group."""
@@ -298,16 +297,15 @@ class ProximitySensor:
         return self._sight.distance_m()
 
 
-class InfraredSensor:
+class InfraredSensor(BuiltInSensor[InfraredSpec]):
     """Sensor `infrared`: value (n, rays), 0 to 1, the response to the infrared light of other robots.
 
     Rays start at the rim and end at the nearest robot that is alive, unless something blocks them. Noise is uniform.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: InfraredSpec) -> None:
-        self._sight = RayArraySight(scene, group, spec, active=False)
-        noise = Noise("uniform", spec.noise)
-        self.fields = (Field("value", len(spec.angle_rad), noise, spec.step, low=0.0, high=1.0, blank=0.0),)
+    def start(self) -> None:
+        """Index what the rays may meet."""
+        self._sight = RayArraySight(self.scene, self.group, self.spec, active=False)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The noise-free response of every ray of every robot of the group."""

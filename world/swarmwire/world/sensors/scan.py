@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
-from swarmwire.comms.truth import Group
+from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import BuiltInSensor
 
 TURN_RAD = 2.0 * np.pi
 SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, despite rounding
@@ -37,14 +36,12 @@ class Laser(NamedTuple):
     nearby: IntArray  # (obstacles,) buffer
 
 
-class ScanSensor:
+class ScanSensor(BuiltInSensor[ScanSpec]):
     """Sensor `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
 
-    def __init__(self, scene: Scene, group: Group, spec: ScanSpec) -> None:
-        noise = Noise("normal", spec.noise_m, spec.noise_relative)
-        self.fields = (
-            Field("range_m", spec.rays, noise, spec.step, low=spec.range_min_m, high=spec.range_m, blank=np.inf),
-        )
+    def start(self) -> None:
+        """Index what the rays may meet."""
+        scene, group, spec = self.scene, self.group, self.spec
         self._shape = len(scene.keys), group.stop - group.start, spec.rays
         self._robots = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
         self._obstacles = ObstacleIndices(scene, spec.range_m)

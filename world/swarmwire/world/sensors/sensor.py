@@ -1,64 +1,23 @@
-"""The sensor interface: fields and their truth, and the `Scene` that sensors read. `pipeline` adds the errors."""
+"""The truth of a sensor: its interface, and the `Scene` that sensors read. `pipeline` adds the errors.
 
+Each built-in sensor is declared in `swarmwire.comms.sensors`; its spec names the class of its truth, a
+`BuiltInSensor`. The class of a user's sensor is a `CustomSensor`, which declares keys and fields itself.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import inf, nan
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.ground import Ground
 from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.sensors.sensor import Field, SensorSpec
 from swarmwire.comms.truth import Boundary, Group, Light
 
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """An error of `size + relative * |value|`: half the width if uniform, the standard deviation if normal."""
-
-    kind: Literal["uniform", "normal"] = "normal"
-    size: float = 0.0  # in the field's unit
-    relative: float = 0.0
-
-
-NO_NOISE = Noise()
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """One field of a sense. Values that are not finite (a ray that meets nothing) have no noise and are not clipped."""
-
-    name: str  # "value"
-    width: int = 0  # 0: one number per robot, (n,); else (n, width)
-    noise: Noise = NO_NOISE
-    step: float = 0.0  # rounded to whole multiples of it; 0: not
-    low: float = -inf  # clipped to low and high
-    high: float = inf
-    blank: float = nan  # what a reading reads that is lost
-    angle: bool = False  # wrapped to (-pi, pi]
-    span: tuple[float, float] | None = None  # where an outlier may lie; None: from low to high
-
-
-class Sensor(Protocol):
-    """One kind of sense of one group, in all arenas, without any error of the sensor."""
-
-    fields: tuple[Field, ...]
-
-    def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """For each field an array of its own, (arenas, n) or (arenas, n, width), C-contiguous, which may be written to.
-
-        A value depends on the robot's own arena, its index and the tick, not on other arenas.
-        """
-        ...
-
-
-@runtime_checkable
-class Following(Protocol):
-    """A sense that adds up what happens from tick to tick, whether or not a reading is taken."""
-
-    def follow(self, tick: int) -> None:
-        """Add what the time since the last tick brought; called instead of `truth` where no reading is taken."""
-        ...
+S = TypeVar("S", bound=SensorSpec)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +53,57 @@ def led_places_m(groups: tuple[Group, ...], most: int) -> FloatArray:
     for group in groups:
         places[group.start : group.stop, : group.body.led_count] = group.body.led_places_m
     return places
+
+
+class Sensor(ABC):
+    """The truth of one sensor of one group, in all arenas, without any error of the sensor.
+
+    The world sets `scene` and `group`, calls `start` once, and then in each tick either `truth` or `follow`.
+    """
+
+    scene: Scene  # the arenas and all bodies, from `start` on
+    group: Group  # the robots with this sensor: of index `group.start` to before `group.stop` in each arena
+
+    @property
+    @abstractmethod
+    def fields(self) -> Sequence[Field]:
+        """The fields of a reading."""
+
+    @abstractmethod
+    def truth(self, tick: int) -> FloatArray | Sequence[FloatArray]:
+        """The truth about each field, (arenas, n) or (arenas, n, width); of a single field the array alone will do.
+
+        The arrays are C-contiguous and may be written to. A value must depend on the robot's own arena, its index and
+        the tick alone: then an arena is the same alone and among others.
+        """
+
+    def start(self) -> None:  # noqa: B027 - there may be nothing to do
+        """Called once, before the first tick."""
+
+    def follow(self, tick: int) -> None:  # noqa: B027 - there may be nothing to do
+        """Called in place of `truth` in ticks in which nothing is read, for what adds up from tick to tick."""
+
+    @property
+    def pose(self) -> FloatArray:
+        """Where the group's robots are, (arenas, n, 3): x, y in m, heading in rad, not wrapped; arena frame."""
+        return self.scene.state[:, self.group.start : self.group.stop, :3]
+
+
+class BuiltInSensor(Sensor, Generic[S]):
+    """The truth of a sensor with a spec, which has its keys and declares its fields."""
+
+    def __init__(self, spec: S) -> None:
+        self.spec = spec
+
+    @property
+    def fields(self) -> Sequence[Field]:
+        """As the spec declares them."""
+        return self.spec.reading_fields()
+
+
+class CustomSensor(Sensor):
+    """The truth of a sensor of your own. Subclasses are dataclasses: fields made by `parameter` are keys.
+
+    One instance serves all robots of a group, in all arenas. Noise and range stand in its `fields`, rate, delay and
+    drop-out in the body's sheet. Its `fields` are asked for before there is a scene.
+    """

@@ -2,12 +2,18 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from math import pi
+from dataclasses import replace
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.sensor_specs import (
+from swarmwire.comms.draws import normal as normals
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import normal
+from swarmwire.comms.geometry.ground import shade_at
+from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.sensors.sensor import Field
+from swarmwire.comms.sensors.simple import (
     BatterySpec,
     BumperSpec,
     CompassSpec,
@@ -15,89 +21,65 @@ from swarmwire.comms.bodies.sensor_specs import (
     OdometrySpec,
     PositioningSpec,
 )
-from swarmwire.comms.draws import normal as normals
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.geometry.ground import shade_at
-from swarmwire.comms.kernels import kernel, njit
-from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.sensor import Field, Noise, Scene
+from swarmwire.world.sensors.sensor import BuiltInSensor
 
 SLIP, WHEEL = purpose("odometry slip"), purpose("odometry wheel")
 
 
-class BatterySensor:
+class BatterySensor(BuiltInSensor[BatterySpec]):
     """Sensor `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,), which falls linearly with the charge."""
-
-    def __init__(self, scene: Scene, group: Group, spec: BatterySpec) -> None:
-        self._scene, self._group, self._spec = scene, group, spec
-        self.fields = (
-            Field("charge", noise=Noise("normal", spec.noise), step=spec.step, low=0.0, high=1.0),
-            Field("voltage_v", noise=Noise("normal", spec.noise_v), low=0.0),
-        )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """Charge and voltage of every robot of the group."""
-        charge = self._scene.charge[:, self._group.start : self._group.stop].copy()
-        empty_v = self._spec.empty_v
-        return charge, empty_v + charge * (self._spec.full_v - empty_v)
+        charge = self.scene.charge[:, self.group.start : self.group.stop].copy()
+        empty_v = self.spec.empty_v
+        return charge, empty_v + charge * (self.spec.full_v - empty_v)
 
 
-class BumperSensor:
+class BumperSensor(BuiltInSensor[BumperSpec]):
     """Sensor `bumper`: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
-
-    def __init__(self, scene: Scene, group: Group, spec: BumperSpec) -> None:
-        self._scene, self._group = scene, group
-        self.fields = (Field("pressed", blank=0.0),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The contact flag of every robot of the group."""
-        return (self._scene.touched[:, self._group.start : self._group.stop].copy(),)
+        return (self.scene.touched[:, self.group.start : self.group.stop].copy(),)
 
 
-class CompassSensor:
+class CompassSensor(BuiltInSensor[CompassSpec]):
     """Sensor `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x; normal noise, new in every tick."""
-
-    def __init__(self, scene: Scene, group: Group, spec: CompassSpec) -> None:
-        self._scene, self._group = scene, group
-        noise = Noise("normal", spec.noise_rad)
-        self.fields = (Field("heading_rad", noise=noise, step=spec.step, angle=True, span=(-pi, pi)),)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The heading of every robot of the group, not wrapped."""
-        return (self._scene.state[:, self._group.start : self._group.stop, 2].copy(),)
+        return (self.scene.state[:, self.group.start : self.group.stop, 2].copy(),)
 
 
-class PositioningSensor:
+class PositioningSensor(BuiltInSensor[PositioningSpec]):
     """Sensor `positioning`: x_m, y_m (n,), in m, arena frame; normal noise, new in every tick.
 
     An outlier is anywhere in the arena.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: PositioningSpec) -> None:
-        self._scene, self._group = scene, group
-        noise = Noise("normal", spec.noise_m)
-        self.fields = tuple(
-            Field(name, noise=noise, step=spec.step, span=(-0.5 * side_m, 0.5 * side_m))
-            for name, side_m in zip(("x_m", "y_m"), scene.size_m, strict=True)
-        )
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """As the spec declares them, with the arena as the range of outliers."""
+        sides_m = zip(self.spec.reading_fields(), self.scene.size_m, strict=True)
+        return tuple(replace(field, span=(-0.5 * side_m, 0.5 * side_m)) for field, side_m in sides_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The position of every robot of the group."""
-        state = self._scene.state[:, self._group.start : self._group.stop]
+        state = self.scene.state[:, self.group.start : self.group.stop]
         return state[:, :, 0].copy(), state[:, :, 1].copy()
 
 
-class OdometrySensor:
+class OdometrySensor(BuiltInSensor[OdometrySpec]):
     """Sensor `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
 
     Errors add up: slip changes the travel of each tick, the size of a wheel changes all of it. They are part of the
     measured travel, not of a reading.
     """
 
-    def __init__(self, scene: Scene, group: Group, spec: OdometrySpec) -> None:
-        self._scene, self._group, self._spec = scene, group, spec
-        self.fields = (Field("left_m", step=spec.step), Field("right_m", step=spec.step))
+    def start(self) -> None:
+        """Draw the sizes of the wheels."""
+        scene, group, spec = self.scene, self.group, self.spec
         self._counted_m = scene.travel_m[:, group.start : group.stop].copy()
         self._measured_m = self._counted_m.copy()
         robots = np.arange(group.start, group.stop)
@@ -106,14 +88,14 @@ class OdometrySensor:
 
     def follow(self, tick: int) -> None:
         """Add the travel since the last tick, with its slip; the result does not depend on how often an agent reads."""
-        scene, start = self._scene, self._group.start
+        scene, start = self.scene, self.group.start
         travel, arena_state = (self._measured_m, self._counted_m, scene.travel_m), (scene.keys, scene.running)
-        _add_travel(*travel, start, self._scale, *arena_state, tick, self._spec.slip)
+        _add_travel(*travel, start, self._scale, *arena_state, tick, self.spec.slip)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The travel that the encoders of every robot measure."""
         self.follow(tick)
-        step_m = self._spec.step_m
+        step_m = self.spec.step_m
         shown = np.floor(self._measured_m / step_m) * step_m if step_m > 0.0 else self._measured_m
         return shown[:, :, 0].copy(), shown[:, :, 1].copy()
 
@@ -134,18 +116,16 @@ def _add_travel(measured, counted, travel, start, scale, keys, running, tick, sl
                 counted[arena, i, wheel] = total
 
 
-class GroundSensor:
+class GroundSensor(BuiltInSensor[GroundSpec]):
     """Sensor `ground`: shade (n, points), 0 black to 1 white, of the floor under each point. Noise is uniform."""
 
-    def __init__(self, scene: Scene, group: Group, spec: GroundSpec) -> None:
-        self._scene, self._group = scene, group
-        self._points = np.array(spec.points_m, np.float64)
-        noise = Noise("uniform", spec.noise)
-        self.fields = (Field("shade", len(self._points), noise, spec.step, low=0.0, high=1.0),)
+    def start(self) -> None:
+        """Convert the points once."""
+        self._points = np.array(self.spec.points_m, np.float64)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The shade under every point of every robot of the group."""
-        scene, group = self._scene, self._group
+        scene, group = self.scene, self.group
         shade = np.empty((len(scene.keys), group.stop - group.start, len(self._points)))
         _look_down(shade, scene.state, scene.running, group.start, self._points, scene.ground)
         return (shade,)

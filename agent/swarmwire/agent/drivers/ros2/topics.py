@@ -10,13 +10,13 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
 from swarmwire.comms.robots.ros2.messages import DISTROS
 from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
 from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, brightness_of, charge_of, topics_of_light
+from swarmwire.comms.sensors.simple import BatterySpec
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"
@@ -98,9 +98,9 @@ class LaserReader(Reader):
         self._proximity = LaserAsProximity(near, body.radius_m, at_m, scanner_rad) if near else None
         self.fields = {}
         if body.scan:
-            self.fields["scan.range_m"] = np.full((1, body.scan.rays), np.inf)
+            self.fields |= body.scan.blank("scan", 1)
         if near:
-            self.fields["proximity.value"] = np.zeros((1, len(near.angle_rad)))
+            self.fields |= near.blank("proximity", 1)
 
     def read(self, message: Any) -> None:
         """As `Reader.read`."""
@@ -154,7 +154,7 @@ class BatteryReader(Reader):
 
     def __init__(self, spec: BatterySpec) -> None:
         self._spec = spec
-        self.fields = _numbers("battery", charge=np.nan, voltage_v=np.nan)
+        self.fields = spec.blank("battery", 1)
 
     def read(self, message: Any) -> None:
         """As `Reader.read`."""
@@ -195,11 +195,11 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
         readers[options.odometry_topic] = OdometryReader(wheel_base_of(body.drive), body.max_linear_mps)
     if "imu" in body.sensors or body.compass:
         readers[options.imu_topic] = ImuReader(options.north_deg)
-    battery = body.sensors.get("battery")
-    if isinstance(battery, BatterySpec):
+    battery = body.spec_of(BatterySpec)
+    if battery:
         readers[options.battery_topic] = BatteryReader(battery)
     if body.light:
-        value = np.zeros((1, len(body.light.angle_rad)))
+        value = body.light.blank("light", 1)["light.value"]
         for cell, topic in enumerate(topics_of_light(options.light_topic, value.shape[1])):
             readers[topic] = LightReader(value, cell, options.full_lux)
     return readers

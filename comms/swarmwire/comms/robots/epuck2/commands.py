@@ -13,8 +13,6 @@ from typing import NamedTuple
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels
-from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec, ScanSpec
-from swarmwire.comms.bodies.sensor_specs import GroundSpec
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import (
     COMMAND_BYTES,
@@ -24,6 +22,10 @@ from swarmwire.comms.robots.epuck2.packets import (
     PacketRequest,
     RobotSettingsBits,
 )
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.simple import GroundSpec
 
 STEPS_PER_TURN = 1000
 M_PER_STEP = pi * 0.04 / STEPS_PER_TURN  # wheels of 40 mm

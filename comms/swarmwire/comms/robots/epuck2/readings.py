@@ -12,9 +12,9 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ranging_specs import ScanSpec
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.simple import BatterySpec
 
 PROXIMITY_FULL = 4095  # 12 bits
 AMBIENT_DARK = 4000  # what the proximity sensors tell of ambient light in the dark

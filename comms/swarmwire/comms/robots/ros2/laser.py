@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.ranging_specs import ProximitySpec, ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
 
 TURN_RAD = 2.0 * np.pi
 MAX_RAYS = 100_000

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
 from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.sensors.simple import BatterySpec
 
 FRAME = ""
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message

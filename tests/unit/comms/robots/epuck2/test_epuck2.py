@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
 from swarmwire.comms.robots.epuck2.commands import (
@@ -23,6 +22,7 @@ from swarmwire.comms.robots.epuck2.commands import (
 )
 from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Odometer
+from swarmwire.comms.sensors.scan import ScanSpec
 from tests.support.robots.epuck2 import fact_sheet
 
 WHEEL_BASE_M = 0.053

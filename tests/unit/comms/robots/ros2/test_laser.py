@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.ranging_specs import ProximitySpec, ScanSpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
 from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
 from tests.support.comms.robots.ros2 import independent
 
 MESSAGES = Messages("jazzy")

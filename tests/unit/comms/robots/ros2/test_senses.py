@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.sensor_specs import BatterySpec
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages
@@ -21,6 +20,7 @@ from swarmwire.comms.robots.ros2.other_sensors import (
     illuminance,
     topics_of_light,
 )
+from swarmwire.comms.sensors.simple import BatterySpec
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
 

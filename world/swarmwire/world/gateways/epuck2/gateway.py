@@ -14,11 +14,12 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.bodies.ranging_specs import LightSpec, ProximitySpec
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
+from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets
 from swarmwire.world.gateways.gateway import Commands, Gateway

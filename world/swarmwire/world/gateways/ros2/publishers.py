@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.bodies.ranging_specs import ScanSpec
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
@@ -16,6 +15,7 @@ from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
 from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, battery_state, illuminance, topics_of_light
+from swarmwire.comms.sensors.scan import ScanSpec
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,25 @@
-"""Specs of the sensors that look around a body: proximity, passive infrared, light, laser scanner.
+"""Infrared rays from the rim of the body: the sensors `proximity` (active) and `infrared` (passive).
 
-Infrared sensors answer to the distance from the body's rim by a `ResponseCurve`. Angles of a spec are in degrees,
-counter-clockwise from ahead; `angle_rad` has them in (-pi, pi].
+They answer to the distance from the rim by a `ResponseCurve`. Angles of a spec are in degrees, counter-clockwise from
+ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `Around` serve the light sensor, too.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar, Generic, Self, TypeVar, cast
 
 import numpy as np
 
 from swarmwire.comms.angles import wrap_by_atan2
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.bodies.spec import RangedSensorSpec
 from swarmwire.comms.config import parameter
+from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise, RangedSensorSpec
 
 FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple
-FULL_DEG = 360.0
 SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by
 
 
-def _directions(angle_rad: FloatArray) -> FloatArray:
+def ray_directions(angle_rad: FloatArray) -> FloatArray:
     """Directions in a body's frame, wrapped into one turn; read-only, since all robots share them."""
     wrapped = wrap_by_atan2(angle_rad)
     wrapped.setflags(write=False)
@@ -35,12 +35,35 @@ class RadialSpec(RangedSensorSpec):
     @cached_property
     def angle_rad(self) -> FloatArray:
         """The directions of the sensors in the body's frame, in (-pi, pi], (sensors,)."""
-        return _directions(np.deg2rad(np.array(self.angles_deg, np.float64)))
+        return ray_directions(np.deg2rad(np.array(self.angles_deg, np.float64)))
 
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Cosine and sine of `angle_rad`, (sensors,) each."""
         return np.cos(self.angle_rad), np.sin(self.angle_rad)
+
+
+S = TypeVar("S", bound=RadialSpec)
+
+
+@dataclass(frozen=True)
+class Around(Generic[N, S]):
+    """Sensors around a body, in the order of the spec (use the angles, never the indices)."""
+
+    value: FloatArray  # (…, sensors) the response, 0 to 1
+    spec: S
+
+    @property
+    def angle_rad(self) -> FloatArray:
+        """Directions of the sensors in the body's frame, in (-pi, pi], 0 ahead, positive to the left, (sensors,)."""
+        return self.spec.angle_rad
+
+    def vector_sum(self) -> tuple[N, N]:
+        """X and y of the sum of the sensors as vectors of length `value` towards `angle_rad`."""
+        value, (cosine, sine) = self.value, self.spec.direction
+        if value.ndim == 1:  # called once per robot and tick: faster than the call with an axis
+            return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
+        return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
 
 
 @dataclass(frozen=True)
@@ -88,9 +111,17 @@ class ResponseCurve:
 class RayArraySpec(RadialSpec):
     """Rays that start at the body's rim and answer to the nearest object on them."""
 
+    meaning: ClassVar[str]  # of the value of a reading
+
     range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
     response: ResponseCurve = parameter(help="answer to distance")
     noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+
+    @classmethod
+    def example(cls) -> Self:
+        """As `SensorSpec.example`."""
+        curve = ResponseCurve("rational", a=0.01, b=0.001, reach_m=0.5)
+        return cls(angles_deg=(0.0, 90.0, 200.0), range_m=0.5, response=curve, noise=0.1)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
         """As `SensorSpec.fault`."""
@@ -99,6 +130,27 @@ class RayArraySpec(RadialSpec):
             return "response", "expected a curve that falls from the rim to reach_m"
         return None
 
+    def reading_fields(self) -> tuple[Field, ...]:
+        """As `SensorSpec.reading_fields`."""
+        noise, width = Noise("uniform", self.noise), len(self.angle_rad)
+        return (Field("value", width, noise, self.step, 0.0, 1.0, blank=0.0, help=self.meaning, per="rays"),)
+
+    def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
+        """As `SensorSpec.synthetic`: half of the rays meet nothing."""
+        return (np.maximum(draw(name, len(self.angles_deg)) * 2.0 - 1.0, 0.0),)
+
+
+R = TypeVar("R", bound=RayArraySpec)
+
+
+class AtRim(Around[N, R]):
+    """Rays around a body that start at its rim."""
+
+    @cached_property
+    def distance_m(self) -> FloatArray:
+        """Distance from the rim at which an ideal ray reads `value`; its range if it sees nothing, (…, rays)."""
+        return self.spec.response.distance_m(self.value)
+
 
 @dataclass(frozen=True)
 class ProximitySpec(RayArraySpec):
@@ -106,6 +158,13 @@ class ProximitySpec(RayArraySpec):
 
     Readings: value (n, rays), 0 to 1.
     """
+
+    truth: ClassVar[str] = "swarmwire.world.sensors.rays:ProximitySensor"
+    meaning: ClassVar[str] = "response of each ray: 0 nothing, 1 touching"
+
+
+class ProximityReading(AtRim[N, ProximitySpec]):
+    """Proximity rays, (…, rays): value is 0 for nothing, 1 for touching."""
 
 
 @dataclass(frozen=True)
@@ -116,56 +175,9 @@ class InfraredSpec(RayArraySpec):
     (n, rays), 0 to 1.
     """
 
-
-@dataclass(frozen=True)
-class LightSpec(RadialSpec):
-    """Photocells that answer to the arena's lights. Readings: value (n, sensors), 0 dark to 1."""
-
-    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+    truth: ClassVar[str] = "swarmwire.world.sensors.rays:InfraredSensor"
+    meaning: ClassVar[str] = "response of each ray: 0 no robot, 1 touching one; walls, obstacles and the dead are dark"
 
 
-@dataclass(frozen=True)
-class ScanSpec(RangedSensorSpec):
-    """A laser scanner: the distance to the nearest object on each ray, all at one height.
-
-    Readings: range_m (n, rays), inf where nothing is within the range.
-    """
-
-    rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
-    range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
-    range_min_m: float = parameter(0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0)
-    first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
-    span_deg: float = parameter(
-        FULL_DEG,
-        help="angle from the first ray to the last; 360: rays all around, the last one step before the first",
-        unit="deg",
-        above=0,
-        at_most=FULL_DEG,
-    )
-    at_m: float = parameter(0.0, help="how far ahead of the body's centre the scanner stands", unit="m")
-    noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
-    noise_relative: float = parameter(0.0, help="and that share of the distance", at_least=0, at_most=1)
-
-    def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `SensorSpec.fault`."""
-        if self.range_min_m >= self.range_m:
-            return "range_min_m", f"expected less than range_m, got {self.range_min_m!r}"
-        if abs(self.at_m) > radius_m:
-            return "at_m", f"expected a place on the body, whose radius is {radius_m:g} m; got {self.at_m!r}"
-        return None
-
-    @property
-    def step_rad(self) -> float:
-        """The angle between two rays."""
-        gaps = self.rays if self.span_deg == FULL_DEG else max(self.rays - 1, 1)
-        return float(np.deg2rad(self.span_deg) / gaps)
-
-    @cached_property
-    def angle_rad(self) -> FloatArray:
-        """The directions of the rays in the body's frame, in (-pi, pi], (rays,)."""
-        return _directions(np.deg2rad(self.first_deg) + self.step_rad * np.arange(self.rays))
-
-    @cached_property
-    def direction(self) -> tuple[FloatArray, FloatArray]:
-        """Cosine and sine of `angle_rad`, (rays,) each."""
-        return np.cos(self.angle_rad), np.sin(self.angle_rad)
+class InfraredReading(AtRim[N, InfraredSpec]):
+    """Rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""

@@ -1,0 +1,62 @@
+"""Sensors: their keys in body files, the fields and types of their readings, and the properties that read them.
+
+To add a sensor, declare it in a file here (`imu.py` is a short one): its spec, with the fields of a reading and the
+name of its truth, and its reading. List it in `Sensors`. The truth is a class in `swarmwire.world.sensors`.
+"""
+
+from abc import abstractmethod
+from typing import Any, Generic
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.sensors.camera import CameraReading, CameraReadings, CameraSpec
+from swarmwire.comms.sensors.imu import ImuReading, ImuSpec
+from swarmwire.comms.sensors.light import LightReading, LightSpec
+from swarmwire.comms.sensors.rays import InfraredReading, InfraredSpec, ProximityReading, ProximitySpec
+from swarmwire.comms.sensors.scan import ScanReading, ScanSpec
+from swarmwire.comms.sensors.sensor import N, SensorProperty, SensorSpec
+from swarmwire.comms.sensors.simple import (
+    BatteryReading,
+    BatterySpec,
+    BumperReading,
+    BumperReadings,
+    BumperSpec,
+    CompassReading,
+    CompassSpec,
+    GroundReading,
+    GroundSpec,
+    OdometryReading,
+    OdometrySpec,
+    PositioningReading,
+    PositioningSpec,
+)
+
+
+class Sensors(Generic[N]):
+    """The built-in sensors, each by its name in body files and in the `needs` of agents.
+
+    Handles of one robot (N is float) and of n robots (N is FloatArray) derive from it.
+    """
+
+    __slots__ = ()  # an attribute set on a handle by mistake raises
+
+    proximity = SensorProperty(ProximitySpec, ProximityReading[float], ProximityReading[FloatArray])
+    compass = SensorProperty(CompassSpec, CompassReading[float], CompassReading[FloatArray])
+    odometry = SensorProperty(OdometrySpec, OdometryReading[float], OdometryReading[FloatArray])
+    light = SensorProperty(LightSpec, LightReading[float], LightReading[FloatArray])
+    bumper = SensorProperty(BumperSpec, BumperReading.of, BumperReadings)
+    positioning = SensorProperty(PositioningSpec, PositioningReading[float], PositioningReading[FloatArray])
+    infrared = SensorProperty(InfraredSpec, InfraredReading[float], InfraredReading[FloatArray])
+    scan = SensorProperty(ScanSpec, ScanReading, ScanReading)
+    ground = SensorProperty(GroundSpec, GroundReading, GroundReading)
+    camera = SensorProperty(CameraSpec, CameraReading.of, CameraReadings)
+    imu = SensorProperty(ImuSpec, ImuReading[float], ImuReading[FloatArray])
+    battery = SensorProperty(BatterySpec, BatteryReading[float], BatteryReading[FloatArray])
+
+    @abstractmethod
+    def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
+        """The reading of a sensor in this tick."""
+
+
+SENSOR_SPECS: dict[str, type[SensorSpec]] = {
+    name: sensor.spec for name, sensor in vars(Sensors).items() if isinstance(sensor, SensorProperty)
+}

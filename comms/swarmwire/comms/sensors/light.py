@@ -1,0 +1,37 @@
+"""Photocells around the body: the sensor `light`."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.config import parameter
+from swarmwire.comms.sensors.rays import Around, RadialSpec
+from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise
+
+
+@dataclass(frozen=True)
+class LightSpec(RadialSpec):
+    """Photocells that answer to the arena's lights. Readings: value (n, sensors), 0 dark to 1."""
+
+    truth: ClassVar[str] = "swarmwire.world.sensors.light:LightSensor"
+
+    noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
+
+    @classmethod
+    def example(cls) -> Self:
+        """As `SensorSpec.example`."""
+        return cls(angles_deg=(0.0, 90.0, 200.0), noise=0.1)
+
+    def reading_fields(self) -> tuple[Field, ...]:
+        """As `SensorSpec.reading_fields`."""
+        noise, width = Noise("uniform", self.noise), len(self.angle_rad)
+        meaning = "light on each photocell: 0 dark, also in the shadow of a body or an obstacle"
+        return (Field("value", width, noise, self.step, 0.0, 1.0, blank=0.0, help=meaning, per="sensors"),)
+
+    def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
+        """As `SensorSpec.synthetic`."""
+        return (draw(name, len(self.angles_deg)),)
+
+
+class LightReading(Around[N, LightSpec]):
+    """Photocells, (…, cells): value is 0 for dark."""

@@ -1,0 +1,188 @@
+"""Sensors made from the specs of a body: the class of each truth is loaded by name, and users' classes are checked.
+
+`fitted_sensor` completes the spec of a custom sensor before a run; `sensor_of` makes the sensor for the pipeline.
+"""
+
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import isfinite, isnan
+from numbers import Real
+from typing import Any, Literal, TypeVar, cast, get_args, get_type_hints
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
+from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.plugins import custom_class, entry_points_of, load_named
+from swarmwire.comms.sensors.sensor import Field, Noise, SensorSpec
+from swarmwire.comms.truth import Group
+from swarmwire.world.sensors.sensor import BuiltInSensor, CustomSensor, Scene, Sensor
+
+T = TypeVar("T")
+SENSORS = "swarmwire.sensors"  # group of entry points
+
+
+def sensor_of(name: str, spec: SensorSpec, scene: Scene, group: Group) -> Sensor:
+    """The sensor `name` of a group, started: of the class that its spec names."""
+    if isinstance(spec, CustomSensorSpec):
+        sensor: Sensor = CheckedSensor(name, made_sensor(spec), spec)
+    else:
+        sensor = truth_of(type(spec))(spec)
+    sensor.scene, sensor.group = scene, group
+    sensor.start()
+    return sensor
+
+
+def truth_of(spec: type[SensorSpec]) -> type[BuiltInSensor[Any]]:
+    """The class of the truth that a built-in spec names; NotLoaded or TypeError if there is no such class."""
+    kind = load_named(spec.truth)
+    if not isinstance(kind, type) or not issubclass(kind, BuiltInSensor):
+        raise TypeError(f"{spec.__name__}.truth: expected a BuiltInSensor, got {spec.truth!r}")
+    return cast("type[BuiltInSensor[Any]]", kind)
+
+
+def made_sensor(spec: CustomSensorSpec) -> CustomSensor:
+    """A new instance of the class of a spec that is fitted."""
+    return made(CustomSensor, spec.kind, spec.params, "", "")
+
+
+def fitted_sensor(spec: SensorSpec, where: str, key: str) -> SensorSpec:
+    """The spec with the fields of its class if it is a custom one; BadInput names what is wrong."""
+    if not isinstance(spec, CustomSensorSpec):
+        return spec
+    spec = replace(spec, kind=entry_point(spec.kind, SENSORS))
+    own = made(CustomSensor, spec.kind, spec.params, where, key)
+    found: Any = asked(own, "fields", where, key)
+    if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
+        raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
+    fields = cast("tuple[Field, ...]", found)
+    names: list[Any] = [of.name for of in fields]
+    if not all(isinstance(name, str) and name.isidentifier() for name in names) or len(set(names)) < len(names):
+        expected = "expected fields with names of their own, of letters, digits and _"
+        raise BadInput(where, f"{key}.kind", f"{expected}; got {', '.join(map(str, names))}")
+    for field in fields:
+        fault = field_fault(field)
+        if fault:
+            raise BadInput(where, f"{key}.kind", f"the field {field.name} of {type(own).__name__}: {fault}")
+    return replace(spec, fields={of.name: of.width for of in fields})
+
+
+def entry_point(kind: str, group: str) -> str:
+    """The "package.module:Class" that an entry point of this name stands for; any other text as it is."""
+    found = () if ":" in kind else entry_points_of(group)
+    return next((point.value for point in found if point.name == kind), kind)
+
+
+def asked(own: object, name: str, where: str, key: str) -> object:
+    """An attribute of an instance of a user's class; BadInput if it raises."""
+    try:
+        return getattr(own, name)
+    except Exception as error:
+        expected = f"{type(own).__name__}.{name} fails: {type(error).__name__}: {error}"
+        raise BadInput(where, f"{key}.kind", expected) from error
+
+
+def made(base: type[T], kind: str, params: Mapping[str, Any], where: str, key: str) -> T:
+    """An instance of the class `kind` below `base`; BadInput if it is none, or does not take these parameters."""
+    found = custom_class(base, kind, where, f"{key}.kind")
+    if cast("Any", found).__dataclass_params__.frozen:  # it is told its scene and group
+        raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {found.__name__} is")
+    try:
+        return built(found, params, where, key)
+    except BadInput:
+        raise
+    except Exception as error:  # of its own __post_init__
+        raise BadInput(where, key, f"{found.__name__} refuses: {type(error).__name__}: {error}") from error
+
+
+class CheckedSensor(Sensor):
+    """A `CustomSensor` whose truth is checked and copied; CustomCodeFailed if it raises."""
+
+    def __init__(self, name: str, own: CustomSensor, spec: CustomSensorSpec) -> None:
+        self._name, self._own, self._spec = name, own, spec
+        self._fields = tuple(replace(field, step=field.step or spec.step) for field in own.fields)
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """Those of the class, with the step of the spec."""
+        return self._fields
+
+    def start(self) -> None:
+        """As `Sensor.start`."""
+        own, group = self._own, self.group
+        own.scene, own.group = self.scene, group
+        self._what = f"the sense {self._name} of {group.name} ({self._spec.kind})"
+        robots = len(self.scene.keys), group.stop - group.start
+        self._shapes = [(*robots, field.width) if field.width else robots for field in self._fields]
+        self._call(own.start)
+
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """The truth about each field."""
+        told: Any = self._call(self._own.truth, tick)
+        if not isinstance(cast("object", told), np.ndarray | tuple | list):
+            raise CustomCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {told!r:.80}")
+        single = isinstance(cast("object", told), np.ndarray)
+        arrays: tuple[Any, ...] = (told,) if single else tuple(told)
+        if len(arrays) != len(self._shapes):
+            raise CustomCodeFailed(self._what, f"truth: expected {len(self._shapes)} arrays, got {len(arrays)}")
+        return tuple(self._checked(*each) for each in zip(self._fields, arrays, self._shapes, strict=True))
+
+    def follow(self, tick: int) -> None:
+        """As `Sensor.follow`."""
+        self._call(self._own.follow, tick)
+
+    def _checked(self, field: Field, array: Any, shape: tuple[int, ...]) -> FloatArray:
+        try:
+            numbers = np.array(array, np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise CustomCodeFailed(self._what, f"truth: expected numbers as {field.name}: {error}") from error
+        if numbers.shape != shape:
+            raise CustomCodeFailed(self._what, f"truth: expected {field.name} of shape {shape}, got {numbers.shape}")
+        return numbers
+
+    def _call(self, method: Any, *args: int) -> Any:
+        try:
+            return method(*args)
+        except (Exception, SystemExit) as error:
+            raise CustomCodeFailed(self._what, traceback.format_exc()) from error
+
+
+KINDS: tuple[Literal["uniform", "normal"], ...] = get_args(get_type_hints(Noise)["kind"])
+
+
+def field_fault(field: Field) -> str | None:
+    """What was expected of one of its values, and which there is; None if all are well. Its name may be anything."""
+    of: Any = field  # what a user wrote may be of any type
+    if type(of.width) is not int or not 0 <= of.width <= MAX_WIDTH:
+        return f"expected a width from 0 to {MAX_WIDTH}; got {of.width!r}"
+    if not isinstance(of.noise, Noise):
+        return f"expected noise as a Noise; got {of.noise!r}"
+    if of.noise.kind not in KINDS:
+        return f"expected noise of the kind {' or '.join(KINDS)}; got {of.noise.kind!r}"
+    for name, value in (("noise.size", of.noise.size), ("noise.relative", of.noise.relative), ("step", of.step)):
+        if not _is(value, lambda number: isfinite(number) and number >= 0.0):
+            return f"expected {name} as a finite number from 0; got {value!r}"
+    for name, value in (("low", of.low), ("high", of.high)):
+        if not _is(value, lambda number: not isnan(number)):
+            return f"expected {name} as a number; got {value!r}"
+    if of.low > of.high:
+        return f"expected low not above high; got {of.low!r} and {of.high!r}"
+    if not _is(of.blank, lambda _: True):
+        return f"expected blank as a number; got {of.blank!r}"
+    if of.span is not None and not _is_span(of.span):
+        return f"expected span as two finite numbers that do not fall; got {of.span!r}"
+    return None
+
+
+def _is(value: Any, holds: Callable[[float], bool]) -> bool:
+    return isinstance(value, Real) and value is not True and value is not False and holds(float(value))
+
+
+def _is_span(span: object) -> bool:
+    if not isinstance(span, tuple | list):
+        return False
+    ends = cast("Sequence[Any]", span)
+    return len(ends) == 2 and all(_is(end, isfinite) for end in ends) and ends[0] <= ends[1]
