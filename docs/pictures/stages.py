@@ -15,6 +15,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save
 from swarmwire.metrics.drawing.looks import FAINT
 from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.sensor import Sensor
 
 TO = Path(__file__).parents[1] / "stages.svg"
 TICK_S, TICKS = 0.1, 60
@@ -30,15 +31,20 @@ SENSOR_SPECS = {
 }
 
 
-class Wave:
+class Wave(Sensor):
     """A number that rises and falls."""
 
     def __init__(self, field: Field) -> None:
-        self.fields = (field,)
+        self._field = field
 
-    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The number."""
+        return (self._field,)
+
+    def truth(self, tick: int) -> FloatArray:
         """The number in a tick."""
-        return (np.full((1, 1), 0.5 + 0.4 * np.sin(1.6 * tick * TICK_S)),)
+        return np.full((1, 1), 0.5 + 0.4 * np.sin(1.6 * tick * TICK_S))
 
 
 def draw(to: Path = TO) -> None:

@@ -36,7 +36,8 @@ class Gas(CustomSensor):
 
     @property
     def fields(self) -> Sequence[Field]:
-        return (Field("concentration", noise=Noise("normal", self.noise), low=0.0, blank=0.0),)
+        noise, meaning = Noise("normal", self.noise), "share of the concentration at the leak"
+        return (Field("concentration", noise=noise, low=0.0, blank=0.0, help=meaning),)
 
     def start(self) -> None:
         self.leak = Leak.of(self.scene)

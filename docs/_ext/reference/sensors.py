@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from functools import cached_property
 from inspect import getdoc, getmembers
+from typing import cast
 
 from reference.markdown import code, sentence, table
 from reference.parameters import HEAD, parameter_rows
@@ -26,7 +27,7 @@ def _rows(name: str) -> Iterator[tuple[str, ...]]:
         need = " "
     for of, value in getmembers(getattr(Sensors, name).many):
         if isinstance(value, property | cached_property):
-            yield need, code(of), "", unit_of(of), sentence(getdoc(value) or ""), ""
+            yield need, code(of), "", unit_of(of), sentence(getdoc(cast("object", value)) or ""), ""
 
 
 def sensor_tables() -> str:

@@ -14,9 +14,9 @@ from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 from swarmwire.deploy.catalogue.sensors import reading_table
 from swarmwire.deploy.catalogue.units import unit_of
-from swarmwire.world.custom.actuators import made_actuator
+from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
-from swarmwire.world.sensors.loading import made_sensor
+from swarmwire.world.sensors.loading import custom_sensor
 
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 
@@ -36,7 +36,7 @@ def _body(body: Body, named: str) -> Entry:
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     sensors = [table for name, of in body.sensors.items() for table in _sensor(name, of)]
-    actuators = [_own(f"actuator: {name}", of.kind, made_actuator(of)) for name, of in body.actuators.items()]
+    actuators = [_own(f"actuator: {name}", of.kind, custom_actuator(of)) for name, of in body.actuators.items()]
     return Entry(
         kind="body",
         name=body.name,
@@ -66,7 +66,7 @@ def _sensor(name: str, sheet: SensorSpec) -> tuple[ParameterTable, ParameterTabl
     title, reading = f"sensor: {name}", f"reading: {name}"
     if not isinstance(sheet, CustomSensorSpec):
         return _sheet(title, type(sheet), asdict(sheet)), reading_table(sheet.reading_fields(), reading)
-    shared, own = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet)), made_sensor(sheet)
+    shared, own = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet)), custom_sensor(sheet)
     return _own(title, sheet.kind, own, shared), reading_table(own.fields, reading)
 
 

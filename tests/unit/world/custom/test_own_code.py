@@ -11,11 +11,11 @@ from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, ActuatorCommands
-from swarmwire.world.custom.actuators import made_actuator
+from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.sensors.loading import made_sensor
+from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded
 
@@ -65,10 +65,10 @@ def test_a_sheets_own_code_is_made_with_its_parameters(tmp_path: Path) -> None:
     body = read_body(tmp_path / "mine.toml", "s.toml", "robots.a.body")
     paint, painter = body.sensors["paint"], body.actuators["painter"]
     assert isinstance(paint, CustomSensorSpec)
-    made: Any = made_sensor(paint)
+    made: Any = custom_sensor(paint)
     assert (type(made).__name__, made.scale) == ("Paint", 2.0)
-    assert type(made_actuator(painter)).__name__ == "Painter"
-    assert made_actuator(painter) is not made_actuator(painter)
+    assert type(custom_actuator(painter)).__name__ == "Painter"
+    assert custom_actuator(painter) is not custom_actuator(painter)
 
 
 def test_an_arena_is_the_same_alone_and_among_others(tmp_path: Path) -> None:

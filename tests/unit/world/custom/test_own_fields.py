@@ -43,6 +43,9 @@ def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
         ({"width": 1.5}, "expected a width from 0 to 10000; got 1.5"),
         ({"span": (1.0, 0.0)}, "expected span as two finite numbers that do not fall; got (1.0, 0.0)"),
         ({"span": (0.0, inf)}, "expected span as two finite numbers that do not fall; got (0.0, inf)"),
+        ({"unit": 1}, "expected unit as a text; got 1"),
+        ({"help": None}, "expected help as a text; got None"),
+        ({"per": 2.0}, "expected per as a text; got 2.0"),
         ({"span": 3}, "expected span as two finite numbers that do not fall; got 3"),
     ],
 )

@@ -16,7 +16,7 @@ from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomActuatorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import ActuatorCommands
 from swarmwire.comms.truth import Group
-from swarmwire.world.sensors.loading import asked, entry_point, made
+from swarmwire.world.sensors.loading import attribute_of, entry_point, instance_of
 from swarmwire.world.sensors.sensor import Scene
 
 ACTUATORS = "swarmwire.actuators"  # group of entry points
@@ -57,25 +57,24 @@ class CustomActuator(ABC):
         return arena, robot
 
 
-def made_actuator(spec: CustomActuatorSpec) -> CustomActuator:
+def custom_actuator(spec: CustomActuatorSpec) -> CustomActuator:
     """A new instance of the class of a spec that is fitted."""
-    return made(CustomActuator, spec.kind, spec.params, "", "")
+    return instance_of(CustomActuator, spec.kind, spec.params, "", "")
 
 
 def fitted_actuator(spec: CustomActuatorSpec, where: str, key: str) -> CustomActuatorSpec:
     """The spec with the width of its class; BadInput names what is wrong."""
     spec = replace(spec, kind=entry_point(spec.kind, ACTUATORS))
-    own = made(CustomActuator, spec.kind, spec.params, where, key)
-    width: Any = asked(own, "width", where, key)
+    actuator = instance_of(CustomActuator, spec.kind, spec.params, where, key)
+    width: Any = attribute_of(actuator, "width", where, key)
     if type(width) is not int or not 1 <= width <= MAX_WIDTH:
-        raise BadInput(
-            where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDTH}; {type(own).__name__} has {width!r}"
-        )
+        got = f"{type(actuator).__name__} has {width!r}"
+        raise BadInput(where, f"{key}.kind", f"expected a width from 1 to {MAX_WIDTH}; {got}")
     return replace(spec, width=width)
 
 
 class CustomActuators:
-    """The actuators of the user's own; `any` tells whether there are some.
+    """The custom actuators of all groups; `any` is whether there are some.
 
     Attributes:
         not_there: (arenas,) numbers set for places that the robots' bodies do not have.
@@ -87,11 +86,11 @@ class CustomActuators:
         self._fitted: list[tuple[str, CustomActuator, slice]] = []
         for group in groups:
             for name, spec in group.body.actuators.items():
-                own = made_actuator(spec)
-                own.scene, own.group = scene, group
+                actuator = custom_actuator(spec)
+                actuator.scene, actuator.group = scene, group
                 what = f"the actuator {name} of {group.name} ({spec.kind})"
-                self._fitted.append((what, own, group.body.actuator_places[name]))
-                _call(what, own.start)
+                self._fitted.append((what, actuator, group.body.actuator_places[name]))
+                _call(what, actuator.start)
         self.any = bool(self._fitted)
         arenas, robots = len(scene.keys), len(scene.radius_m)
         places = [sum(spec.width for spec in group.body.actuators.values()) for group in groups]
@@ -106,13 +105,13 @@ class CustomActuators:
         there = place < self._places[rows]
         np.add.at(self.not_there, rows[~there] // self._robots, 1)
         there &= alive[rows]
-        asked = np.full((len(alive), self._places.max(initial=0)), np.nan)
-        asked[rows[there], place[there]] = actuations.value[there]
-        for what, own, places in self._fitted:
-            here = (self._index >= own.group.start) & (self._index < own.group.stop)
-            values = asked[:, places]
+        commands = np.full((len(alive), self._places.max(initial=0)), np.nan)
+        commands[rows[there], place[there]] = actuations.value[there]
+        for what, actuator, places in self._fitted:
+            here = (self._index >= actuator.group.start) & (self._index < actuator.group.stop)
+            values = commands[:, places]
             set_ = np.flatnonzero(here & ~np.isnan(values).any(axis=1))
-            _call(what, own.act, self._ticks, set_, values[set_])
+            _call(what, actuator.act, self._ticks, set_, values[set_])
             self._check(what)
         self._ticks += 1
 

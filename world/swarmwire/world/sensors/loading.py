@@ -28,7 +28,7 @@ SENSORS = "swarmwire.sensors"  # group of entry points
 def sensor_of(name: str, spec: SensorSpec, scene: Scene, group: Group) -> Sensor:
     """The sensor `name` of a group, started: of the class that its spec names."""
     if isinstance(spec, CustomSensorSpec):
-        sensor: Sensor = CheckedSensor(name, made_sensor(spec), spec)
+        sensor: Sensor = CheckedSensor(name, custom_sensor(spec), spec)
     else:
         sensor = truth_of(type(spec))(spec)
     sensor.scene, sensor.group = scene, group
@@ -44,9 +44,9 @@ def truth_of(spec: type[SensorSpec]) -> type[BuiltInSensor[Any]]:
     return cast("type[BuiltInSensor[Any]]", kind)
 
 
-def made_sensor(spec: CustomSensorSpec) -> CustomSensor:
+def custom_sensor(spec: CustomSensorSpec) -> CustomSensor:
     """A new instance of the class of a spec that is fitted."""
-    return made(CustomSensor, spec.kind, spec.params, "", "")
+    return instance_of(CustomSensor, spec.kind, spec.params, "", "")
 
 
 def fitted_sensor(spec: SensorSpec, where: str, key: str) -> SensorSpec:
@@ -54,11 +54,12 @@ def fitted_sensor(spec: SensorSpec, where: str, key: str) -> SensorSpec:
     if not isinstance(spec, CustomSensorSpec):
         return spec
     spec = replace(spec, kind=entry_point(spec.kind, SENSORS))
-    own = made(CustomSensor, spec.kind, spec.params, where, key)
-    found: Any = asked(own, "fields", where, key)
-    if not isinstance(found, tuple | list) or not found or not all(isinstance(of, Field) for of in cast(Any, found)):
-        raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {type(own).__name__} has {found!r}")
-    fields = cast("tuple[Field, ...]", found)
+    sensor = instance_of(CustomSensor, spec.kind, spec.params, where, key)
+    value: Any = attribute_of(sensor, "fields", where, key)
+    if not isinstance(value, tuple | list) or not value or not all(isinstance(of, Field) for of in cast(Any, value)):
+        got = f"{type(sensor).__name__} has {value!r}"
+        raise BadInput(where, f"{key}.kind", f"expected fields as a tuple of Field; {got}")
+    fields = cast("tuple[Field, ...]", value)
     names: list[Any] = [of.name for of in fields]
     if not all(isinstance(name, str) and name.isidentifier() for name in names) or len(set(names)) < len(names):
         expected = "expected fields with names of their own, of letters, digits and _"
@@ -66,44 +67,44 @@ def fitted_sensor(spec: SensorSpec, where: str, key: str) -> SensorSpec:
     for field in fields:
         fault = field_fault(field)
         if fault:
-            raise BadInput(where, f"{key}.kind", f"the field {field.name} of {type(own).__name__}: {fault}")
+            raise BadInput(where, f"{key}.kind", f"the field {field.name} of {type(sensor).__name__}: {fault}")
     return replace(spec, fields={of.name: of.width for of in fields})
 
 
 def entry_point(kind: str, group: str) -> str:
     """The "package.module:Class" that an entry point of this name stands for; any other text as it is."""
-    found = () if ":" in kind else entry_points_of(group)
-    return next((point.value for point in found if point.name == kind), kind)
+    points = () if ":" in kind else entry_points_of(group)
+    return next((point.value for point in points if point.name == kind), kind)
 
 
-def asked(own: object, name: str, where: str, key: str) -> object:
+def attribute_of(instance: object, name: str, where: str, key: str) -> object:
     """An attribute of an instance of a user's class; BadInput if it raises."""
     try:
-        return getattr(own, name)
+        return getattr(instance, name)
     except Exception as error:
-        expected = f"{type(own).__name__}.{name} fails: {type(error).__name__}: {error}"
+        expected = f"{type(instance).__name__}.{name} fails: {type(error).__name__}: {error}"
         raise BadInput(where, f"{key}.kind", expected) from error
 
 
-def made(base: type[T], kind: str, params: Mapping[str, Any], where: str, key: str) -> T:
+def instance_of(base: type[T], kind: str, params: Mapping[str, Any], where: str, key: str) -> T:
     """An instance of the class `kind` below `base`; BadInput if it is none, or does not take these parameters."""
-    found = custom_class(base, kind, where, f"{key}.kind")
-    if cast("Any", found).__dataclass_params__.frozen:  # it is told its scene and group
-        raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {found.__name__} is")
+    loaded = custom_class(base, kind, where, f"{key}.kind")
+    if cast("Any", loaded).__dataclass_params__.frozen:  # its scene and group are set
+        raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {loaded.__name__} is")
     try:
-        return built(found, params, where, key)
+        return built(loaded, params, where, key)
     except BadInput:
         raise
     except Exception as error:  # of its own __post_init__
-        raise BadInput(where, key, f"{found.__name__} refuses: {type(error).__name__}: {error}") from error
+        raise BadInput(where, key, f"{loaded.__name__} refuses: {type(error).__name__}: {error}") from error
 
 
 class CheckedSensor(Sensor):
     """A `CustomSensor` whose truth is checked and copied; CustomCodeFailed if it raises."""
 
-    def __init__(self, name: str, own: CustomSensor, spec: CustomSensorSpec) -> None:
-        self._name, self._own, self._spec = name, own, spec
-        self._fields = tuple(replace(field, step=field.step or spec.step) for field in own.fields)
+    def __init__(self, name: str, sensor: CustomSensor, spec: CustomSensorSpec) -> None:
+        self._name, self._sensor, self._spec = name, sensor, spec
+        self._fields = tuple(replace(field, step=field.step or spec.step) for field in sensor.fields)
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -112,27 +113,27 @@ class CheckedSensor(Sensor):
 
     def start(self) -> None:
         """As `Sensor.start`."""
-        own, group = self._own, self.group
-        own.scene, own.group = self.scene, group
+        sensor, group = self._sensor, self.group
+        sensor.scene, sensor.group = self.scene, group
         self._what = f"the sense {self._name} of {group.name} ({self._spec.kind})"
         robots = len(self.scene.keys), group.stop - group.start
         self._shapes = [(*robots, field.width) if field.width else robots for field in self._fields]
-        self._call(own.start)
+        self._call(sensor.start)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """The truth about each field."""
-        told: Any = self._call(self._own.truth, tick)
-        if not isinstance(cast("object", told), np.ndarray | tuple | list):
-            raise CustomCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {told!r:.80}")
-        single = isinstance(cast("object", told), np.ndarray)
-        arrays: tuple[Any, ...] = (told,) if single else tuple(told)
+        truth: Any = self._call(self._sensor.truth, tick)
+        if not isinstance(cast("object", truth), np.ndarray | tuple | list):
+            raise CustomCodeFailed(self._what, f"truth: expected an array, or a tuple of arrays, got {truth!r:.80}")
+        single = isinstance(cast("object", truth), np.ndarray)
+        arrays: tuple[Any, ...] = (truth,) if single else tuple(truth)
         if len(arrays) != len(self._shapes):
             raise CustomCodeFailed(self._what, f"truth: expected {len(self._shapes)} arrays, got {len(arrays)}")
         return tuple(self._checked(*each) for each in zip(self._fields, arrays, self._shapes, strict=True))
 
     def follow(self, tick: int) -> None:
         """As `Sensor.follow`."""
-        self._call(self._own.follow, tick)
+        self._call(self._sensor.follow, tick)
 
     def _checked(self, field: Field, array: Any, shape: tuple[int, ...]) -> FloatArray:
         try:
@@ -174,6 +175,9 @@ def field_fault(field: Field) -> str | None:
         return f"expected blank as a number; got {of.blank!r}"
     if of.span is not None and not _is_span(of.span):
         return f"expected span as two finite numbers that do not fall; got {of.span!r}"
+    for name, value in (("unit", of.unit), ("help", of.help), ("per", of.per)):
+        if not isinstance(value, str):
+            return f"expected {name} as a text; got {value!r}"
     return None
 
 
