@@ -133,7 +133,7 @@ class World:
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
         """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
-        self.actuators.failed.fail(failed)
+        self.actuators.fail(failed)
         self._brake()
         shape = self.static.arenas, self.static.robots
         for group in self.static.groups:
