@@ -181,7 +181,7 @@ class World:
         self.states.take(actions.notes, self.alive)
         self.values.take(actions.values, self.alive)
         if self._own.any:
-            self._own.act(actions.own, self.alive)
+            self._own.act(actions.actuators, self.alive)
             self.actuators.leds.tell()
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)

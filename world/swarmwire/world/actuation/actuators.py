@@ -18,7 +18,7 @@ from swarmwire.comms.bodies.body import MOTORS, WHEELS
 from swarmwire.comms.bodies.drives import DRIVES, NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.tick_io import Actions, LedChanges
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.truth import Group
 
 DIFFERENTIAL, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))
@@ -198,6 +198,17 @@ def _factor(key, i, tick, wheel, noise):
     return noise.factor[i] + noise.factor_std[i] * normal(key, i, tick, wheel, FACTOR)
 
 
+def fitting(table: SparseTable, places: IntArray, alive: BoolArray, not_there: IntArray) -> SparseTable:
+    """The rows of robots that are `alive` (rows,) and have such a place: as many as `places` (robots,) says.
+
+    Adds the number of rows without one to `not_there` (arenas,).
+    """
+    robots = len(places)
+    there = table.place < places[table.rows % robots]
+    np.add.at(not_there, table.rows[~there] // robots, 1)
+    return table.select(np.flatnonzero(there & alive[table.rows]))
+
+
 class ShownLeds:
     """The LEDs of all robots: dark at the start, then as their agents switch them.
 
@@ -214,14 +225,12 @@ class ShownLeds:
         self.told = self._row.copy()
         self.not_there: IntArray = np.zeros(arenas, np.int64)
 
-    def take(self, changes: LedChanges, alive: BoolArray) -> None:
+    def take(self, changes: SparseTable, alive: BoolArray) -> None:
         """Apply the changes of a tick to the LEDs of robots that are `alive` (rows,)."""
         if not len(changes):
             return
-        there = changes.which < self._count[changes.rows % len(self._count)]
-        np.add.at(self.not_there, changes.rows[~there] // len(self._count), 1)
-        there &= alive[changes.rows]
-        self._row[changes.rows[there], changes.which[there]] = changes.rgb[there]
+        changes = fitting(changes, self._count, alive, self.not_there)
+        self._row[changes.rows, changes.place] = changes.value
         self.told = self._row.copy()
 
     def tell(self) -> None:

@@ -17,8 +17,9 @@ from swarmwire.comms.bodies.spec import SensorSpec
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.plugins import custom_class, entry_points_of
-from swarmwire.comms.tick_io import ActuatorCommands
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.truth import Group
+from swarmwire.world.actuation.actuators import fitting
 from swarmwire.world.custom.actuators import CustomActuator
 from swarmwire.world.custom.sensors import CustomSensor, field_fault
 from swarmwire.world.sensors.sensor import Field, Scene
@@ -123,22 +124,19 @@ class CustomActuators:
         self.any = bool(self._fitted)
         arenas, robots = len(scene.keys), len(scene.radius_m)
         places = [sum(spec.width for spec in group.body.actuators.values()) for group in groups]
-        self._places = np.tile(np.repeat(places, [group.stop - group.start for group in groups]), arenas)
+        self._places = np.repeat(places, [group.stop - group.start for group in groups])
         self._index: IntArray = np.tile(np.arange(robots, dtype=np.int64), arenas)
         self.not_there: IntArray = np.zeros(arenas, np.int64)
-        self._robots, self._ticks = robots, 0
+        self._ticks = 0
 
-    def act(self, actuations: ActuatorCommands, alive: BoolArray) -> None:
+    def act(self, commands: SparseTable, alive: BoolArray) -> None:
         """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
-        rows, place = actuations.rows, actuations.place
-        there = place < self._places[rows]
-        np.add.at(self.not_there, rows[~there] // self._robots, 1)
-        there &= alive[rows]
-        asked = np.full((len(alive), self._places.max(initial=0)), np.nan)
-        asked[rows[there], place[there]] = actuations.value[there]
+        commands = fitting(commands, self._places, alive, self.not_there)
+        numbers = np.full((len(alive), self._places.max(initial=0)), np.nan)
+        numbers[commands.rows, commands.place] = commands.value
         for what, own, places in self._fitted:
             here = (self._index >= own.group.start) & (self._index < own.group.stop)
-            values = asked[:, places]
+            values = numbers[:, places]
             set_ = np.flatnonzero(here & ~np.isnan(values).any(axis=1))
             _call(what, own.act, self._ticks, set_, values[set_])
             self._check(what)
