@@ -45,7 +45,7 @@ class Mailbox:
         """
         if self._always:
             return received
-        pending = received.merged(self._waiting) if len(self._waiting) else received
+        pending = ReceivedPackets.joined([received, self._waiting])
         acts = (tick % self._act_every == 0)[pending.receiver]
         self._waiting = pending.select(np.flatnonzero(~acts & alive[pending.receiver])).compacted()
         return pending.select(np.flatnonzero(acts))
