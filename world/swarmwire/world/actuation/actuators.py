@@ -184,7 +184,7 @@ def drive_target(
             if failed.motors[arena, i]:
                 forward = turn = lateral = 0.0
             elif failed.left[arena, i] or failed.right[arena, i]:
-                left, right = wheels_of_twist(forward, turn, base_m)
+                left, right = wheels_of_twist(forward, turn, base_m)  # also if noisy: rounding is that of any command
                 left, right = 0.0 if failed.left[arena, i] else left, 0.0 if failed.right[arena, i] else right
                 forward, turn = twist_of_wheels(left, right, base_m)
             target[arena, i, 0], target[arena, i, 1], target[arena, i, 2] = forward, turn, lateral
