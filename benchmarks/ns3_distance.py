@@ -66,11 +66,10 @@ def delivered(distance_m: float, payload_bytes: int, seeds: Sequence[int], packe
     pose = np.tile([[-0.5 * distance_m, 0.0, 0.0], [0.5 * distance_m, 0.0, 0.0]], (arenas, 1))
     sender = 2 * np.arange(arenas)
     sent = SentPackets(sender, np.full(arenas, BROADCAST), Payloads.of([bytes(payload_bytes)] * arenas))
-    air.hold(pose, np.ones(2 * arenas, np.bool_))
     received = 0
     for tick in range(packets + QUIET_TICKS):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        received += int(air.advance(at_ns).tally.fates[:, Fate.RECEIVED].sum())
+        received += int(air.step(at_ns, pose).tally.fates[:, Fate.RECEIVED].sum())
         if tick < packets:
             air.send(at_ns, tick, sent)
     return received / (arenas * packets)

@@ -60,12 +60,12 @@ def delivered(case: Case, seeds: Sequence[int], packets: int) -> tuple[float, fl
     rate_hz = round(STEPS / case.interval_s)
     keys = np.array([derive_key("hidden node", seed) for seed in seeds], np.uint64)
     air = RadioMedium(radio, keys, ROBOTS, SIZE_M, obstacle_arrays(((pillar,),) * arenas), rate_hz)
-    air.hold(np.tile(pose, (arenas, 1)), np.ones(ROBOTS * arenas, np.bool_))
+    poses = np.tile(pose, (arenas, 1))
     last = WARM_UP + packets
     received = np.zeros(2, np.int64)
 
     def listen(until_ns: int) -> None:
-        done = air.advance(until_ns).finished
+        done = air.step(until_ns, poses).finished
         counts = (done.fate == Fate.RECEIVED) & (done.receiver == ROBOTS - 1)
         counts &= (done.sequence >= WARM_UP) & (done.sequence < last)
         received[:] += np.bincount(done.sender[counts], minlength=2)

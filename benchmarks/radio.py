@@ -77,16 +77,13 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
-    alive = np.ones(robots, np.bool_)
     sent = SentPackets(np.arange(robots), np.full(robots, BROADCAST), Payloads.of([bytes(case.payload_bytes)] * robots))
     spent_ns, in_range, fates = 0, 0, np.zeros(len(Fate), np.int64)
     for tick in range(WARM_UP + ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)
         start_ns = clock.now_ns()
-        news = air.advance(at_ns)
-        air.hold(pose, alive)
+        news = air.step(at_ns, pose)
         air.send(at_ns, tick, sent)
-        air.edges(pose, alive)
         if tick >= WARM_UP:
             spent_ns += clock.now_ns() - start_ns
             in_range += int(news.tally.in_range.sum())

@@ -15,7 +15,7 @@ from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
-from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Values
+from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import LIMITS, GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
@@ -83,10 +83,8 @@ def _frames(page: _Page) -> Iterator[Comparison]:
     sensors = {"GROUP": GroupReadings(ROWS, {"SENSE.FIELD": np.zeros(2)})}
     sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
-        Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, Notes(ROWS, np.array([0, 0]), ("x",))),
-        leds=LedChanges(ROWS, ROWS, ROWS),
-        own=ActuatorCommands(ROWS, ROWS, zeros),
-        values=Values(ROWS, zeros),
+        Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, SparseTable(ROWS, ROWS, zeros, ("x",))),
+        **dict.fromkeys(("leds", "actuators", "values"), SparseTable(ROWS, ROWS, zeros)),
     )
     tick = encode_tick(0, sensors, received, TxStatuses(one, one, one))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):

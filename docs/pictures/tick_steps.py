@@ -70,8 +70,10 @@ def _calls(value: ast.expr) -> Iterator[ast.Call]:
 
 def _step(call: ast.Call, givers: dict[str, str]) -> Step:
     lane = _lane(call.func)
-    names = [node.id for given in call.args for node in ast.walk(given) if isinstance(node, ast.Name)]
-    takes = {name: givers[name] for name in names if givers.get(name, lane) not in {"", lane}}
+    nodes = [node for given in call.args for node in ast.walk(given)]
+    names = [(node.id, givers.get(node.id, lane)) for node in nodes if isinstance(node, ast.Name)]
+    names += [(node.attr, _lane(node)) for node in nodes if isinstance(node, ast.Attribute)]  # such as `world.pose`
+    takes = {name: giver for name, giver in names if giver not in {"", lane}}
     return Step(lane, ast.unparse(call.func).rpartition(".")[2], tuple(takes.items()))
 
 

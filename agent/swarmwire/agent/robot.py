@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packet, TxStatus
-from swarmwire.agent.robots import Draw, RobotHandle, forward_and_turn
+from swarmwire.agent.robots import Draw, RobotHandle
 from swarmwire.agent.step_context import StepContext
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.bodies.drives import rgb_of
+from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
 from swarmwire.comms.packets import TxResult
 from swarmwire.comms.sensors.sensor import CustomReading, SensorProperty
@@ -56,7 +56,7 @@ class Robot(RobotHandle[float]):
 
     def wheels(self, left_mps: float, right_mps: float) -> None:
         """Command the speeds of two wheels; they hold until the next command. IncompatibleBody if the body has none."""
-        self.drive(*forward_and_turn(left_mps, right_mps, self.body.wheels.wheel_base_m))
+        self.drive(*twist_of_wheels(left_mps, right_mps, self.body.wheels.wheel_base_m))
 
     def led(self, red: float, green: float, blue: float, which: int | None = None) -> None:
         """Set the colour of all LEDs, or of LED `which` of the body's spec, each share 0 to 1; all 0: dark.

@@ -14,7 +14,7 @@ from swarmwire.agent.step_context import StepContext
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import rgb_of
+from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.packets import TxStatuses
@@ -128,7 +128,7 @@ class Robots(RobotHandle[FloatArray]):
     def wheels(self, left_mps: ArrayLike, right_mps: ArrayLike, rows: BoolArray | None = None) -> None:
         """Command the speeds of two wheels, (n,) or one number; IncompatibleBody if the bodies have none."""
         left, right = np.asarray(left_mps, np.float64), np.asarray(right_mps, np.float64)
-        self.drive(*forward_and_turn(left, right, self.body.wheels.wheel_base_m), rows=rows)
+        self.drive(*twist_of_wheels(left, right, self.body.wheels.wheel_base_m), rows=rows)
 
     def led(
         self,
@@ -213,8 +213,3 @@ def _masked(rows: BoolArray, value: Any) -> Any:
     if np.shape(value) != (len(rows),):
         raise ValueError(f"expected one number or an array ({len(rows)},), also with rows=, got {np.shape(value)}")
     return np.asarray(value)[rows]
-
-
-def forward_and_turn(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
-    """Forward speed and turn rate (positive to the left) of a body with these wheel speeds."""
-    return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m

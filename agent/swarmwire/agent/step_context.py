@@ -16,22 +16,10 @@ from swarmwire.comms.bodies.body import IncompatibleBody
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.sensors.sensor import SensorProperty
-from swarmwire.comms.tick_io import (
-    NO_ACTUATOR_COMMANDS,
-    NO_LED_CHANGES,
-    NO_VALUES,
-    Actions,
-    ActuatorCommands,
-    GroupReadings,
-    LedChanges,
-    Notes,
-    Values,
-    checked_state,
-)
+from swarmwire.comms.tick_io import TABLES, Actions, GroupReadings, SparseTable, checked_state
 
 M = TypeVar("M", bound=Message)
 TX_STATUS = "radio.tx_status"  # the need for tx statuses of addressed packets
-NOT_SWITCHED = -1
 
 
 class StepContext:
@@ -64,11 +52,8 @@ class StepContext:
         self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
         self._sent_before = sent_before  # (n,) packets that each robot has sent so far; updated here
         self._outbox: list[SentPackets] = []
-        self._states: dict[str, int] = {}  # noted in this tick -> code
-        self._state: IntArray | None = None  # (n,) codes; -1: none noted
-        self._value: FloatArray | None = None  # (n,) numbers noted in this tick; NaN: none
-        self._leds: IntArray | None = None  # (n, leds) colours; NOT_SWITCHED: unchanged in this tick
-        self._actuators: FloatArray | None = None  # (n, numbers of all custom actuators); NaN: not set in this tick
+        self._states: dict[str, int] = {}  # noted in this tick -> index
+        self._tables: dict[str, FloatArray] = {}  # by name in TABLES: (n, places); NaN: not set in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
         self._lists: ReceivedLists | None = None
 
@@ -106,7 +91,7 @@ class StepContext:
     def received_lists(self) -> ReceivedLists:
         """All packets that these robots received, for agents of one robot each."""
         if self._lists is None:
-            self._lists = ReceivedLists(self.received, self.needs)
+            self._lists = ReceivedLists(self.n, self.received, self.needs)
         return self._lists
 
     def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:
@@ -165,13 +150,10 @@ class StepContext:
             raise ValueError("note(…): expected a state, a value, or both")
         numbers = None if value is None else self._numbers(rows, value)
         if state is not None:
-            if self._state is None:
-                self._state = np.full(self.n, -1)
-            self._state[rows] = self._states.setdefault(checked_state(state), len(self._states))
+            index = self._states.setdefault(checked_state(state), len(self._states))
+            self._table("notes", 1)[rows, 0] = index
         if numbers is not None:
-            if self._value is None:
-                self._value = np.full(self.n, np.nan)
-            self._value[rows] = numbers
+            self._table("values", 1)[rows, 0] = numbers
 
     def _numbers(self, rows: BoolArray | slice, value: ArrayLike) -> FloatArray:
         """The numbers of these rows; ValueError for a wrong shape, or if one is not finite."""
@@ -183,16 +165,15 @@ class StepContext:
             raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
         return numbers
 
-    def leds(self, which: int | None) -> IntArray:
+    def leds(self, which: int | None) -> FloatArray:
         """New colours of one LED of each body, or of all, (n, leds), to write into; IncompatibleBody without LEDs."""
         body = self.group.body
         if not body.led_count:
             raise IncompatibleBody(f"the body {body.name} has no LEDs")
         if which is not None and not 0 <= which < body.led_count:
             raise ValueError(f"led(which=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {which}")
-        if self._leds is None:
-            self._leds = np.full((self.n, body.led_count), NOT_SWITCHED)
-        return self._leds if which is None else self._leds[:, which : which + 1]
+        leds = self._table("leds", body.led_count)
+        return leds if which is None else leds[:, which : which + 1]
 
     def actuate(self, name: str, values: ArrayLike, rows: slice, mask: BoolArray | None = None) -> None:
         """Set a custom actuator of some robots to numbers (rows, width), or a shape that broadcasts to it.
@@ -205,9 +186,8 @@ class StepContext:
             has = ", ".join(body.actuators) or "none"
             raise IncompatibleBody(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
         numbers, width = np.asarray(values, np.float64), body.actuators[name].width
-        if self._actuators is None:
-            self._actuators = np.full((self.n, sum(spec.width for spec in body.actuators.values())), np.nan)
-        columns = self._actuators[rows, body.actuator_places[name]]
+        table = self._table("actuators", sum(spec.width for spec in body.actuators.values()))
+        columns = table[rows, body.actuator_places[name]]
         if numbers.ndim == 1 and width == 1:
             numbers = numbers[:, None]  # (n,) is one number for each robot
         fits = numbers.ndim < 2 or (numbers.ndim == 2 and len(numbers) == len(columns))
@@ -233,41 +213,26 @@ class StepContext:
     def end_receive(self) -> SentPackets:
         """The packets that the robots sent in `on_receive`; RuntimeError if they acted in another way."""
         actions = self.end()
-        others = actions.notes, actions.leds, actions.own, actions.values
-        if actions.drive.any() or any(map(len, others)):
+        if actions.drive.any() or any(len(getattr(actions, name)) for name in TABLES):
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return actions.sent
 
     def _actions(self) -> Actions:
         sent = SentPackets.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
-        return Actions(
-            self.readings.rows,
-            self.drive,
-            *command,
-            sent,
-            Notes.none() if self._state is None else self._notes(self._state),
-            NO_LED_CHANGES if self._leds is None else self._led_changes(self._leds),
-            NO_ACTUATOR_COMMANDS if self._actuators is None else self._actuations(self._actuators),
-            NO_VALUES if self._value is None else self._values(self._value),
-        )
+        names = {"notes": tuple(self._states)}
+        tables = {
+            name: SparseTable.of(self.readings.rows, values, names.get(name, ()))
+            for name, values in self._tables.items()
+        }
+        return Actions(self.readings.rows, self.drive, *command, sent, **tables)
+
+    def _table(self, name: str, places: int) -> FloatArray:
+        """The numbers that were set in this tick, to write into."""
+        if name not in self._tables:
+            self._tables[name] = np.full((self.n, places), np.nan)
+        return self._tables[name]
 
     def _require(self, need: str) -> None:
         if need not in self.needs:
             raise NotDeclared(f"reads {need!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
-
-    def _led_changes(self, leds: IntArray) -> LedChanges:
-        place, which = np.nonzero(leds != NOT_SWITCHED)
-        return LedChanges(self.readings.rows[place], which, leds[place, which])
-
-    def _actuations(self, numbers: FloatArray) -> ActuatorCommands:
-        at, place = np.nonzero(~np.isnan(numbers))
-        return ActuatorCommands(self.readings.rows[at], place, numbers[at, place])
-
-    def _notes(self, state: IntArray) -> Notes:
-        noted = np.flatnonzero(state >= 0)
-        return Notes(self.readings.rows[noted], state[noted], tuple(self._states))
-
-    def _values(self, value: FloatArray) -> Values:
-        noted = np.flatnonzero(~np.isnan(value))
-        return Values(self.readings.rows[noted], value[noted])

@@ -48,19 +48,18 @@ def _driven(actions: Actions) -> Iterator[Action]:
 
 def _shown(actions: Actions) -> Iterator[Action]:
     notes, leds = actions.notes, actions.leds
-    codes: list[int] = notes.code.tolist()
-    for robot, code in zip(notes.rows.tolist(), codes, strict=True):
-        yield robot, "note", repr(notes.names[code])
+    for robot, index in zip(notes.rows.tolist(), notes.value.tolist(), strict=True):
+        yield robot, "note", repr(notes.names[int(index)])
     for robot, value in zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True):
         yield robot, "note: value", repr(value)
-    for robot, which, rgb in zip(leds.rows.tolist(), leds.which.tolist(), leds.rgb.tolist(), strict=True):
+    for robot, which, rgb in zip(leds.rows.tolist(), leds.place.tolist(), leds.integers.tolist(), strict=True):
         yield robot, f"led {which}", f"0x{rgb:06x}"
 
 
 def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
     places = [f"{name}[{at}]" for name, spec in body.actuators.items() for at in range(spec.width)]
-    rows, place, value = actions.own.rows.tolist(), actions.own.place.tolist(), actions.own.value.tolist()
-    for robot, at, number in zip(rows, place, value, strict=True):
+    table = actions.actuators
+    for robot, at, number in zip(table.rows.tolist(), table.place.tolist(), table.value.tolist(), strict=True):
         yield robot, f"actuate: {places[at]}", repr(number)
 
 

@@ -200,10 +200,6 @@ class ReceivedPackets:
             self.payloads,
         )
 
-    def merged(self, other: "ReceivedPackets") -> "ReceivedPackets":
-        """The packets of both, in the order of the class; `other` has the same columns in `given`."""
-        return ReceivedPackets.joined([self, other])
-
     @classmethod
     def joined(cls, parts: "list[ReceivedPackets]") -> "ReceivedPackets":
         """The packets of all parts, one or more with the same columns in `given`, in the order of the class."""

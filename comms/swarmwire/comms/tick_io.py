@@ -2,10 +2,10 @@
 
 `Readings` are what the robots' sensors read. `Actions` are the robots' drive commands, packets, notes, LED colours,
 actuator commands and noted values. Notes and values are for observers: they change nothing in the run. Each of the
-last four is a sparse table: a row for each robot that set something, none for the others.
+last four is a `SparseTable`: rows for the robots that set something, none for the others.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,34 +17,52 @@ MAX_STATES = 256  # different states in a run, and in one tick of a runner
 
 
 @dataclass(frozen=True, slots=True)
-class Notes:
-    """The states that robots named in one tick, such as `note(state="search")`: a row per robot."""
+class SparseTable:
+    """Numbers that robots set in one tick, a row each; the last row of a robot and place counts.
 
-    rows: IntArray  # (k,) robot row: arena x robots + index, each once
-    code: IntArray  # (k,) index in `names`
-    names: tuple[str, ...] = ()
+    Colours and names are numbers, too: 0xRRGGBB, and indices in `names`.
+    """
+
+    rows: IntArray  # (k,) robot row: arena x robots + index
+    place: IntArray  # (k,) which of the robot's LEDs or other numbers; 0 where a robot has one
+    value: FloatArray  # (k,) finite
+    names: tuple[str, ...] = ()  # if `value` is an index
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    @classmethod
-    def none(cls) -> "Notes":
-        """No notes."""
-        return _NO_NOTES
+    @property
+    def integers(self) -> IntArray:
+        """The values of a table of integers, (k,)."""
+        return self.value.astype(np.int64)
+
+    def select(self, index: IntArray) -> "SparseTable":
+        """The rows of `index` (k,), in its order."""
+        return replace(self, rows=self.rows[index], place=self.place[index], value=self.value[index])
 
     @classmethod
-    def joined(cls, parts: "list[Notes]") -> "Notes":
-        """The notes of all parts."""
+    def of(cls, rows: IntArray, values: FloatArray, names: tuple[str, ...] = ()) -> "SparseTable":
+        """The numbers of robots `rows` (n,) that are set in `values` (n, places); NaN: not set."""
+        at, place = np.nonzero(~np.isnan(values))
+        return cls(rows[at], place, values[at, place], names)
+
+    @classmethod
+    def joined(cls, parts: "list[SparseTable]") -> "SparseTable":
+        """The rows of all parts, in order."""
         parts = [part for part in parts if len(part)]
         if len(parts) < 2:
-            return parts[0] if parts else cls.none()
+            return parts[0] if parts else NOTHING_SET
         names = tuple(dict.fromkeys(name for part in parts for name in part.names))
-        code_of = {name: code for code, name in enumerate(names)}
-        codes = [np.array([code_of[name] for name in part.names])[part.code] for part in parts]
-        return cls(np.concatenate([part.rows for part in parts]), np.concatenate(codes), names)
+        if names:
+            index_of = {name: float(index) for index, name in enumerate(names)}
+            values = [np.array([index_of[name] for name in part.names])[part.integers] for part in parts]
+        else:
+            values = [part.value for part in parts]
+        rows, place = ([getattr(part, column) for part in parts] for column in ("rows", "place"))
+        return cls(np.concatenate(rows), np.concatenate(place), np.concatenate(values), names)
 
 
-_NO_NOTES = Notes(np.empty(0, np.int64), np.empty(0, np.int64))
+NOTHING_SET = SparseTable(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
 
 
 def checked_state(state: object) -> str:
@@ -52,79 +70,6 @@ def checked_state(state: object) -> str:
     if not isinstance(state, str) or not 0 < len(state) <= MAX_STATE:
         raise ValueError(f"note(state=…): expected a text of 1 to {MAX_STATE} characters, got {state!r}")
     return state
-
-
-@dataclass(frozen=True, slots=True)
-class LedChanges:
-    """LED colours set in one tick, a row each; the last row of an LED counts, and other LEDs keep their colours."""
-
-    rows: IntArray  # (k,) robot row: arena x robots + index
-    which: IntArray  # (k,) index of the LED in the body's spec
-    rgb: IntArray  # (k,) 0xRRGGBB; 0: dark
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @classmethod
-    def joined(cls, parts: "list[LedChanges]") -> "LedChanges":
-        """The changes of all parts, in order."""
-        parts = [part for part in parts if len(part)]
-        if len(parts) < 2:
-            return parts[0] if parts else NO_LED_CHANGES
-        names = ("rows", "which", "rgb")
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-NO_LED_CHANGES = LedChanges(*np.empty((3, 0), np.int64))
-
-
-@dataclass(frozen=True, slots=True)
-class ActuatorCommands:
-    """Numbers set on custom actuators in one tick, a row each; the last row of a number counts."""
-
-    rows: IntArray  # (k,) robot row: arena x robots + index
-    place: IntArray  # (k,) index among the numbers of all actuators of the body, in the order of its spec
-    value: FloatArray  # (k,)
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @classmethod
-    def joined(cls, parts: "list[ActuatorCommands]") -> "ActuatorCommands":
-        """The commands of all parts, in order."""
-        parts = [part for part in parts if len(part)]
-        if len(parts) < 2:
-            return parts[0] if parts else NO_ACTUATOR_COMMANDS
-        return cls(
-            np.concatenate([part.rows for part in parts]),
-            np.concatenate([part.place for part in parts]),
-            np.concatenate([part.value for part in parts]),
-        )
-
-
-NO_ACTUATOR_COMMANDS = ActuatorCommands(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-
-
-@dataclass(frozen=True, slots=True)
-class Values:
-    """The numbers that robots noted in one tick, such as `note(value=1.25)`; the last row of a robot counts."""
-
-    rows: IntArray  # (k,) robot row: arena x robots + index
-    value: FloatArray  # (k,) finite
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @classmethod
-    def joined(cls, parts: "list[Values]") -> "Values":
-        """The values of all parts, in order."""
-        parts = [part for part in parts if len(part)]
-        if len(parts) < 2:
-            return parts[0] if parts else NO_VALUES
-        return cls(np.concatenate([part.rows for part in parts]), np.concatenate([part.value for part in parts]))
-
-
-NO_VALUES = Values(np.empty(0, np.int64), np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +93,10 @@ class Actions:
     angular_radps: FloatArray  # (n,) commanded turn rate, positive to the left
     lateral_mps: FloatArray  # (n,) commanded speed to the left; 0 except for holonomic bodies
     sent: SentPackets = field(default_factory=SentPackets.none)
-    notes: Notes = field(default_factory=Notes.none)
-    leds: LedChanges = NO_LED_CHANGES
-    own: ActuatorCommands = NO_ACTUATOR_COMMANDS  # of custom actuators
-    values: Values = NO_VALUES
+    notes: SparseTable = NOTHING_SET  # states that agents named, such as `note(state="search")`; each robot once
+    leds: SparseTable = NOTHING_SET  # place: the LED in the body's spec; other LEDs keep their colours
+    actuators: SparseTable = NOTHING_SET  # place: among the numbers of all custom actuators of the body
+    values: SparseTable = NOTHING_SET  # numbers that agents noted, such as `note(value=1.25)`
 
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
@@ -169,8 +114,13 @@ class Actions:
             np.concatenate([part.angular_radps for part in parts]),
             np.concatenate([part.lateral_mps for part in parts]),
             SentPackets.joined([part.sent for part in parts]),
-            Notes.joined([part.notes for part in parts]),
-            LedChanges.joined([part.leds for part in parts]),
-            ActuatorCommands.joined([part.own for part in parts]),
-            Values.joined([part.values for part in parts]),
+            **joined_tables(parts),
         )
+
+
+TABLES = ("notes", "leds", "actuators", "values")  # the sparse tables of `Actions`
+
+
+def joined_tables(parts: list[Actions]) -> dict[str, SparseTable]:
+    """The sparse tables of all parts, joined, by name."""
+    return {name: SparseTable.joined([getattr(part, name) for part in parts]) for name in TABLES}

@@ -89,11 +89,11 @@ def throughput(load: float) -> float:
     medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
     rows = np.arange(SENDERS)
     sent = SentPackets(rows, np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
-    medium.hold(np.zeros((SENDERS + 1, 3)), np.ones(SENDERS + 1, np.bool_))
+    pose = np.zeros((SENDERS + 1, 3))
     received = 0
     for tick in range(TICKS + 2):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        received += int(medium.advance(at_ns).tally.fates[0, Fate.RECEIVED])
+        received += int(medium.step(at_ns, pose).tally.fates[0, Fate.RECEIVED])
         if tick < TICKS:
             medium.send(at_ns, tick, sent)
     return load * received / (SENDERS * TICKS)

@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.ns3_reference import PRESETS, radio_far_apart
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
+from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
@@ -49,16 +50,15 @@ def share_received(radio: Radio, sir_db: float, place: int) -> float:
     wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
     keys = np.array([derive_key("figure of capture", arena) for arena in range(ARENAS)], np.uint64)
     medium = RadioMedium(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
-    pose = np.array([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]])
-    medium.hold(np.tile(pose, (ARENAS, 1)), np.ones(3 * ARENAS, np.bool_))
+    pose = np.tile([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]], (ARENAS, 1))
     received = 0
     for frame in range(FRAMES):
         for sender, at_ns in order(place, frame * PAIR_NS):
-            received += told(medium, at_ns)
+            received += told(medium, at_ns, pose)
             rows = 3 * np.arange(ARENAS) + sender
             payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * ARENAS)
             medium.send(at_ns, frame, SentPackets(rows, np.full(ARENAS, 2), payloads))
-    received += told(medium, FRAMES * PAIR_NS)
+    received += told(medium, FRAMES * PAIR_NS, pose)
     return received / (ARENAS * FRAMES)
 
 
@@ -67,7 +67,7 @@ def order(place: int, at_ns: int) -> list[tuple[int, int]]:
     return sorted([(0, at_ns + LATER_NS * (place > 0)), (1, at_ns + LATER_NS * (place < 0))], key=lambda one: one[1])
 
 
-def told(medium: RadioMedium, until_ns: int) -> int:
+def told(medium: RadioMedium, until_ns: int, pose: FloatArray) -> int:
     """How many frames of robot 0 were received."""
-    done = medium.advance(until_ns).finished
+    done = medium.step(until_ns, pose).finished
     return int(np.count_nonzero((done.sender == 0) & (done.fate == Fate.RECEIVED)))

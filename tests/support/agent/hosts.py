@@ -70,7 +70,7 @@ def plain(actions: Actions) -> list[Any]:
     columns = (actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
     sent = by_sender(actions.sent)
     payloads = [sent.payloads.row(i) for i in range(len(sent))]
-    switched = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
+    switched = np.array((actions.leds.rows, actions.leds.place, actions.leds.value))
     leds = sorted(switched.T.tolist())
     return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads, leds]
 

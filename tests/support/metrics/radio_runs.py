@@ -36,10 +36,8 @@ def ticks(radio: Radio, of: Static, seed: int, count: int = 12) -> Iterator[Trut
         at_ns = tick_start_ns(tick, of.rate_hz)
         alive = np.ones(rows, np.bool_)
         alive[0] = not count // 3 <= tick < 2 * count // 3
-        medium.disrupt(replace(states, alive=alive))
-        news = medium.advance(at_ns)
         pose = pose + rng.normal(0.0, 0.2, pose.shape)
-        medium.hold(pose, alive)
+        news = medium.step(at_ns, pose, replace(states, alive=alive))
         sent = random_traffic(rng, of.arenas, of.robots)
         living = np.flatnonzero(alive[sent.sender])
         sent = replace(sent, sender=sent.sender[living], to=sent.to[living], payloads=sent.payloads.rows(living))

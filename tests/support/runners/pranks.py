@@ -108,18 +108,22 @@ def stolen(turn: Turn) -> bytes:
 
 def told(turn: Turn, value: float) -> bytes:
     """The answer with a number of its first robot for whoever looks on."""
-    arrays = {"values": packed("<i8", [1], rows_of(turn)[:1]), "values/value": packed("<f8", [1], [value])}
-    return frame("actions", turn.tick, turn.arrays | arrays, {})
+    return frame("actions", turn.tick, turn.arrays | _table("values", turn, 0, value), {})
 
 
 def noted(turn: Turn, states: list[Any]) -> bytes:
     """The answer with a state of its first robot."""
-    return turn.other(values={"states": states}, notes=packed("<i8", [2, 1], [rows_of(turn)[0], 0]))
+    return frame("actions", turn.tick, turn.arrays | _table("notes", turn, 0, 0.0), {"states": states})
 
 
 def lit(turn: Turn, which: int, rgb: int) -> bytes:
     """The answer with a light of its first robot."""
-    return turn.other(leds=packed("<i8", [3, 1], [rows_of(turn)[0], which, rgb]))
+    return frame("actions", turn.tick, turn.arrays | _table("leds", turn, which, float(rgb)), {})
+
+
+def _table(name: str, turn: Turn, place: int, value: float) -> dict[str, Any]:
+    """A number of the first robot as the arrays of a sparse table."""
+    return {name: packed("<i8", [2, 1], [rows_of(turn)[0], place]), f"{name}/value": packed("<f8", [1], [value])}
 
 
 BESIDE = (

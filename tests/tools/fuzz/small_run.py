@@ -11,7 +11,7 @@ from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, ActuatorCommands, Notes, Readings, Values
+from swarmwire.comms.tick_io import Actions, Readings, SparseTable
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
@@ -140,9 +140,9 @@ def joined(roster: Any, *, ready: bool = True) -> Any:
 def with_all(actions: Actions) -> Actions:
     """The actions with a note, a custom actuator and a custom value."""
     one = actions.rows[:1]
-    note = Notes(one, np.zeros(1, np.int64), ("searching",))
-    own = ActuatorCommands(one, np.zeros(1, np.int64), np.array([0.5]))
-    return replace(actions, notes=note, own=own, values=Values(one, np.array([1.5])))
+    place = np.zeros(1, np.int64)
+    note, number, value = (SparseTable(one, place, np.array([set_])) for set_ in (0.0, 0.5, 1.5))
+    return replace(actions, notes=replace(note, names=("searching",)), actuators=number, values=value)
 
 
 def readings_of(parts: Sequence[Assignment], runner: str) -> set[str]:

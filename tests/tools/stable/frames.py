@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Values
+from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.truth import EventRecord, PacketCounts, ReceptionRecords, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
@@ -122,10 +122,8 @@ def _actions() -> Actions:
         np.ones(TOLD_OF, np.bool_),
         *_floats(3, TOLD_OF),
         SentPackets(*_ints(2, SENT), payloads, _ints(SENT)),
-        Notes(*_ints(2, NOTED), ("",)),
-        LedChanges(*_ints(3, SWITCHED)),
-        ActuatorCommands(*_ints(2, ACTUATED), _floats(ACTUATED)),
-        Values(_ints(TOLD), _floats(TOLD)),
+        SparseTable(*_ints(2, NOTED), _floats(NOTED), ("",)),
+        *(SparseTable(*_ints(2, k), _floats(k)) for k in (SWITCHED, ACTUATED, TOLD)),
     )
 
 

@@ -42,7 +42,7 @@ def vector(does: Callable[[Robots], None]) -> type[Any]:
 
 def colours(actions: Actions) -> dict[tuple[int, int], str]:
     table = actions.leds
-    named = zip(table.rows.tolist(), table.which.tolist(), table.rgb.tolist(), strict=True)
+    named = zip(table.rows.tolist(), table.place.tolist(), table.integers.tolist(), strict=True)
     return {(row, which): f"{rgb:06x}" for row, which, rgb in named}
 
 

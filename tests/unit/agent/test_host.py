@@ -363,7 +363,7 @@ def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
                 robot.note(state="search")
 
     notes = once(Rows, [1, 4, 6]).notes
-    assert [notes.names[code] for code in notes.code] == ["search", "wait", "search"]
+    assert [notes.names[index] for index in notes.integers] == ["search", "wait", "search"]
     host = host_of(One, [2, 5])
     assert [len(step(host, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
 

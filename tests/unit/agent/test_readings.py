@@ -257,7 +257,7 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
 
         rows = [2, 3, 5]
         host = agent_group(replace(group("", rows), body=BODY), Some)
-        own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).own
+        own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).actuators
         return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
 
     arm = [1.0, 2.0, 3.0]

@@ -13,6 +13,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.world.backends import allocation as assignments
+from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed
@@ -171,11 +172,24 @@ def test_a_ramp_changes_the_radio_tick_by_tick_and_only_while_it_moves():
     assert told == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
 
 
-def test_the_air_is_tuned_only_when_a_number_changes(monkeypatch: pytest.MonkeyPatch):
-    tuned: list[float] = []
-    monkeypatch.setattr(RadioMedium, "tune", lambda _, radio: tuned.append(radio.loss))
-    ran(TWO, [{"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}], 20)
-    assert tuned == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
+def effects(events: list[dict[str, Any]], ticks: int = 20) -> list[Effects]:
+    """What the events of a run with two robots and a radio did, by tick."""
+    scenario = posed(TWO, events=events, radio={"range_m": 9.0})
+    world = World(scenario, [1], {})
+    scheduler = EventScheduler(scenario.events, world.static, world.keys, scenario.radio)
+    return [scheduler.apply(tick * 10**8, world) for tick in range(ticks)]
+
+
+def test_the_radio_is_new_only_when_a_number_changes():
+    ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}
+    losses = [each.radio.loss for each in effects([ramp]) if each.radio is not None]
+    assert losses == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
+
+
+def test_the_disruption_is_new_only_in_a_tick_with_an_event():
+    changed = {tick: each.disruption for tick, each in enumerate(effects([at("blackout", 0.2, "a-1", for_s=0.5)]))}
+    on = {tick: new.radio_on.tolist() for tick, new in changed.items() if new is not None}
+    assert on == {2: [True, False], 7: [True, True]}
 
 
 def test_a_partition_by_place_takes_robots_where_they_are_when_it_begins():

@@ -1,15 +1,15 @@
 import numpy as np
 
-from swarmwire.comms.tick_io import MAX_STATES, Notes
+from swarmwire.comms.tick_io import MAX_STATES, SparseTable
 from swarmwire.world.annotations import States
 
 ALIVE = np.ones(6, np.bool_)
 
 
-def notes(*named: tuple[int, str]) -> Notes:
+def notes(*named: tuple[int, str]) -> SparseTable:
     names = tuple(dict.fromkeys(state for _, state in named))
     rows = np.array([row for row, _ in named], np.int64)
-    return Notes(rows, np.array([names.index(state) for _, state in named], np.int64), names)
+    return SparseTable(rows, np.zeros_like(rows), np.array([names.index(state) for _, state in named], float), names)
 
 
 def shown(states: States) -> list[str]:
@@ -26,7 +26,7 @@ def test_a_state_holds_until_the_next_is_named():
 def test_new_states_are_numbered_by_row_whatever_the_order_and_division_of_the_notes():
     together, joined = States(1, 6), States(1, 6)
     together.take(notes((5, "c"), (0, "b"), (3, "a")), ALIVE)
-    joined.take(Notes.joined([notes((3, "a")), notes((5, "c"), (0, "b"))]), ALIVE)
+    joined.take(SparseTable.joined([notes((3, "a")), notes((5, "c"), (0, "b"))]), ALIVE)
     assert together.names == joined.names == ("", "b", "a", "c")
     assert together.code.tolist() == joined.code.tolist()
 

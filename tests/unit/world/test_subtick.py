@@ -11,6 +11,7 @@ from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.new_medium import new_medium
@@ -36,9 +37,12 @@ def static(robots: int, arenas: int = 1) -> Static:
 
 
 def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> SubtickRadio:
-    medium = make_medium(radio, robots, range(arenas))
-    medium.hold(scattered(robots * arenas), np.ones(robots * arenas, np.bool_))
-    return SubtickRadio(medium, static(robots, arenas), lambda sent: sent)
+    return SubtickRadio(make_medium(radio, robots, range(arenas)), static(robots, arenas), lambda sent: sent)
+
+
+def begun(medium: SubtickRadio, start_ns: int, robots: int = 4) -> tuple[Results, Results]:
+    """A tick with robots at rest, and nothing disrupted."""
+    return medium.step(start_ns, scattered(robots), None, None)
 
 
 def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
@@ -49,13 +53,13 @@ def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int,
 
 def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
     medium = in_time(Radio(99.0, latency_s=0.002))
-    medium.begin(0)
+    begun(medium, 0)
     medium.send(SubtickPackets(10 * MS, None, packet(0)))
     assert received_at(medium.advance(12 * MS)[0]) == []
     assert received_at(medium.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
     assert received_at(medium.advance(13 * MS)[0]) == []
-    told, rest, _ = medium.begin(TICK_NS)
-    assert (received_at(told.received), received_at(rest)) == (
+    told, rest = begun(medium, TICK_NS)
+    assert (received_at(told.received), received_at(rest.received)) == (
         [(0, 12 * MS)],
         [],
     )  # observers learn of it, agents have it
@@ -63,7 +67,7 @@ def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
 
 def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
     medium = in_time(Radio(99.0, send_offset=0.05))
-    medium.begin(0)
+    begun(medium, 0)
     medium.send(SubtickPackets(1 * MS, 0, packet(0)))
     medium.send(SubtickPackets(2 * MS, None, packet(0)))
     medium.send(SubtickPackets(60 * MS, 0, packet(2)))  # too late for its turn: at once
@@ -72,12 +76,12 @@ def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is
 
 def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
     medium = in_time(Radio(99.0, send_offset=0.25))
-    medium.begin(0)
+    begun(medium, 0)
     medium.send(SubtickPackets(1 * MS, 0, packet(0)))
     medium.send(SubtickPackets(2 * MS, 0, packet(1)))
     for tick in (1, 2):
-        assert not len(medium.begin(tick * TICK_NS)[0].received)
-    assert received_at(medium.begin(3 * TICK_NS)[0].received) == [(0, 250 * MS)]
+        assert not len(begun(medium, tick * TICK_NS)[0].received)
+    assert received_at(begun(medium, 3 * TICK_NS)[0].received) == [(0, 250 * MS)]
     medium.send(SubtickPackets(301 * MS, 3, packet(3)))
     medium.end()
     assert medium._medium.end().intended.sum() == 3
@@ -103,9 +107,9 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
 
     for tick in range(5):
         start_ns = tick_start_ns(tick, RATE_HZ)
-        news, rest, _ = medium.begin(start_ns)
+        news, rest = begun(medium, start_ns, 2 * robots)
         tallies.append(news.tally)
-        keep(rest)
+        keep(rest.received)
         arenas = 1 if one_leaves and tick > 2 else 2
         puts = [
             (start_ns + int(at), int(rng.integers(0, arenas * robots)), bool(rng.integers(2)))

@@ -1,14 +1,14 @@
 import numpy as np
 
-from swarmwire.comms.tick_io import NO_VALUES, Values
+from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.annotations import LatestValues
 
 ALIVE = np.ones(4, np.bool_)
 
 
-def told(*numbers: tuple[int, float]) -> Values:
+def told(*numbers: tuple[int, float]) -> SparseTable:
     rows, value = zip(*numbers, strict=True)
-    return Values(np.array(rows, np.int64), np.array(value, np.float64))
+    return SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(value, np.float64))
 
 
 def shown(values: LatestValues) -> list[float | None]:
@@ -18,17 +18,17 @@ def shown(values: LatestValues) -> list[float | None]:
 
 def test_a_number_holds_until_the_next_is_told() -> None:
     values = LatestValues()
-    values.take(NO_VALUES, ALIVE)
+    values.take(NOTHING_SET, ALIVE)
     assert values.value is None
     values.take(told((1, 2.5), (3, -1.0)), ALIVE)
     values.take(told((3, 0.0)), ALIVE)
-    values.take(NO_VALUES, ALIVE)
+    values.take(NOTHING_SET, ALIVE)
     assert shown(values) == [None, 2.5, None, 0.0]
 
 
 def test_of_two_numbers_of_a_robot_the_later_counts() -> None:
     values = LatestValues()
-    values.take(Values.joined([told((2, 1.0)), NO_VALUES, told((0, 5.0), (2, 2.0))]), ALIVE)
+    values.take(SparseTable.joined([told((2, 1.0)), NOTHING_SET, told((0, 5.0), (2, 2.0))]), ALIVE)
     assert shown(values) == [5.0, None, 2.0, None]
 
 

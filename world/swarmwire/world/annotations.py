@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.tick_io import MAX_STATES, Notes, Values
+from swarmwire.comms.tick_io import MAX_STATES, SparseTable
 
 
 class LatestValues:
@@ -16,12 +16,12 @@ class LatestValues:
     def __init__(self) -> None:
         self.value: FloatArray | None = None
 
-    def take(self, told: Values, alive: BoolArray) -> None:
-        """Take down what robots told in a tick; only those `alive` (rows,) tell anything."""
-        here = alive[told.rows]
+    def take(self, noted: SparseTable, alive: BoolArray) -> None:
+        """Keep the numbers of a tick of robots `alive` (rows,)."""
+        here = alive[noted.rows]
         if here.any():
             self.value = np.full(len(alive), np.nan) if self.value is None else self.value.copy()
-            self.value[told.rows[here]] = told.value[here]
+            self.value[noted.rows[here]] = noted.value[here]
 
     def forget(self, rows: BoolArray) -> None:
         """These robots (rows,) have told nothing."""
@@ -48,7 +48,7 @@ class States:
         self._robots = robots
         self._named: BoolArray = np.ones((arenas, 1), np.bool_)  # (arenas, names) which each arena knows
 
-    def take(self, notes: Notes, alive: BoolArray) -> None:
+    def take(self, notes: SparseTable, alive: BoolArray) -> None:
         """Take down what robots named in a tick; only those `alive` (rows,) name anything."""
         if not len(notes):
             return
@@ -56,7 +56,7 @@ class States:
         order = order[alive[notes.rows[order]]]
         rows = notes.rows[order]
         arena = rows // self._robots
-        place = self._places(arena, notes.code[order], notes.names)
+        place = self._places(arena, notes.integers[order], notes.names)
         kept = place != ONE_TOO_MANY
         np.add.at(self.dropped, arena[~kept], 1)
         self.code = self.code.copy()

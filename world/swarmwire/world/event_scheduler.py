@@ -1,8 +1,9 @@
-"""The event scheduler: events that are due at the start of a tick change world and radio before anything else."""
+"""The event scheduler: events that are due at the start of a tick change the world, and what holds in the medium."""
 
 from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.world.world import World
 
@@ -26,6 +27,14 @@ class EventProgress:
     begun: dict[int, int] = field(default_factory=dict[int, int])  # the tick at whose start each one began
     over: set[int] = field(default_factory=set[int])  # those that happen once, and those that were undone
     radio: Radio | None = None  # as events have made it by now
+
+
+class Effects(NamedTuple):
+    """What the events of one tick did."""
+
+    records: tuple[EventRecord, ...]  # in order
+    disruption: Disruption | None  # of the radio medium from this tick on; None: unchanged
+    radio: Radio | None  # the radio's parameters from this tick on; None: unchanged
 
 
 class EventScheduler:
@@ -66,8 +75,8 @@ class EventScheduler:
         if serial in self._course.begun and serial not in self._course.over:
             insort(self._coming, (start_ns, False, serial))
 
-    def apply(self, start_ns: int, world: World, medium: RadioMedium | None) -> tuple[EventRecord, ...]:
-        """Let happen what is due by the start of a tick, in ns; world and air go on under what holds after that."""
+    def apply(self, start_ns: int, world: World) -> Effects:
+        """Apply to the world what is due by the start of a tick, in ns, and return what holds from then on."""
         happened: list[EventRecord] = []
         if world.batteries.any:  # first, so that who is revived in this tick is not found empty
             happened.extend(self._run_down(start_ns, world))
@@ -83,17 +92,18 @@ class EventScheduler:
             world.fail(self._conditions.failed_parts)
             if (by_mps := self._conditions.take_impulses()) is not None:
                 world.apply_impulse(by_mps)
-            if medium:
-                medium.disrupt(self._conditions.disruption())
-        if medium and self._radio:
-            self._tune(medium, self._conditions.radio_at(self._radio, start_ns))
-        return tuple(happened)
+        disruption = self._conditions.disruption() if happened else None
+        return Effects(tuple(happened), disruption, self._new_radio(start_ns))
 
-    def _tune(self, medium: RadioMedium, radio: Radio) -> None:
-        known = self._course.radio
-        if radio is not known and radio != known:  # as most often it is the same, which costs nothing
-            medium.tune(radio)
-            self._course.radio = radio
+    def _new_radio(self, start_ns: int) -> Radio | None:
+        """The radio's parameters from now on; None if the run has no radio, or if they stay."""
+        if self._radio is None:
+            return None
+        radio, known = self._conditions.radio_at(self._radio, start_ns), self._course.radio
+        if radio is known or radio == known:  # mostly the same object, which costs nothing
+            return None
+        self._course.radio = radio
+        return radio
 
     def _plan(self, serial: int, event: Event, at_ns: int) -> None:
         insort(self._coming, (at_ns, True, serial))

@@ -17,7 +17,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.world.event_scheduler import EventScheduler
+from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.trajectory_hash import TrajectoryHash
@@ -45,7 +45,7 @@ class Mailbox:
         """
         if self._always:
             return received
-        pending = received.merged(self._waiting) if len(self._waiting) else received
+        pending = ReceivedPackets.joined([received, self._waiting])
         acts = (tick % self._act_every == 0)[pending.receiver]
         self._waiting = pending.select(np.flatnonzero(~acts & alive[pending.receiver])).compacted()
         return pending.select(np.flatnonzero(acts))
@@ -128,8 +128,8 @@ class Loop:
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._intervene(tick, start_ns)
-        events = self._events.apply(start_ns, world, self.medium)
-        results, packets, tx_status = self._receive(start_ns)
+        effects = self._events.apply(start_ns, world)
+        results, packets, tx_status = self._receive(start_ns, effects)
         readings = world.sense(tick)
         actions = self._act(start_ns, readings, packets, tx_status)
         received = results.received if results else ReceivedPackets.none()
@@ -137,8 +137,6 @@ class Loop:
         onsets = world.move(actions)
         command = world.command
         self._hash.add(pose, velocity, command, received)
-        edges = self.medium.edges(pose, alive) if self.medium else None
-        tally, finished = (results.tally, results.finished) if results else (None, None)
         self._open = None
         truth = Truth(
             tick=tick,
@@ -153,10 +151,10 @@ class Loop:
             leds=world.actuators.leds.told,
             readings=readings,
             contact_onsets=onsets,
-            edges=edges,
-            tally=tally,
-            finished=finished,
-            events=events,
+            edges=results.edges if results else None,
+            tally=results.tally if results else None,
+            finished=results.finished if results else None,
+            events=effects.records,
             departed=results.departed if results else None,
             movable=movable,
             value=world.values.value,
@@ -208,24 +206,24 @@ class Loop:
         packets = {"packets_to_nobody": self._invalid_destination, "packets_without_radio": self._without_radio}
         return {**self.world.counts(), **packets}
 
-    def _receive(self, start_ns: int) -> tuple[Results | None, ReceivedPackets, TxStatuses]:
+    def _receive(self, start_ns: int, effects: Effects) -> tuple[Results | None, ReceivedPackets, TxStatuses]:
         """The results of the medium up to a tick's start, and the packets and statuses for the backend."""
+        world, tick = self.world, self.ticks_done
+        if self.medium is None:
+            return None, ReceivedPackets.none(), NO_TX_STATUSES
         if self._subtick:
-            results, packets, tx_status = self._subtick.begin(start_ns)
+            results, undelivered = self._subtick.step(start_ns, world.pose, effects.disruption, effects.radio)
             self._open = results.tally
-            return results, packets, tx_status
-        tick, alive = self.ticks_done, self.world.alive
-        results = self.medium.advance(start_ns) if self.medium else None
-        self._open = results.tally if results else None
-        packets = self._mailbox.hand_over(tick, results.received if results else ReceivedPackets.none(), alive)
-        tx_status = self._mailbox.hand_over_tx_status(tick, results.tx_status if results else NO_TX_STATUSES, alive)
+            return results, undelivered.received, undelivered.tx_status
+        results = self.medium.step(start_ns, world.pose, effects.disruption, effects.radio)
+        self._open = results.tally
+        packets = self._mailbox.hand_over(tick, results.received, world.alive)
+        tx_status = self._mailbox.hand_over_tx_status(tick, results.tx_status, world.alive)
         return results, packets, tx_status
 
     def _act(self, start_ns: int, readings: Readings, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         """The actions of the robots in a tick; their packets go to the medium."""
         world, tick = self.world, self.ticks_done
-        if self.medium:
-            self.medium.hold(world.pose, world.alive.copy())
         if self._timed and self._subtick:
             return self._timed.act_in_time(tick, readings, packets, tx_status, self._subtick)
         actions = self.backend.act(tick, readings, packets, tx_status)

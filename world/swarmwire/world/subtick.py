@@ -2,7 +2,7 @@
 
 `SubtickRadio` is the radio medium of such a loop:
 
-    start of a tick   `begin`      results since the last tick, for observers; of these, packets not yet delivered
+    start of a tick   `step`       results since the last tick, for observers; of these, those not yet delivered
     within the tick   `send`       packets of a step wait for their robot's turn, others are sent at once
                       `advance`    received packets are delivered when they are due
 
@@ -18,10 +18,12 @@ from typing import Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Static
@@ -42,13 +44,15 @@ class SubtickRadio:
         self._next_ns = NEVER_NS  # the first turn to come
         self._now_ns = 0
 
-    def begin(self, start_ns: int) -> tuple[Results, ReceivedPackets, TxStatuses]:
-        """Let the tick end that is under way; what became final in it, and what of that was not handed over."""
+    def step(
+        self, start_ns: int, pose: FloatArray, disruption: Disruption | None, radio: Radio | None
+    ) -> tuple[Results, Results]:
+        """End the last tick, and begin one as `RadioMedium.step`; its results, and those of them not yet delivered."""
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
-        received, tx_status = self._medium.advance_within(start_ns)
-        return self._medium.advance(start_ns), received, tx_status
+        undelivered = self._medium.advance(start_ns)
+        return self._medium.step(start_ns, pose, disruption, radio), undelivered
 
     def send(self, put: SubtickPackets) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -61,7 +65,7 @@ class SubtickRadio:
             self._medium.send_at(np.full(self._rows, at_ns), sent)
             return
         start_ns = tick_start_ns(put.tick, self._static.rate_hz)
-        turn_ns = np.maximum(at_ns, self._medium.turns(start_ns, put.tick)[sent.sender])
+        turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, put.tick)[sent.sender])
         waits = np.flatnonzero(self._turn_ns < NEVER_NS)
         self._waiting = SentPackets.joined([self._waiting.select(waits), sent]) if len(waits) else sent
         self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
@@ -72,7 +76,8 @@ class SubtickRadio:
         """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
         self._release(until_ns)
         self._now_ns = until_ns
-        return self._medium.advance_within(until_ns)
+        results = self._medium.advance(until_ns)
+        return results.received, results.tx_status
 
     def leave(self, over: BoolArray) -> None:
         """The arenas (arenas,) are over: what waits there for a turn is the medium's to end."""

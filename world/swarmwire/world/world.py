@@ -128,7 +128,7 @@ class World:
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
         """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
-        self.actuators.failed.fail(failed)
+        self.actuators.fail(failed)
         self._brake()
         shape = self.static.arenas, self.static.robots
         for group in self.static.groups:
@@ -176,7 +176,7 @@ class World:
         self.states.take(actions.notes, self.alive)
         self.values.take(actions.values, self.alive)
         if self._own.any:
-            self._own.act(actions.own, self.alive)
+            self._own.act(actions.actuators, self.alive)
             self.actuators.leds.tell()
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)

@@ -129,10 +129,10 @@ class Diffusion(VectorAgent):
         x, y = proximity.vector_sum()
         angle = np.arctan2(y, x)
         straight = (np.abs(angle) <= self.go_straight_rad) & (np.hypot(x, y) < self.nearness * rays)
-        turn = self.speed_mps / robots.body.wheels.wheel_base_m
-        linear = np.where(straight, self.speed_mps, 0.5 * self.speed_mps)
-        angular = np.where(straight, 0.0, np.where(angle > 0.0, -turn, turn))
-        robots.drive(linear_mps=linear, angular_radps=angular)
+        is_left = angle > 0.0
+        robots.wheels(
+            np.where(straight | is_left, self.speed_mps, 0.0), np.where(straight | ~is_left, self.speed_mps, 0.0)
+        )
 
 
 class Present(Message):

@@ -113,12 +113,12 @@ class Controller:
         drive = bool(actions.drive[0])
         if drive:
             self._take_command(actions)
-        self.actuations += len(actions.own)
+        self.actuations += len(actions.actuators)
         if len(actions.notes):
-            self.state = actions.notes.names[int(actions.notes.code[-1])]
+            self.state = actions.notes.names[int(actions.notes.value[-1])]
         if len(actions.values):
             self.value = float(actions.values.value[-1])
-        switched = dict(zip(actions.leds.which.tolist(), actions.leds.rgb.tolist(), strict=True))
+        switched = dict(zip(actions.leds.place.tolist(), actions.leds.integers.tolist(), strict=True))
         self.leds |= switched
         return Decision(self._with_leds(switched), drive, actions.sent)
 

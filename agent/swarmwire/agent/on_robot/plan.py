@@ -21,7 +21,7 @@ from swarmwire.agent.on_robot.settings import RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.comms.assignment import params_of
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.drives import Wheels
+from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import read_toml
@@ -102,7 +102,7 @@ class SpeedLimits:
         )
         excess = max(hypot(linear, lateral) / self.linear_mps, abs(angular) / self.angular_radps)
         if self.wheel_mps is not None:
-            excess = max(excess, (abs(linear) + 0.5 * self.wheel_base_m * abs(angular)) / self.wheel_mps)
+            excess = max(excess, max(map(abs, wheels_of_twist(linear, angular, self.wheel_base_m))) / self.wheel_mps)
         if excess <= 1.0:
             return command
         return replace(

@@ -93,7 +93,7 @@ class WorldRadio:
             ahead_ns = arrival.at_ns - started_ns - tick_start_ns(tick, terms.rate_hz)
             mine = self._own_rows(packets, ahead_ns)
             self._log_received(mine, arrival.utc_ns - arrival.at_ns + started_ns)
-            received = received.merged(mine)
+            received = ReceivedPackets.joined([received, mine])
             tx_status = TxStatuses.joined(
                 [tx_status, TxStatuses(self._rows(statuses.row), statuses.id, statuses.result)]
             )

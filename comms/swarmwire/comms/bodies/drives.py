@@ -4,6 +4,7 @@ Colours of LEDs are numbers 0xRRGGBB.
 """
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.config import parameter
 
+N = TypeVar("N", float, FloatArray)
 BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue
 
 
@@ -89,6 +91,20 @@ DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic":
 def wheel_base_of(drive: Drive) -> float:
     """The distance between a drive's wheels in m; 0 if it has none."""
     return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
+
+
+def wheels_of_twist(linear_mps: N, angular_radps: N, wheel_base_m: float) -> tuple[N, N]:
+    """Speeds of the left and the right wheel at this forward speed and turn rate (positive to the left).
+
+    Way instead of speed gives way. The world compiles this function.
+    """
+    difference_mps = 0.5 * wheel_base_m * angular_radps
+    return linear_mps - difference_mps, linear_mps + difference_mps
+
+
+def twist_of_wheels(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
+    """Forward speed and turn rate (positive to the left) at these speeds of the wheels; as `wheels_of_twist`."""
+    return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,16 @@ is final, and counts the fates.
 
 # pyright: basic, reportUnknownMemberType=false
 
+from dataclasses import replace
+from functools import reduce
+from operator import add
+
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOWHERE, Fate, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, SentPackets
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -20,6 +24,7 @@ from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
+from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
@@ -57,17 +62,16 @@ class RadioMedium:
 
     `radio` holds the current parameters.
 
-    A packet waits in its sender's queue, goes on air, and ends at each intended receiver in exactly one fate. Tick k
-    starts with `advance(its start)`; then come `hold` with the poses of tick k and `send`. So a packet sent in a tick
-    is received in the next tick at the earliest, under the poses of the tick in which it goes on air.
+    A packet waits in its sender's queue, goes on air, and ends at each intended receiver in exactly one fate. Each tick
+    is a `step` to its start, then a `send`. So a packet sent in a tick is received in the next tick at the earliest,
+    under the poses of the tick in which it goes on air. `advance` and `send_at` divide a tick into sub-ticks.
 
     A fate is final when the reception ends: RECEIVED at `on_air_at + airtime + latency + jitter`, every other fate of a
     packet on air at `on_air_at + airtime`, a fate at the sender's radio at `sent_at`.
 
-    Events kill or revive robots, switch radios and set partitions at the start of a tick (`disrupt`, before `advance`).
-    Packets already on air stay on air, but dead robots receive nothing and their queues end. A radio that is off loses
-    the packets that it is receiving; packets to send end or wait by its `backlog`. A revived robot receives only
-    packets sent from then on.
+    Disruptions kill or revive robots, switch radios and set partitions at the start of a tick. Packets already on air
+    stay on air, but dead robots receive nothing and their queues end. A radio that is off loses the packets that it is
+    receiving; packets to send end or wait by its `backlog`. A revived robot receives only packets sent from then on.
     """
 
     def __init__(
@@ -98,9 +102,9 @@ class RadioMedium:
         if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
             raise ValueError(f"{unfit}: expected a unit disk without bodies_block on a torus")
         rows = len(keys) * robots
-        self.radio = self._next_radio = radio
-        self._robots = robots
-        self._active, self._next_disruption = Disruption.none(rows), Disruption.none(rows)
+        self.radio, self._robots = radio, robots
+        self._disruption = Disruption.none(rows)  # of the last `step`
+        self._active = Disruption.none(rows)  # the same, shared with the model; robots of arenas that left are alive
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
         robot_antennas = antennas or Antennas.alike(robots)
         self._running: BoolArray = np.ones(len(keys), np.bool_)
@@ -116,55 +120,55 @@ class RadioMedium:
         self._left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left the run
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
-        self._parts: list[results.FinalFates] = []  # results within the current tick
+        self._parts: list[Results] = []  # results within the current tick
         self._on_air = Transmissions.none()  # the packets of `_links`
         self._links = self._no_links = Links.none(len(radio.measures.columns))
-        none = (
-            ReceivedPackets.none(radio.measures.columns),
-            *results.nothing_final(self._links, self._on_air, radio.is_phy),
+        self._nothing = Results.nothing(
+            self._links, self._on_air, radio.measures.columns, self._counters.close(), radio.is_phy
         )
-        self._nothing = results.FinalFates(*none, NO_TX_STATUSES)
 
-    def hold(self, pose: FloatArray, alive: BoolArray) -> None:
-        """Robots are at `pose` (rows, 3) (x, y in m, heading in rad) from now on; those `alive` (rows,) receive.
+    def step(
+        self, start_ns: int, pose: FloatArray, disruption: Disruption | None = None, radio: Radio | None = None
+    ) -> Results:
+        """Let time pass to the start of a tick; then `pose`, `disruption` and `radio` hold.
 
-        `pose` must not change afterwards.
+        Packets go on air before `start_ns` under the poses until then, and fates are final by it. Events at a sender's
+        radio at `start_ns` itself belong to the new poses.
+
+        Args:
+            start_ns: the start of the tick; ValueError if it has passed.
+            pose: x, y in m and heading in rad, (rows, 3); the array must not change afterwards.
+            disruption: the state of robots and radios from now on; None: unchanged.
+            radio: the parameters from now on, for packets that neither wait nor are on air. Only numbers may change.
+                None: unchanged.
+
+        Returns:
+            All results since the last step, those of `advance` included, and the radio graph at `pose`.
         """
-        alive = alive | self._left  # no packets are for them, so they may count as alive
-        self._liveness.now(alive)
-        self._active.become(self._next_disruption)
-        self._active.alive = alive
-        if self._next_radio is not self.radio:
-            self.radio = self._next_radio
-            self._model.tune(self._now_ns, self.radio)
-        self._model.hold(pose)
-        in_arena = alive.reshape(-1, self._robots).sum(axis=1)
-        self._others_alive = np.repeat(in_arena, self._robots) - alive
+        self._pass_time(start_ns)
+        disruption = disruption or self._disruption
+        if disruption.anyone_out or self._active.anyone_out:
+            self._keep_new(*self._model.disrupt(start_ns, disruption, self._liveness))
+            self._cut_off(start_ns, disruption)
+        self._disruption = disruption
+        final = Results.joined([*self._parts, self._final(start_ns)])
+        self._parts = []
+        self._hold(pose, radio or self.radio)
+        return replace(final, edges=self._model.edges(pose, disruption.alive & ~self._left))
 
-    def disrupt(self, first_new: Disruption) -> None:
-        """Apply this disruption from the end of the next `advance` on, until the next call."""
-        self._next_disruption = first_new
-
-    def tune(self, radio: Radio) -> None:
-        """Use the numbers of `radio` from the end of the next `advance` on; everything else must be unchanged.
-
-        Packets that wait or are on air are not affected.
-        """
-        self._next_radio = radio
-
-    def send(self, at_ns: int, tick: int, sent: SentPackets) -> None:
-        """Queue the packets that agents sent in the tick that started at `at_ns`; call `hold` with its poses before.
+    def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
+        """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
 
         The intended receivers of a broadcast are all other robots of the arena that are alive now, of a unicast packet
         its one receiver. A packet to NOWHERE has none: it takes a sequence number, and its transmit status is "not
         acknowledged". Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
         the sender itself, or for a time that has passed.
         """
-        self._check(at_ns, sent)
+        self._check(start_ns, sent)
         if len(sent):
-            self._accept(self._send_times.at(at_ns, tick), sent)
+            self._accept(self._send_times.at(start_ns, tick), sent)
 
-    def turns(self, start_ns: int, tick: int) -> IntArray:
+    def send_times(self, start_ns: int, tick: int) -> IntArray:
         """Send time of each robot in the tick that starts at `start_ns`, in ns, (rows,)."""
         return self._send_times.at(start_ns, tick)
 
@@ -174,37 +178,25 @@ class RadioMedium:
             self._check(int(sent_at_ns[sent.sender].min()), sent)
             self._accept(sent_at_ns, sent)
 
-    def advance(self, until_ns: int) -> results.Results:
-        """Let time pass to `until_ns` under the current poses: packets go on air before it, fates are final by it.
+    def advance(self, until_ns: int) -> Results:
+        """Let time pass within a tick; the number of such calls changes nothing.
 
-        Events at a sender's radio at `until_ns` itself belong to the next poses, and so to the next call.
-        """
-        self._pass_time(until_ns)
-        if self._next_disruption.anyone_out or self._active.anyone_out:
-            self._keep_new(*self._model.disrupt(until_ns, self._next_disruption, self._liveness))
-            self._cut_off(until_ns)
-        final = results.joined([*self._parts, self._final(until_ns)])
-        self._parts = []
-        return results.Results(final.received, final.finished, final.departed, self._counters.close(), final.tx_status)
-
-    def advance_within(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Let time pass within a tick, where no disruption begins; the number of such calls changes nothing.
-
-        The next `advance` returns these results again, with those of the whole tick.
+        Returns the results since the last call, which the next `step` returns again; they have no edges.
         """
         self._pass_time(until_ns)
         final = self._final(until_ns)
-        if final.anything:
-            self._parts.append(final)
-            if len(self._parts) == MAX_PARTS:  # joined early, since the next tick waits for the last part
-                self._parts = [results.joined(self._parts)]
-        return final.received, final.tx_status
+        self._parts.append(final)
+        if len(self._parts) == MAX_PARTS:  # joined early, since the next tick waits for the last part
+            self._parts = [Results.joined(self._parts)]
+        return final
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._counters.strand(self._links, self._without_left(self._model.drain()))
         self._keep(np.empty(0, np.int64))
-        return self._counters.close()
+        counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
+        self._parts = []
+        return counts
 
     def leave(self, over: BoolArray) -> PacketCounts:
         """End the run in arenas `over` (arenas,); returns the counts that `end` would return for them.
@@ -215,17 +207,26 @@ class RadioMedium:
         is_leaving = leaving[self._links.sender]
         self._counters.strand(self._links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0])
         self._keep(np.flatnonzero(~is_leaving))
-        self._parts = [results.joined(self._parts).of(~over, self._robots)] if self._parts else []
+        counts = self._counters.close(over)
+        if self._parts:
+            final = Results.joined(self._parts)
+            counts, self._parts = counts + final.tally.of(over), [final.of(~over, self._robots)]
         self._left |= leaving
         self._running &= ~over
-        return self._counters.close(over)
+        return counts
 
-    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Edges of the radio graph over robots at `pose`: pairs of robot rows a < b, sorted, (e, 2).
-
-        Two robots that are alive are joined where a lone packet is delivered with at least `min_delivery`.
-        """
-        return self._model.edges(pose, alive)
+    def _hold(self, pose: FloatArray, radio: Radio) -> None:
+        """Hold these poses and parameters, and the disruption, from now on."""
+        alive = self._disruption.alive | self._left  # no packets are for those that left, so they may count as alive
+        self._liveness.now(alive)
+        self._active.become(self._disruption)
+        self._active.alive = alive
+        if radio is not self.radio:
+            self.radio = radio
+            self._model.tune(self._now_ns, radio)
+        self._model.hold(pose)
+        in_arena = alive.reshape(-1, self._robots).sum(axis=1)
+        self._others_alive = np.repeat(in_arena, self._robots) - alive
 
     def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         packets = self._model.accept(sent_at_ns, sent, self._others_alive, self._liveness.epoch)
@@ -237,23 +238,26 @@ class RadioMedium:
         self._now_ns = until_ns
         self._keep_new(*self._model.pass_time(until_ns, self._liveness))
 
-    def _final(self, until_ns: int) -> results.FinalFates:
+    def _final(self, until_ns: int) -> Results:
         """Results of links that are final by `until_ns`; the others are kept."""
         self._liveness.forget(self._model.queued.epoch)
-        links, packets, robots = self._links, self._on_air, self._robots
-        rows = results.parted(links.fate, links.receiver, links.final_at_ns, until_ns)
-        if len(rows.open) == len(links.fate):
-            return self._nothing._replace(tx_status=self._model.tx_status(self._next_disruption.alive & ~self._left))
-        self._counters.settle(links, until_ns)
-        final = results.FinalFates(
-            results.received(
-                rows.received, links, packets, self.radio.measures.columns, robots, len(self._others_alive)
-            ),
-            results.finished(rows.finished, links, packets, robots, self.radio.is_phy),
-            results.departed(rows.departed, links, packets, robots),
-            self._model.tx_status(self._next_disruption.alive & ~self._left),
+        tx_status = self._model.tx_status(self._disruption.alive & ~self._left)
+        links, packets = self._links, self._on_air
+        received, finished, departed, still_open = results.parted(
+            links.fate, links.receiver, links.final_at_ns, until_ns
         )
-        self._keep(rows.open)
+        if len(still_open) == len(links.fate):
+            return replace(self._nothing, tally=self._counters.close(), tx_status=tx_status)
+        self._counters.settle(links, until_ns)
+        rows, robots = len(self._others_alive), self._robots
+        final = Results(
+            results.received(received, links, packets, self.radio.measures.columns, robots, rows),
+            results.finished(finished, links, packets, robots, self.radio.is_phy),
+            results.departed(departed, links, packets, robots),
+            tx_status,
+            self._counters.close(),
+        )
+        self._keep(still_open)
         return final
 
     def _check(self, at_ns: int, sent: SentPackets) -> None:
@@ -264,9 +268,9 @@ class RadioMedium:
         if is_invalid.any():
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[is_invalid][0]}")
 
-    def _cut_off(self, now_ns: int) -> None:
-        """End receptions of robots that are dead now, and unfinished ones at radios that are off now."""
-        links, now = self._links, self._next_disruption
+    def _cut_off(self, now_ns: int, now: Disruption) -> None:
+        """End receptions of robots that are dead `now`, and unfinished ones at radios that are off."""
+        links = self._links
         is_open = (links.fate == RECEIVED) & (links.receiver != THE_REST)
         links.fate[is_open & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[is_open & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD

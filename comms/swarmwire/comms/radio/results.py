@@ -6,17 +6,20 @@ times as long.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import add
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import ReceivedPackets, TxStatuses
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRecords
+
+NO_EDGES = np.empty((0, 2), np.int64)
 
 
 @njit()
@@ -79,60 +82,60 @@ def _insertion_sort(order, receiver, at_ns):
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Results of one `advance`: received packets, final records, counts and transmit statuses."""
+    """What became final in the medium in a stretch of time."""
 
     received: ReceivedPackets
     finished: ReceptionRecords
     departed: TransmissionRecords
-    tally: PacketCounts
     tx_status: TxStatuses  # of packets with a requested status, of senders that are alive
+    tally: PacketCounts
+    # (e, 2) the radio graph: robot rows a < b, sorted. Two robots that are alive are joined where a lone packet is
+    # delivered with at least `min_delivery`.
+    edges: IntArray = field(default_factory=lambda: NO_EDGES)
 
-
-class FinalFates(NamedTuple):
-    """Results that became final in a part of a tick."""
-
-    received: ReceivedPackets
-    finished: ReceptionRecords
-    departed: TransmissionRecords
-    tx_status: TxStatuses
-
-    @property
-    def anything(self) -> bool:
-        """Whether there are any results."""
-        return bool(len(self.finished.arena) or len(self.departed.arena) or len(self.tx_status))
-
-    def of(self, arenas: BoolArray, robots: int) -> "FinalFates":
+    def of(self, arenas: BoolArray, robots: int) -> "Results":
         """The results of arenas `arenas` (arenas,), of `robots` robots each."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
-        return FinalFates(received, self.finished.of(arenas), self.departed.of(arenas), tx_status)
+        return Results(received, self.finished.of(arenas), self.departed.of(arenas), tx_status, self.tally.of(arenas))
 
+    @classmethod
+    def joined(cls, parts: "list[Results]") -> "Results":
+        """The results of all parts of a stretch of time, one or more, in order."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            ReceivedPackets.joined([part.received for part in parts]),
+            ReceptionRecords.joined([part.finished for part in parts]),
+            TransmissionRecords.joined([part.departed for part in parts]),
+            TxStatuses.joined([part.tx_status for part in parts]),
+            reduce(add, [part.tally for part in parts]),
+        )
 
-def joined(parts: list[FinalFates]) -> FinalFates:
-    """The results of all parts, one or more."""
-    if len(parts) == 1:
-        return parts[0]
-    received, finished, departed, tx_status = (list(of) for of in zip(*parts, strict=True))
-    return FinalFates(
-        ReceivedPackets.joined(received),
-        ReceptionRecords.joined(finished),
-        TransmissionRecords.joined(departed),
-        TxStatuses.joined(tx_status),
-    )
-
-
-class Parted(NamedTuple):
-    """Rows of links by kind of result, rising; a row may have several kinds."""
-
-    received: IntArray
-    finished: IntArray  # final, without receivers out of range
-    departed: IntArray  # final rows for the rest: one for each packet that left its sender's radio
-    open: IntArray  # not final yet
+    @classmethod
+    def nothing(
+        cls, links: Links, packets: Transmissions, measures: tuple[str, ...], tally: PacketCounts, has_strength: bool
+    ) -> "Results":
+        """No results, for a medium with these kinds of links and packets."""
+        none = np.empty(0, np.int64)
+        return cls(
+            ReceivedPackets.none(measures),
+            finished(none, links, packets, 1, has_strength),
+            departed(none, links, packets, 1),
+            NO_TX_STATUSES,
+            tally,
+        )
 
 
 @njit()
-def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int) -> Parted:
-    """The rows of links that are final by `until_ns` by kind of result, and the open ones."""
+def parted(
+    fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """The rows of links by kind of result, rising: received, finished, departed, open; a row may have several kinds.
+
+    Finished links are final by `until_ns`, without receivers out of range. Departed ones are final rows for the rest:
+    one for each packet that left its sender's radio. Open ones are not final yet.
+    """
     k = len(fate)
     received, finished = np.empty(k, np.int64), np.empty(k, np.int64)
     departed, still_open = np.empty(k, np.int64), np.empty(k, np.int64)
@@ -145,7 +148,7 @@ def parted(fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: 
         f += final & (fate[row] != OUT_OF_RANGE)
         d += final & (receiver[row] == THE_REST)
         o += not final
-    return Parted(received[:h], finished[:f], departed[:d], still_open[:o])
+    return received[:h], finished[:f], departed[:d], still_open[:o]
 
 
 def received(
@@ -196,14 +199,6 @@ def _finished(index, link_columns, packet_columns, robots):
         columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
         columns[9, k], columns[10, k], columns[11, k], columns[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
     return columns
-
-
-def nothing_final(
-    links: Links, packets: Transmissions, has_strength: bool
-) -> tuple[ReceptionRecords, TransmissionRecords]:
-    """Empty records, for a medium with these kinds of links and packets."""
-    none = np.empty(0, np.int64)
-    return finished(none, links, packets, 1, has_strength), departed(none, links, packets, 1)
 
 
 def in_arena(row: IntArray, robots: int) -> IntArray:

@@ -5,6 +5,7 @@ back. In real time with a sub-tick, `packets` and `sent` frames carry packets in
 """
 
 from collections.abc import Mapping, Set
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, cast
 
@@ -25,16 +26,12 @@ from swarmwire.comms.packets import (
 )
 from swarmwire.comms.tick_io import (
     MAX_STATES,
-    NO_ACTUATOR_COMMANDS,
-    NO_LED_CHANGES,
-    NO_VALUES,
+    NOTHING_SET,
+    TABLES,
     Actions,
-    ActuatorCommands,
     GroupReadings,
-    LedChanges,
-    Notes,
     Readings,
-    Values,
+    SparseTable,
     checked_state,
 )
 from swarmwire.comms.wire import frames
@@ -165,19 +162,14 @@ def encode_actions(
     }
     if len(actions.sent):
         arrays |= sent_arrays(actions.sent)
-    if len(actions.leds):
-        arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
-    if len(actions.own):
-        arrays["own"] = np.array((actions.own.rows, actions.own.place))
-        arrays["own/value"] = actions.own.value
-    if len(actions.values):
-        arrays["values"] = actions.values.rows
-        arrays["values/value"] = actions.values.value
+    for name in TABLES:
+        table: SparseTable = getattr(actions, name)
+        if len(table):
+            arrays |= {name: np.array((table.rows, table.place)), f"{name}/value": table.value}
     if memory:
         arrays |= memory_arrays(memory)
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}
     if len(actions.notes):
-        arrays["notes"] = np.array((actions.notes.rows, actions.notes.code))
         values["states"] = actions.notes.names
     return frames.encode("actions", tick, arrays, values)
 
@@ -199,11 +191,11 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
-    notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
-    leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
-    commands = _actuator_commands(frame, rows) if "own" in frame.arrays else NO_ACTUATOR_COMMANDS
-    values = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
-    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, commands, values)
+    tables = {name: _table(frame, name, rows) for name in TABLES if name in frame.arrays}
+    if "notes" in tables:
+        tables["notes"] = _named(tables["notes"], frame.values.get("states"))
+    _check_integers(tables.get("leds", NOTHING_SET), "leds", BRIGHTEST)
+    return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, **tables)
 
 
 def sent_of(frame: Frame, rows: IntArray) -> SentPackets:
@@ -227,43 +219,32 @@ def _tx_status_id(frame: Frame, to: IntArray) -> IntArray | None:
     return tx_status_id
 
 
-def _notes(frame: Frame, rows: IntArray) -> Notes:
-    noted, code = checked_array(frame, "notes", "<i8", (2, None))
-    names: object = frame.values.get("states")
+def _table(frame: Frame, name: str, rows: IntArray) -> SparseTable:
+    """A sparse table of a frame; BadFrame unless its robots are among `rows`, and its numbers finite."""
+    of, place = checked_array(frame, name, "<i8", (2, None))
+    value = checked_array(frame, f"{name}/value", "<f8", (len(of),))
+    if not _are_among(of, rows) or (place < 0).any() or not np.isfinite(value).all():
+        raise BadFrame("malformed", f"{name}: expected places, and finite numbers, of the runner's own robots")
+    return SparseTable(of, place, value)
+
+
+def _named(notes: SparseTable, names: object) -> SparseTable:
+    """The table of notes with the states of its frame; BadFrame if they do not fit each other."""
     if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MAX_STATES:
         raise BadFrame("malformed", f"states: expected a list of 1 to {MAX_STATES} texts")
     try:
         states = tuple(checked_state(name) for name in cast("list[object]", names))
     except ValueError as error:
         raise BadFrame("malformed", str(error)) from error
-    if not _are_among(noted, rows) or len(np.unique(noted)) < len(noted):
-        raise BadFrame("malformed", "notes: expected the runner's own robots, each once")
-    if ((code < 0) | (code >= len(states))).any():
-        raise BadFrame("malformed", "notes: expected places in states")
-    return Notes(noted, code, states)
+    if len(np.unique(notes.rows)) < len(notes):
+        raise BadFrame("malformed", "notes: expected each robot once")
+    _check_integers(notes, "notes", len(states) - 1)
+    return replace(notes, names=states)
 
 
-def _leds(frame: Frame, rows: IntArray) -> LedChanges:
-    switched, which, rgb = checked_array(frame, "leds", "<i8", (3, None))
-    if not _are_among(switched, rows) or (which < 0).any() or (rgb < 0).any() or (rgb > BRIGHTEST).any():
-        raise BadFrame("malformed", "leds: expected colours up to 0xFFFFFF of LEDs of the runner's own robots")
-    return LedChanges(switched, which, rgb)
-
-
-def _actuator_commands(frame: Frame, rows: IntArray) -> ActuatorCommands:
-    actuated, place = checked_array(frame, "own", "<i8", (2, None))
-    value = checked_array(frame, "own/value", "<f8", (len(actuated),))
-    if not _are_among(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
-        raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
-    return ActuatorCommands(actuated, place, value)
-
-
-def _values(frame: Frame, rows: IntArray) -> Values:
-    noted = checked_array(frame, "values", "<i8", (None,))
-    value = checked_array(frame, "values/value", "<f8", (len(noted),))
-    if not _are_among(noted, rows) or not np.isfinite(value).all():
-        raise BadFrame("malformed", "values: expected finite numbers of the runner's own robots")
-    return Values(noted, value)
+def _check_integers(table: SparseTable, name: str, largest: int) -> None:
+    if ((table.value < 0) | (table.value > largest) | (table.value % 1 != 0)).any():
+        raise BadFrame("malformed", f"{name}/value: expected integers from 0 to {largest}")
 
 
 def _are_among(index: IntArray, rows: IntArray) -> bool:

@@ -153,8 +153,8 @@ def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) 
         exchanged(robot, command(leds=0b0000, led2=(100, 101, 50), led8=(255, 40, 255)))
         later = gateway.take().leds
     assert changes.rows.tolist() == [1, 1]
-    assert dict(zip(changes.which.tolist(), changes.rgb.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
-    assert dict(zip(later.which.tolist(), later.rgb.tolist(), strict=True)) == {6: 0, 7: 0x006600}
+    assert dict(zip(changes.place.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
+    assert dict(zip(later.place.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
 
 
 def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gateway) -> None:

@@ -1,7 +1,7 @@
 """Small runs of the medium: fixed poses, packets by tick, everything that became final."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.traces import LinkTraces
@@ -28,9 +29,11 @@ class Run:
     medium: RadioMedium
     news: list[Results] = field(default_factory=list)
     last: PacketCounts | None = None
-    edges: IntArray = field(
-        default_factory=lambda: np.empty((0, 2), np.int64)
-    )  # of the radio graph, if it was asked for
+
+    @property
+    def edges(self) -> IntArray:
+        """Of the radio graph at the last step."""
+        return self.news[-1].edges
 
     @property
     def tally(self) -> PacketCounts:
@@ -77,15 +80,18 @@ def run(
 ) -> Run:
     """Ticks in the loop's order with robots at rest, then quiet ones, then the end."""
     out = Run(medium)
-    alive = np.ones(len(pose), np.bool_)
     for tick in range(ticks + quiet_ticks + 1):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        out.news.append(medium.advance(at_ns))
+        out.news.append(medium.step(at_ns, pose))
         if tick < ticks:
-            medium.hold(pose, alive)
             medium.send(at_ns, tick, sent_in(tick))
     out.last = medium.end()
     return out
+
+
+def living(alive: Sequence[bool]) -> Disruption:
+    """Only these robots are alive (rows,), and nothing else is disrupted."""
+    return replace(Disruption.none(len(alive)), alive=np.array(alive))
 
 
 def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Sequence[int] | int = 10) -> SentPackets:

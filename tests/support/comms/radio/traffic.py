@@ -44,9 +44,7 @@ def run_disrupted(
     for tick in range(ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)
         current = now.get(tick, current)
-        medium.disrupt(current)
-        out.news.append(medium.advance(at_ns))
-        medium.hold(pose, current.alive)
+        out.news.append(medium.step(at_ns, pose, current))
         medium.send(at_ns, tick, sent.get(tick, SentPackets.none()))
     out.last = medium.end()
     return out

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.config import parameter
-from swarmwire.comms.tick_io import NO_LED_CHANGES, LedChanges
+from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.gateways.gateway import Commands, Gateway
 
 
@@ -38,7 +38,7 @@ class ScriptedGateway(Gateway):
         super().__init__(names, body, address, options, clock)
         self.published: list[Published] = []
         self.drive: dict[int, tuple[float, float]] = {}  # by place, until it is taken
-        self.leds: LedChanges = NO_LED_CHANGES
+        self.leds: SparseTable = NOTHING_SET
         self.faults: dict[str, int] = {}
         self.is_open = False
         ScriptedGateway.made.append(self)
@@ -55,7 +55,7 @@ class ScriptedGateway(Gateway):
         for place, command in self.drive.items():
             drive[place] = True
             linear[place], angular[place] = command
-        leds, self.drive, self.leds = self.leds, {}, NO_LED_CHANGES
+        leds, self.drive, self.leds = self.leds, {}, NOTHING_SET
         return Commands(drive, linear, angular, np.zeros_like(linear), leds)
 
     def counts(self) -> dict[str, int]:

@@ -5,9 +5,11 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, IncompatibleBody, body_from, load_body
-from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels
+from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels, twist_of_wheels, wheels_of_twist
 from swarmwire.comms.errors import BadInput
 
 FORCES = {"max_force_n": 1.0, "max_torque_nm": 2.0}
@@ -111,3 +113,15 @@ def test_the_bodies_that_come_along_have_argos_s_leds() -> None:
     assert footbot.led_places_m[-1].tolist() == [0.0, 0.0, 0.174249733]
     ring_m = np.hypot(*footbot.led_places_m[:-1, :2].T)
     np.testing.assert_allclose(ring_m, footbot.radius_m + 0.005)
+
+
+@given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(0.01, 1.0))
+def test_a_twist_becomes_wheel_speeds_and_back(linear: float, angular: float, base_m: float) -> None:
+    left, right = wheels_of_twist(linear, angular, base_m)
+    assert twist_of_wheels(left, right, base_m) == pytest.approx((linear, angular), abs=1e-12)
+    assert (right > left) == (angular > 0.0) or abs(base_m * angular) < 1e-12
+
+
+def test_a_turn_to_the_left_has_the_right_wheel_ahead() -> None:
+    assert wheels_of_twist(0.0, 2.0, 0.1) == (-0.1, 0.1)
+    assert twist_of_wheels(0.0, 0.2, 0.1) == (0.1, 2.0)

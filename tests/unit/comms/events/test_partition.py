@@ -35,11 +35,8 @@ def broadcasts(conditions: ActiveEffects, pose: FloatArray = POSE) -> Run:
     medium = make_medium(Radio(9.0, send_offset="tick"), len(pose))
     told = Run(medium)
     for tick in range(3):
-        medium.disrupt(conditions.disruption())
-        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
-        medium.hold(pose, conditions.alive)
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, conditions.disruption()))
         if tick == 1:
-            told.edges = medium.edges(pose, conditions.alive)
             medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
     told.last = medium.end()
     return told

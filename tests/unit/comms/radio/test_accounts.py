@@ -15,7 +15,7 @@ from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, living, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, RADIOS, random_traffic
 
 
@@ -59,9 +59,10 @@ def test_sent_and_intended_are_counted_when_the_air_takes_a_packet_up():
 
 def test_a_broadcast_intends_only_robots_alive():
     medium = make_medium(Radio(9.0, send_offset="tick"), 4)
-    medium.hold(scattered(4), np.array([True, True, False, True]))
+    pose = scattered(4)
+    medium.step(0, pose, living([True, True, False, True]))
     medium.send(0, 0, packets([0]))
-    tally = medium.advance(10**8).tally
+    tally = medium.step(10**8, pose).tally
     assert tally.intended.tolist() == [2]
     assert tally.fates[0, Fate.RECEIVED] == 2
 
@@ -176,15 +177,14 @@ ASKED: IntArray = np.array([41, 42])
 def sent(radio: str) -> RadioMedium:
     """Robot 1 of arena 0 has sent to all, robot 2 of arena 1 to robot 0."""
     medium = make_medium(NEWS_RADIOS[radio], ROBOTS, [1, 2])
-    medium.advance(0)
-    medium.hold(POSE, ALIVE)
+    medium.step(0, POSE)
     medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
     return medium
 
 
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
 def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
-    told = sent(radio).advance(TICK_NS).finished
+    told = sent(radio).step(TICK_NS, POSE).finished
     of_links = told.arena, told.sender, told.receiver, told.to, told.sequence, told.fate
     rows = list(zip(*(column.tolist() for column in of_links), strict=True))
     assert sorted(rows) == [(0, 1, 0, -1, 0, 0), (0, 1, 2, -1, 0, 0), (1, 2, 0, 0, 0, 0)]
@@ -200,10 +200,9 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
 def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
     medium = sent(radio)
-    received, _ = medium.advance_within(TICK_NS // 2)
-    assert received.receiver.tolist() == [0, 2, 3]
+    assert medium.advance(TICK_NS // 2).received.receiver.tolist() == [0, 2, 3]
     medium.leave(np.arange(2) == over)
-    news, left = medium.advance(TICK_NS), 1 - over
+    news, left = medium.step(TICK_NS, POSE), 1 - over
     assert news.received.receiver.tolist() == [[0, 2], [3]][left]
     assert {news.received.payloads.row(int(row)) for row in news.received.payload} == {PAYLOADS[left]}
     assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {left}
@@ -212,12 +211,10 @@ def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
 @pytest.mark.parametrize("over", [0, 1])
 def test_nor_what_its_senders_learned(over: int):
     medium = make_medium(with_access("csma-802154"), ROBOTS, [1, 2])
-    medium.advance(0)
-    medium.hold(POSE, ALIVE)
+    medium.step(0, POSE)
     medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
-    _, learned = medium.advance_within(TICK_NS // 2)
-    assert learned.row.tolist() == [1, 5]
+    assert medium.advance(TICK_NS // 2).tx_status.row.tolist() == [1, 5]
     medium.leave(np.arange(2) == over)
-    tx_status = medium.advance(TICK_NS).tx_status
+    tx_status = medium.step(TICK_NS, POSE).tx_status
     assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])
     assert tx_status.result.tolist() == [int(TxResult.ACKNOWLEDGED)]

@@ -148,28 +148,25 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
     before that: a robot that has been handed a packet has received it, though it be dead a moment later.
     """
     rng = np.random.default_rng(seed)
-    pose, alive = scattered(SIX, seed), np.ones(SIX, np.bool_)
+    pose = scattered(SIX, seed)
     news, within = list[Results](), list[ReceivedPackets]()
     for tick in range(TICKS):
-        start_ns = tick_start_ns(tick, RATE_HZ)
+        start_ns, disruption = tick_start_ns(tick, RATE_HZ), None
         if out is not None and tick in (1, 3):
-            off = Disruption.none(SIX)
+            disruption = Disruption.none(SIX)
             if tick == 1:
-                off.radio_on[out] = off.alive[(out + 1) % SIX] = False
-            medium.disrupt(off)
-            alive = off.alive.copy()
-        within.append(medium.advance_within(start_ns)[0])
-        news.append(medium.advance(start_ns))
-        medium.hold(pose, alive)
+                disruption.radio_on[out] = disruption.alive[(out + 1) % SIX] = False
+        within.append(medium.advance(start_ns).received)
+        news.append(medium.step(start_ns, pose, disruption))
         sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
         for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
             if sender is None:
-                within.append(medium.advance_within(at_ns)[0])
+                within.append(medium.advance(at_ns).received)
             else:
                 medium.send_at(np.full(SIX, at_ns), packets(sender, size=12))
-    within.append(medium.advance_within(tick_start_ns(TICKS, RATE_HZ))[0])
-    news.append(medium.advance(tick_start_ns(TICKS, RATE_HZ)))
+    within.append(medium.advance(tick_start_ns(TICKS, RATE_HZ)).received)
+    news.append(medium.step(tick_start_ns(TICKS, RATE_HZ), pose))
     last = medium.end()
     tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
     assert tallies.fates.sum() == tallies.intended.sum()
@@ -206,15 +203,15 @@ def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray
     """
     rng = np.random.default_rng(seed)
     medium = make_medium(radio, FIVE, range(ARENAS))
-    pose, alive = scattered(ARENAS * FIVE, seed), np.ones(ARENAS * FIVE, np.bool_)
+    pose = scattered(ARENAS * FIVE, seed)
     told = []
     for tick in range(LATE_TICKS + 40):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        told.append(medium.advance(at_ns).received)
-        medium.hold(pose, alive)
+        told.append(medium.step(at_ns, pose).received)
         if tick < LATE_TICKS:
             medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
-        told += [medium.advance(at_ns + int(share * TICK_NS)).received for share in between]
+        for share in between:
+            medium.advance(at_ns + int(share * TICK_NS))
     return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.received_at_ns], axis=1) for h in told])
 
 
@@ -265,15 +262,13 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
         for tick in range(14):
             now = Disruption.none(12)
             now.radio_on[0] = tick != 1
-            medium.disrupt(now)
             at_ns = tick_start_ns(tick, RATE_HZ)
-            told = medium.advance(at_ns).received
+            told = medium.step(at_ns, pose, now).received
             times[-1] |= {
                 (s, q): t
                 for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.received_at_ns, strict=True)
                 if r == 0
             }
-            medium.hold(pose, np.ones(12, np.bool_))
             if tick in (0, 2):
                 medium.send(at_ns, tick, packets(range(1, 12)))
     free, ordered = times

@@ -12,7 +12,7 @@ from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.presets import PRESETS, with_preset
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, at, everybody, living, make_medium, packets, run, scattered
 
 # Two-sided, for each of the losses below; the seed is fixed, so a pass stays a pass.
 FALSE_ALARM_RATE = 1e-4
@@ -119,10 +119,9 @@ def test_bodies_do_not_block_unless_asked_to():
 
 
 def test_the_dead_are_in_the_way_and_the_graph_has_no_edge_through_bodies():
-    pose, alive = at((-1, 0), (0, 0), (1, 0)), np.array([True, False, True])
-    medium = medium_of(BLOCKING, 3)
-    assert medium.edges(pose, np.ones(3, bool)).tolist() == [[0, 1], [1, 2]]
-    assert medium.edges(pose, alive).tolist() == []
+    pose, medium = at((-1, 0), (0, 0), (1, 0)), medium_of(BLOCKING, 3)
+    assert medium.step(0, pose).edges.tolist() == [[0, 1], [1, 2]]
+    assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
 
 
 def test_an_arena_among_others_is_blocked_as_it_is_alone():

@@ -102,25 +102,25 @@ def test_geometry_is_that_of_the_tick_in_which_a_packet_goes_on_air():
     near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
     for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
         medium = make_medium(Radio(2.0, send_offset=send_offset), 2)
-        medium.hold(before, np.ones(2, bool))
+        medium.step(0, before)
         medium.send(0, 0, packets([0]))
-        assert len(medium.advance(TICK_NS).finished.fate) == 0
-        medium.hold(after, np.ones(2, bool))
-        assert len(medium.advance(2 * TICK_NS).received) == received
+        assert len(medium.step(TICK_NS, after).finished.fate) == 0
+        assert len(medium.step(2 * TICK_NS, after).received) == received
 
 
 def test_time_does_not_run_backwards():
     medium = make_medium(Radio(2.0), 2)
-    medium.advance(TICK_NS)
-    with pytest.raises(ValueError, match="until_ns"):
-        medium.advance(TICK_NS - 1)
+    medium.step(TICK_NS, at((0, 0), (1, 0)))
+    for pass_time in (medium.advance, lambda until_ns: medium.step(until_ns, at((0, 0), (1, 0)))):
+        with pytest.raises(ValueError, match="until_ns"):
+            pass_time(TICK_NS - 1)
     with pytest.raises(ValueError, match="at_ns"):
         medium.send(0, 0, packets([0]))
 
 
 def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
     medium = make_medium(Radio(9.0, send_offset="tick"), 2)
-    medium.advance(TICK_NS)
+    medium.step(TICK_NS, at((0, 0), (1, 0)))
     medium.send_at(np.zeros(2, np.int64), packets([]))  # long ago: packets would be refused
     with pytest.raises(ValueError):
         medium.send_at(np.zeros(2, np.int64), packets([0]))

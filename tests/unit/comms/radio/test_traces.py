@@ -140,13 +140,11 @@ def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
 
 def test_the_graph_has_the_pairs_whose_worse_direction_suffices_now():
     ratio = trace_of("delivery_ratio", [(0, 0, 1, 0.9), (0, 1, 0, 0.4), (0, 0, 2, 0.9), (0, 2, 0, 0.2), (2, 2, 0, 0.6)])
-    alive = np.ones(TRIO, np.bool_)
     for others, expected in (("none", []), ("model", [[1, 2]])):
         radio = replace(DISK, trace=Trace("a.csv", others), min_delivery=0.3)
         medium = make_medium(radio, TRIO, traces=LinkTraces(delivery_ratio=ratio))
-        assert medium.edges(POSE, alive).tolist() == [[0, 1], *expected]
-        medium.advance(2 * TICK_NS)
-        assert medium.edges(POSE, alive).tolist() == [[0, 1], [0, 2], *expected]
+        assert medium.step(0, POSE).edges.tolist() == [[0, 1], *expected]
+        assert medium.step(2 * TICK_NS, POSE).edges.tolist() == [[0, 1], [0, 2], *expected]
 
 
 @pytest.mark.parametrize("radio", [DISK, replace(DISK, trace=Trace("a.csv"))])

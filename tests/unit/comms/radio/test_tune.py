@@ -23,11 +23,8 @@ def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8, ticks: int =
     pose = np.concatenate([scattered(robots)] * len(seeds))
     for tick in range(ticks + 1):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        if tick in changes:
-            out.medium.tune(changes[tick])
-        out.news.append(out.medium.advance(at_ns))
+        out.news.append(out.medium.step(at_ns, pose, radio=changes.get(tick)))
         if tick < ticks:
-            out.medium.hold(pose, np.ones(rows, np.bool_))
             out.medium.send(at_ns, tick, everybody(rows)(tick))
     out.last = out.medium.end()
     return out
@@ -91,22 +88,17 @@ def test_what_was_handed_over_keeps_its_airtime_and_its_place_and_what_comes_has
     medium = make_medium(slow, 2)
     told = Run(medium)
     for tick in range(6):
-        if tick == 1:
-            medium.tune(replace(slow, bit_rate_bps=2000))
-        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
-        medium.hold(PAIR, np.ones(2, np.bool_))
+        fast = replace(slow, bit_rate_bps=2000) if tick == 1 else None
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), PAIR, radio=fast))
         if tick < 2:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, packets([0, 0, 0]))
     assert (told.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
 
 
 def test_the_radio_graph_is_that_of_the_new_radio_once_it_holds():
-    medium, alive = make_medium(Radio(2.0), 2), np.ones(2, np.bool_)
-    medium.tune(Radio(0.5))
-    assert len(medium.edges(PAIR, alive)) == 1
-    medium.advance(10)
-    medium.hold(PAIR, alive)
-    assert len(medium.edges(PAIR, alive)) == 0
+    medium = make_medium(Radio(2.0), 2)
+    assert len(medium.step(0, PAIR).edges) == 1
+    assert len(medium.step(10, PAIR, radio=Radio(0.5)).edges) == 0
     assert medium.radio == Radio(0.5)
 
 

@@ -21,7 +21,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import Actions, ActuatorCommands, GroupReadings, LedChanges, Notes, Readings, Values
+from swarmwire.comms.tick_io import TABLES, Actions, GroupReadings, Readings, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 
@@ -221,24 +221,24 @@ def sound(**more: Any) -> Actions:
     return replace(Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent), **more)
 
 
-ACTUATED = ActuatorCommands(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
-LEDS = LedChanges(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([0xFFFFFF, 0, 0x123456]))
+ACTUATED = SparseTable(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+LEDS = SparseTable(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([float(0xFFFFFF), 0.0, float(0x123456)]))
 
 
 def refused(**changes: Any) -> None:
-    frame = frames.decode(encode_actions(0, sound(own=ACTUATED)))
+    frame = frames.decode(encode_actions(0, sound(actuators=ACTUATED, leds=LEDS)))
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
     assert caught.value.fault == "malformed"
 
 
 def test_actuators_and_leds_come_over_whole_and_what_was_not_done_takes_no_room() -> None:
-    got = decode_actions(frames.decode(encode_actions(0, sound(own=ACTUATED, leds=LEDS))), ROWS)
-    assert all(same(getattr(got.own, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
-    assert all(same(getattr(got.leds, name), getattr(LEDS, name)) for name in ("rows", "which", "rgb"))
+    got = decode_actions(frames.decode(encode_actions(0, sound(actuators=ACTUATED, leds=LEDS))), ROWS)
+    for table, expected in ((got.actuators, ACTUATED), (got.leds, LEDS)):
+        assert all(same(getattr(table, name), getattr(expected, name)) for name in ("rows", "place", "value"))
     silent = frames.decode(encode_actions(0, sound(sent=SentPackets.none())))
-    assert not [name for name in silent.arrays if name.startswith(("sent", "own", "leds"))]
-    assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).own)) == (0, 0)
+    assert not [name for name in silent.arrays if name.startswith(("sent", *TABLES))]
+    assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).actuators)) == (0, 0)
 
 
 def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
@@ -265,18 +265,13 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
         *(("sent", [[4, 9, 9], [0, to, 0]]) for to in (-2, I64.min)),
         *(("sent/tx_status_id", ids) for ids in ([0, 1, 2], [-1, -2, 0], [-1, I64.min, 0], [-1, 1], [[-1, 1, 2]])),
         ("sent/tx_status_id", [-1.0, 1.0, 2.0]),
-        ("leds", [[5], [0], [1]]),  # another's robot
-        ("leds", [[4], [-1], [1]]),
-        ("leds", [[4], [0], [-1]]),
-        ("leds", [[4], [0], [0x1000000]]),
-        ("leds", [[4], [0]]),
-        ("leds", [4, 0, 1]),
-        ("leds", [[4.0], [0.0], [1.0]]),
-        ("own", [[4, 4, 8], [0, 3, 1]]),  # another's robot
-        ("own", [[4, 4, 9], [0, -1, 1]]),
-        ("own", [[4, 9], [0, 1]]),
-        ("own", [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]),
-        *(("own/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
+        *((table, [[4, 4, 8], [0, 3, 1]]) for table in ("leds", "actuators")),  # another's robot
+        *((table, [[4, 4, 9], [0, -1, 1]]) for table in ("leds", "actuators")),
+        *((table, [[4, 9], [0, 1]]) for table in ("leds", "actuators")),
+        *((table, [4, 4, 9]) for table in ("leds", "actuators")),
+        *((table, [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]) for table in ("leds", "actuators")),
+        *(("actuators/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
+        *(("leds/value", [0.0, rgb, 1.0]) for rgb in (-1.0, float(0x1000000), 0.5, np.nan)),
     ],
     ids=repr,
 )
@@ -309,17 +304,21 @@ def test_packets_without_any_sender_are_none() -> None:
     assert len(decode_actions(replace(frame, arrays=arrays), ROWS).sent) == 0
 
 
-def noting(rows: list[int], code: list[int], names: tuple[Any, ...]) -> bytes:
-    return encode_actions(0, sound(notes=Notes(np.array(rows), np.array(code), names)))
+def noting(rows: list[int], code: list[float], names: tuple[Any, ...]) -> bytes:
+    return encode_actions(
+        0, sound(notes=SparseTable(np.array(rows), np.zeros_like(rows), np.array(code, float), names))
+    )
 
 
 def numbering(rows: list[int], value: list[float]) -> bytes:
-    return encode_actions(0, sound(values=Values(np.array(rows, np.int64), np.array(value, np.float64))))
+    return encode_actions(
+        0, sound(values=SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(value)))
+    )
 
 
 def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room() -> None:
     notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
-    assert (notes.rows.tolist(), notes.code.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
+    assert (notes.rows.tolist(), notes.integers.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
     value = [0.1 + 0.2, -0.0, 5e-324]
     told = decode_actions(frames.decode(numbering([9, 4, 4], value)), ROWS).values
     assert (told.rows.tolist(), told.value.tobytes()) == ([9, 4, 4], np.array(value).tobytes())
@@ -334,6 +333,7 @@ def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room
         noting([4, 4], [0, 0], ("search",)),
         noting([4], [1], ("search",)),
         noting([4], [-1], ("search",)),
+        noting([4], [0.5], ("search", "wait")),
         *(noting([4], [0], names) for names in ((), ("",), ("x" * 65,), (7,), tuple(map(str, range(257))))),
         numbering([5], [1.0]),
         numbering([4], [np.nan]),
@@ -341,7 +341,7 @@ def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room
         numbering([4, 9], [1.0]),
         numbering([4], []),
     ],
-    ids=range(14),
+    ids=range(15),
 )
 def test_states_and_numbers_that_contradict_themselves_or_are_anothers_are_refused(data: bytes) -> None:
     with pytest.raises(BadFrame) as caught:

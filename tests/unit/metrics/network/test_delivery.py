@@ -190,10 +190,9 @@ def test_of_robots_that_all_send_each_tick_they_are_what_the_radio_says():
     """
     of, size, lost, radio = static(20), 25, 0.3, Radio(range_m=50.0, loss=0.3, bit_rate_bps=20_000, overhead_bytes=5)
     air, metrics, told = make_medium(radio, of.robots, of.seeds, [()]), Metrics(["airtime", "throughput"]), []
-    air.hold(np.zeros((20, 3)), np.ones(20, np.bool_))
     metrics.begin(of)
     for tick in range(31):
-        news = air.advance(tick * TICK_MS * MS)
+        news = air.step(tick * TICK_MS * MS, np.zeros((20, 3)))
         metrics.see(truth(of, tick, finished=news.finished, departed=news.departed))
         told.append([metrics.latest[name][0] for name in ("airtime", "throughput")])
         air.send(tick * TICK_MS * MS, tick, packets(np.arange(20), size=np.full(20, size)))

@@ -102,10 +102,9 @@ def test_of_independent_losses_the_ratio_is_what_is_not_lost_and_the_latency_tha
     """Of 15000 links the ratio deviates by 0.004, the mean of the jitter by 0.0003 s: five times that is let pass."""
     of = static(20, arenas=4)
     air = make_medium(OPEN, of.robots, of.seeds, [()] * of.arenas)
-    air.hold(np.zeros((80, 3)), np.ones(80, np.bool_))
     seen = []
     for tick in range(16):
-        news = air.advance(tick * 100 * MS)
+        news = air.step(tick * 100 * MS, np.zeros((80, 3)))
         seen.append(truth(of, tick, tally=news.tally, finished=news.finished))
         air.send(tick * 100 * MS, tick, packets(np.arange(80), np.full(80, BROADCAST), np.full(80, 10)))
     pdr, air_s, agent_s = told(of, seen, window_s=1.0)[:, -1]

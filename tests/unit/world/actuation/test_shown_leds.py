@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.tick_io import Actions, LedChanges
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import ShownLeds
 from swarmwire.world.world import World
@@ -15,8 +15,9 @@ GROUPS = (Group("a", load_body("epuck"), 0, 2), Group("b", load_body("footbot"),
 EVERYBODY = np.ones(6, np.bool_)
 
 
-def changes(*listed: tuple[int, int, int]) -> LedChanges:
-    return LedChanges(*np.array(listed, np.int64).reshape(-1, 3).T)
+def changes(*listed: tuple[int, int, int]) -> SparseTable:
+    rows, place, rgb = np.array(listed, np.int64).reshape(-1, 3).T
+    return SparseTable(rows, place, rgb.astype(float))
 
 
 def test_all_are_dark_at_the_start_and_there_is_room_for_the_robot_with_the_most() -> None:

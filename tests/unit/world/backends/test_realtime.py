@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, LedChanges, Values
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, encode_sent
@@ -109,14 +109,14 @@ def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_new
     runners = playing()
     opened(runners, 0)
     opened(runners, 1)
-    for tick, changes in enumerate(([[0, 2], [3, 3], [7, 8]], [[2, 2], [3, 4], [9, 10]])):
+    for tick, (changed, place, rgb) in enumerate((([0, 2], [3, 3], [7.0, 8.0]), ([2, 2], [3, 4], [9.0, 10.0]))):
         rows = np.array(OWN["a"], np.int64)
         still = np.zeros(len(rows))
-        leds = LedChanges(*np.array(changes))
+        leds = SparseTable(np.array(changed), np.array(place), np.array(rgb))
         actions = Actions(rows, still.astype(bool), still, still, still, leds=leds)
         runners.answer("a", encode_actions(tick, actions))
     got = runners.take().leds
-    assert (got.rows.tolist(), got.which.tolist(), got.rgb.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
+    assert (got.rows.tolist(), got.place.tolist(), got.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
     assert len(runners.take().leds) == 0
 
 
@@ -126,7 +126,9 @@ def test_of_two_numbers_told_in_answers_between_two_takes_the_newer_comes_last()
     opened(runners, 1)
     rows = np.array(OWN["a"], np.int64)
     still = np.zeros(len(rows))
-    for tick, told in enumerate((Values(rows, still + 0.5), Values(rows[1:], still[1:] + 0.75))):
+    place = np.zeros_like(rows)
+    tables = SparseTable(rows, place, still + 0.5), SparseTable(rows[1:], place[1:], still[1:] + 0.75)
+    for tick, told in enumerate(tables):
         runners.answer("a", encode_actions(tick, Actions(rows, still.astype(bool), still, still, still, values=told)))
     got = runners.take().values
     assert (got.rows.tolist(), got.value.tolist()) == ([*OWN["a"], *OWN["a"][1:]], [0.5, 0.5, 0.75])

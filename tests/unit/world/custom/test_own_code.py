@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.bodies.body import body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.comms.tick_io import Actions, ActuatorCommands
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.scenario.file import scenario_from
@@ -45,8 +45,8 @@ def world(folder: Path, spec: str = BOTH, seeds: tuple[int, ...] = (1,), needs: 
 
 
 def actuated(of: World, rows: list[int], place: list[int], value: list[float], speed: float = 0.0) -> Actions:
-    own = ActuatorCommands(np.array(rows), np.array(place), np.array(value))
-    return replace(commanded(of, speed, 0.0), own=own)
+    commands = SparseTable(np.array(rows), np.array(place), np.array(value))
+    return replace(commanded(of, speed, 0.0), actuators=commands)
 
 
 def test_an_own_sense_tells_what_an_own_actuator_did(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupReadings, LedChanges
+from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
@@ -110,7 +110,7 @@ def commands(actions: Actions) -> dict[int, tuple[float, float]]:
 def test_each_tick_tells_all_that_is_sensed_and_takes_what_programs_command() -> None:
     around = Around()
     around.gateway.drive = {1: (0.05, -0.7)}
-    around.gateway.leds = LedChanges(np.array([2]), np.array([4]), np.array([0xFF0000]))
+    around.gateway.leds = SparseTable(np.array([2]), np.array([4]), np.array([float(0xFF0000)]))
     actions = around.act(0, [2, 3, 4])
     (told,) = around.gateway.published
     assert told.time_ns == 0
@@ -119,7 +119,7 @@ def test_each_tick_tells_all_that_is_sensed_and_takes_what_programs_command() ->
     assert told.fields["odometry.left_m"].tolist() == [2.0, 3.0, 4.0]
     assert commands(actions) == {0: (0.5, 0.0), 1: (0.5, 0.0), 3: (0.05, -0.7)}
     assert sorted(actions.rows.tolist()) == [0, 1, 2, 3, 4]
-    assert (actions.leds.rows.tolist(), actions.leds.which.tolist()) == ([4], [4])
+    assert (actions.leds.rows.tolist(), actions.leds.place.tolist()) == ([4], [4])
     assert commands(around.act(1, [2, 3, 4])) == {0: (0.5, 0.0), 1: (0.5, 0.0)}  # the last command holds
     assert [told.time_ns for told in around.gateway.published] == [0, TICK_NS]
     assert around.shown == 2

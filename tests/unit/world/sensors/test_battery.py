@@ -77,10 +77,10 @@ def test_a_robot_whose_battery_is_empty_is_dead_and_its_run_says_so() -> None:
     world = World(scenario, [1], {})
     short = with_battery(BatterySpec(capacity_wh=1.0, idle_w=3700.0, start=0.5))
     world.batteries = Batteries([Group("a", short, 0, 2)], 1, 0.1)
-    told = EventScheduler(scenario.events, world.static, world.keys)
+    scheduler = EventScheduler(scenario.events, world.static, world.keys)
     deaths: list[tuple[int, str, list[bool]]] = []
     for tick in range(25):
-        happened = told.apply(tick * 10**8, world, None)
+        happened = scheduler.apply(tick * 10**8, world).records
         deaths += [(tick, each.do, each.changed.tolist()) for each in happened]
         world.move(commanded(world, 0.05, 0.0))
     # Half a watt-hour lasts not quite half a second at 3,700 W, a full one not quite a second.

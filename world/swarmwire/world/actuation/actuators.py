@@ -1,8 +1,7 @@
 """The actuators of all robots: drives with their limits, noise and failures, and LEDs. Compiled.
 
-A command passes these steps in each tick: `take_commands` limits it to the drive, `NoisyWheels` adds the noise of
-wheels, `FailedDrives` removes failed motors and wheels. The result is the target of the engines. `Actuators` joins the
-steps.
+A command passes two kernels in each tick: `take_commands` limits it to the drive; `drive_target` turns it into the
+target of the engines, by way of the speeds of wheels where these are noisy or have failed.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,24 +13,26 @@ import numpy as np
 
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.bodies import drives
 from swarmwire.comms.bodies.body import MOTORS, WHEELS
 from swarmwire.comms.bodies.drives import DRIVES, NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.draws_compiled import normal
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.tick_io import Actions, LedChanges
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.truth import Group
 
 DIFFERENTIAL, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))
 ROUNDING_FACTOR = 1.0 + 1e-9  # a command at exactly the limit is not clipped, despite rounding
 BIAS, FACTOR = draws.purpose("wheel bias"), draws.purpose("wheel factor")
-WHEEL_NOISE = np.arange(2)  # left and right
+LEFT, RIGHT = range(2)
+wheels_of_twist, twist_of_wheels = njit()(drives.wheels_of_twist), njit()(drives.twist_of_wheels)
 
 
 class DriveLimits(NamedTuple):
     """The speed limits of each robot index of an arena, (robots,) each."""
 
-    kind: IntArray  # WHEELS, TWIST or HOLONOMIC
-    half_base_m: FloatArray  # half the distance between the wheels; 0: it has none
+    kind: IntArray  # DIFFERENTIAL, TWIST or HOLONOMIC
+    wheel_base_m: FloatArray  # 0: it has no wheels
     max_linear_mps: FloatArray  # of wheels that of a wheel, of a holonomic drive that of the planar vector
     max_angular_radps: FloatArray
 
@@ -39,12 +40,7 @@ class DriveLimits(NamedTuple):
 def drive_limits_of(groups: Sequence[Group]) -> DriveLimits:
     """The limits of the groups' drives."""
     columns = [
-        (
-            list(DRIVES).index(drive.kind),
-            0.5 * wheel_base_of(drive),
-            drive.max_linear_mps,
-            drive.max_angular_radps,
-        )
+        (list(DRIVES).index(drive.kind), wheel_base_of(drive), drive.max_linear_mps, drive.max_angular_radps)
         for drive in (group.body.drive for group in groups)
     ]
     sizes = [group.stop - group.start for group in groups]
@@ -110,7 +106,8 @@ def _within(limits, i, linear, angular, lateral):
     if kind != HOLONOMIC:
         lateral = 0.0
     if kind == DIFFERENTIAL:
-        fastest = abs(linear) + abs(angular) * limits.half_base_m[i]
+        left, right = wheels_of_twist(linear, angular, limits.wheel_base_m[i])
+        fastest = max(abs(left), abs(right))
         if fastest > max_linear * ROUNDING_FACTOR:
             return linear * (max_linear / fastest), angular * (max_linear / fastest), lateral, True
         return linear, angular, lateral, too_fast
@@ -124,30 +121,30 @@ def _within(limits, i, linear, angular, lateral):
     return linear, angular, lateral, too_fast
 
 
-class NoisyWheels:
-    """The noise of all wheels of all arenas, as in ARGoS: a wheel runs at f (w + b) in place of w.
+class NoisyWheels(NamedTuple):
+    """The noise of all wheels, as in ARGoS: a wheel runs at f (w + b) in place of w, and stands still if both should.
 
-    The bias b is drawn once for each wheel, the factor f for each wheel and tick. `any` is whether any wheel has noise.
+    The bias b is drawn once for each wheel, the factor f for each wheel and tick.
     """
 
-    def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
-        """The biases are drawn now; `keys` (arenas,)."""
-        sizes = [group.stop - group.start for group in groups]
-        noise = [noise_of(group.body.drive) for group in groups]
-        self._keys = keys
-        self._noisy = np.repeat([each != NO_WHEEL_NOISE for each in noise], sizes)
-        self._wheel_base_m = np.repeat([wheel_base_of(group.body.drive) for group in groups], sizes)
-        self._factor = np.repeat([each.factor for each in noise], sizes)
-        self._factor_std = np.repeat([each.factor_std for each in noise], sizes)
-        mean, spread = np.repeat([(each.bias_mps, each.bias_std_mps) for each in noise], sizes, axis=0).T[:, :, None]
-        index = np.arange(len(mean))
-        self._bias_mps = mean + spread * draws.normal(keys[:, None, None], index[:, None], 0, WHEEL_NOISE, BIAS)
-        self.any = bool(self._noisy.any())
+    noisy: BoolArray  # (robots,)
+    factor: FloatArray  # (robots,) mean
+    factor_std: FloatArray  # (robots,)
+    bias_mps: FloatArray  # (arenas, robots, wheels)
 
-    def act(self, tick: int, target: FloatArray) -> None:
-        """Apply the noise to the target of the engines in a tick, (arenas, robots, 3), in place."""
-        spread = self._wheel_base_m, self._factor, self._factor_std, self._bias_mps
-        _act_noise(self._keys, self._noisy, *spread, tick, target)
+
+def noisy_wheels_of(groups: Sequence[Group], keys: KeyArray) -> NoisyWheels:
+    """The noise of the groups' wheels, with the biases of this run; `keys` (arenas,)."""
+    sizes = [group.stop - group.start for group in groups]
+    noise = [noise_of(group.body.drive) for group in groups]
+    mean, spread = np.repeat([(each.bias_mps, each.bias_std_mps) for each in noise], sizes, axis=0).T[:, :, None]
+    index, wheels = np.arange(len(mean))[:, None], np.array([LEFT, RIGHT])
+    return NoisyWheels(
+        np.repeat([each != NO_WHEEL_NOISE for each in noise], sizes),
+        np.repeat([each.factor for each in noise], sizes),
+        np.repeat([each.factor_std for each in noise], sizes),
+        mean + spread * draws.normal(keys[:, None, None], index, 0, wheels, BIAS),
+    )
 
 
 def noise_of(drive: Drive) -> WheelNoise:
@@ -155,68 +152,61 @@ def noise_of(drive: Drive) -> WheelNoise:
     return NO_WHEEL_NOISE if isinstance(drive, Holonomic) else drive.noise
 
 
-@njit()
-def _act_noise(keys, noisy, wheel_base_m, factor, factor_std, bias_mps, tick, target):
-    for arena in range(target.shape[0]):
-        for i in range(target.shape[1]):
-            forward, turn = target[arena, i, 0], target[arena, i, 1]
-            if not noisy[i] or (forward == 0.0 and turn == 0.0):
-                continue
-            half = 0.5 * wheel_base_m[i] * turn
-            left = _factor(keys[arena], i, tick, 0, factor, factor_std) * (forward - half + bias_mps[arena, i, 0])
-            right = _factor(keys[arena], i, tick, 1, factor, factor_std) * (forward + half + bias_mps[arena, i, 1])
-            target[arena, i, 0] = 0.5 * (left + right)
-            target[arena, i, 1] = (right - left) / wheel_base_m[i]
+class FailedParts(NamedTuple):
+    """Robots whose motors or wheels failed, (arenas, robots) each."""
+
+    motors: BoolArray  # they brake
+    left: BoolArray  # the left wheel stands still, the other turns
+    right: BoolArray
 
 
 @njit()
-def _factor(key, i, tick, wheel, factor, factor_std):
+def drive_target(
+    keys: KeyArray,
+    wheel_base_m: FloatArray,
+    noise: NoisyWheels,
+    failed: FailedParts,
+    tick: int,
+    command: FloatArray,
+    target: FloatArray,
+) -> None:
+    """Write the target of the engines in a tick, (arenas, robots, 3): `command` (rows, 3) with noise and failures."""
+    arenas, robots = target.shape[:2]
+    for arena in range(arenas):
+        for i in range(robots):
+            forward, turn, lateral = command[arena * robots + i]
+            base_m = wheel_base_m[i]
+            if noise.noisy[i] and (forward != 0.0 or turn != 0.0):
+                left, right = wheels_of_twist(forward, turn, base_m)
+                left = _factor(keys[arena], i, tick, LEFT, noise) * (left + noise.bias_mps[arena, i, LEFT])
+                right = _factor(keys[arena], i, tick, RIGHT, noise) * (right + noise.bias_mps[arena, i, RIGHT])
+                forward, turn = twist_of_wheels(left, right, base_m)
+            if failed.motors[arena, i]:
+                forward = turn = lateral = 0.0
+            elif failed.left[arena, i] or failed.right[arena, i]:
+                left, right = wheels_of_twist(forward, turn, base_m)  # also if noisy: rounding is that of any command
+                left, right = 0.0 if failed.left[arena, i] else left, 0.0 if failed.right[arena, i] else right
+                forward, turn = twist_of_wheels(left, right, base_m)
+            target[arena, i, 0], target[arena, i, 1], target[arena, i, 2] = forward, turn, lateral
+
+
+@njit()
+def _factor(key, i, tick, wheel, noise):
     """The factor of a wheel's speed in a tick."""
-    if factor_std[i] == 0.0:
-        return factor[i]
-    return factor[i] + factor_std[i] * normal(key, i, tick, wheel, FACTOR)
+    if noise.factor_std[i] == 0.0:
+        return noise.factor[i]
+    return noise.factor[i] + noise.factor_std[i] * normal(key, i, tick, wheel, FACTOR)
 
 
-class FailedDrives:
-    """The failed motors and wheels of all arenas: failed motors brake, a failed wheel stands still, the other turns.
+def fitting(table: SparseTable, places: IntArray, alive: BoolArray, not_there: IntArray) -> SparseTable:
+    """The rows of robots that are `alive` (rows,) and have such a place: as many as `places` (robots,) says.
 
-    Attributes:
-        motors: (arenas, robots) whose motors failed.
-        any: whether any motor or wheel failed.
+    Adds the number of rows without one to `not_there` (arenas,).
     """
-
-    def __init__(self, groups: Sequence[Group], arenas: int) -> None:
-        """All of them work."""
-        sizes = [group.stop - group.start for group in groups]
-        self._wheel_base_m = np.repeat([wheel_base_of(group.body.drive) for group in groups], sizes)
-        self._shape = arenas, sum(sizes)
-        self.fail({})
-
-    def fail(self, failed: Mapping[str, BoolArray]) -> None:
-        """Set the failed parts, by name (rows,); all others work."""
-        none = np.zeros(self._shape, np.bool_)
-        masks = [failed[part].reshape(self._shape) if part in failed else none for part in (MOTORS, *WHEELS)]
-        self.motors: BoolArray = masks[0]
-        self._left, self._right = masks[1], masks[2]
-        self.any = any(bool(mask.any()) for mask in masks)
-
-    def act(self, target: FloatArray) -> None:
-        """Apply the failures to the target of the engines, (arenas, robots, 3), in place."""
-        _act_failures(self.motors, self._left, self._right, self._wheel_base_m, target)
-
-
-@njit()
-def _act_failures(motors, left_failed, right_failed, wheel_base_m, target):
-    for arena in range(target.shape[0]):
-        for i in range(target.shape[1]):
-            if motors[arena, i]:
-                target[arena, i] = 0.0
-            elif left_failed[arena, i] or right_failed[arena, i]:
-                forward, half = target[arena, i, 0], 0.5 * wheel_base_m[i] * target[arena, i, 1]
-                left = 0.0 if left_failed[arena, i] else forward - half
-                right = 0.0 if right_failed[arena, i] else forward + half
-                target[arena, i, 0] = 0.5 * (left + right)
-                target[arena, i, 1] = (right - left) / wheel_base_m[i]
+    robots = len(places)
+    there = table.place < places[table.rows % robots]
+    np.add.at(not_there, table.rows[~there] // robots, 1)
+    return table.select(np.flatnonzero(there & alive[table.rows]))
 
 
 class ShownLeds:
@@ -235,14 +225,12 @@ class ShownLeds:
         self.told = self._row.copy()
         self.not_there: IntArray = np.zeros(arenas, np.int64)
 
-    def take(self, changes: LedChanges, alive: BoolArray) -> None:
+    def take(self, changes: SparseTable, alive: BoolArray) -> None:
         """Apply the changes of a tick to the LEDs of robots that are `alive` (rows,)."""
         if not len(changes):
             return
-        there = changes.which < self._count[changes.rows % len(self._count)]
-        np.add.at(self.not_there, changes.rows[~there] // len(self._count), 1)
-        there &= alive[changes.rows]
-        self._row[changes.rows[there], changes.which[there]] = changes.rgb[there]
+        changes = fitting(changes, self._count, alive, self.not_there)
+        self._row[changes.rows, changes.place] = changes.value
         self.told = self._row.copy()
 
     def tell(self) -> None:
@@ -270,12 +258,12 @@ class Actuators:
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
         """All stand still and are dark; `keys` (arenas,)."""
-        arenas, robots = len(keys), groups[-1].stop
+        self._keys, arenas, robots = keys, len(keys), groups[-1].stop
         self.command: FloatArray = np.zeros((arenas * robots, 3))
         self.target: FloatArray = np.zeros((arenas, robots, 3))
         self.leds = ShownLeds(groups, arenas)
-        self.failed = FailedDrives(groups, arenas)
-        self._limits, self._noise = drive_limits_of(groups), NoisyWheels(groups, keys)
+        self._limits, self._noise = drive_limits_of(groups), noisy_wheels_of(groups, keys)
+        self.fail({})
         self._ticks = 0
         self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
 
@@ -288,13 +276,16 @@ class Actuators:
         commands = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
         clipped, not_finite = take_commands(self._limits, alive, *commands, self.command)
         self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
-        self.target[:] = self.command.reshape(self.target.shape)
-        if self._noise.any:
-            self._noise.act(self._ticks, self.target)
-        if self.failed.any:
-            self.failed.act(self.target)
+        errors = self._limits.wheel_base_m, self._noise, self.failed
+        drive_target(self._keys, *errors, self._ticks, self.command, self.target)
         self.leds.take(actions.leds, alive)
         self._ticks += 1
+
+    def fail(self, failed: Mapping[str, BoolArray]) -> None:
+        """Set the failed parts, by name (rows,); all others work."""
+        none = np.zeros(self.target.shape[:2], np.bool_)
+        parts = (failed[part].reshape(none.shape) if part in failed else none for part in (MOTORS, *WHEELS))
+        self.failed = FailedParts(*parts)
 
     def stop(self, dead: BoolArray) -> None:
         """Stop these robots (rows,) and switch off their LEDs."""

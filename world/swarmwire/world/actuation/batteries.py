@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.sensors.simple import BatterySpec
 from swarmwire.comms.truth import Group
-from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of
+from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of, wheels_of_twist
 
 PER_HOUR = 3600.0
 MAINS = BatterySpec(capacity_wh=inf)  # of a body without a battery: its charge never falls
@@ -34,7 +34,7 @@ class Batteries:
         share = tick_s / PER_HOUR / np.array([spec.capacity_wh for spec in specs])  # of a charge, per W and tick
         self._draw = np.repeat(np.array(draw) * share[:, None], sizes, axis=0)  # (robots, 3) in a tick
         limits = drive_limits_of(groups)
-        self._half_base_m, self._holonomic = limits.half_base_m, limits.kind == HOLONOMIC
+        self._wheel_base_m, self._holonomic = limits.wheel_base_m, limits.kind == HOLONOMIC
 
     @property
     def empty(self) -> BoolArray:
@@ -53,22 +53,22 @@ class Batteries:
             leds: (arenas, robots, LEDs) 0 dark.
             target: (arenas, robots, 3) what engines are given.
         """
-        _drain(self.charge, self._draw, self._half_base_m, self._holonomic, alive, leds, target)
+        _drain(self.charge, self._draw, self._wheel_base_m, self._holonomic, alive, leds, target)
 
 
 @njit()
-def _drain(charge, draw, half_base_m, holonomic, alive, leds, target):
+def _drain(charge, draw, wheel_base_m, holonomic, alive, leds, target):
     robots = charge.shape[1]
     for arena in range(charge.shape[0]):
         for i in range(robots):
             if not alive[arena * robots + i]:
                 continue
-            forward, turn, left = target[arena, i]
+            forward, turn, lateral = target[arena, i]
             if holonomic[i]:
-                speed = np.hypot(forward, left)
+                speed = np.hypot(forward, lateral)
             else:
-                rim = half_base_m[i] * turn
-                speed = 0.5 * (abs(forward - rim) + abs(forward + rim))
+                left, right = wheels_of_twist(forward, turn, wheel_base_m[i])
+                speed = 0.5 * (abs(left) + abs(right))
             lit = 0
             for led in leds[arena, i]:
                 lit += led != 0

@@ -16,6 +16,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
@@ -55,27 +56,65 @@ def split_received(received: ReceivedPackets, owner: IntArray, parts: int) -> li
     """The received packets of each part, with each payload once per part; `owner` (rows,) is each row's part."""
     if not len(received):
         return [received] * parts
-    order = np.argsort(owner[received.receiver], kind="stable")
-    part_index = owner[received.receiver[order]]
-    sorted_received = received.select(order)
-    packets = len(received.payloads)
-    pairs, place = np.unique(part_index * packets + sorted_received.payload, return_inverse=True)
-    payloads = received.payloads.rows(pairs % packets)
-    first_row = np.searchsorted(part_index, np.arange(parts + 1)).tolist()
-    first_payload = np.searchsorted(pairs // packets, np.arange(parts + 1)).tolist()
-    place = place.reshape(-1)
+    order, first_row, payload, kept, first_payload = _by_part(
+        owner.take(received.receiver), parts, received.payload, len(received.payloads)
+    )
+    ordered, payloads = received.select(order), received.payloads.rows(kept)
+    spans = zip(itertools.pairwise(first_row.tolist()), itertools.pairwise(first_payload.tolist()), strict=True)
     return [
         ReceivedPackets(
-            sorted_received.receiver[a:b],
-            sorted_received.sender[a:b],
-            sorted_received.sequence[a:b],
-            sorted_received.received_at_ns[a:b],
-            {name: column[a:b] for name, column in sorted_received.given.items()},
-            place[a:b] - p,
+            ordered.receiver[a:b],
+            ordered.sender[a:b],
+            ordered.sequence[a:b],
+            ordered.received_at_ns[a:b],
+            {name: column[a:b] for name, column in ordered.given.items()},
+            payload[a:b],
             payloads.span(p, q),
         )
-        for a, b, p, q in zip(first_row[:-1], first_row[1:], first_payload[:-1], first_payload[1:], strict=True)
+        for (a, b), (p, q) in spans
     ]
+
+
+@njit()
+def _by_part(
+    part: IntArray, parts: int, payload: IntArray, payloads: int
+) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+    """The packets part after part, and the payloads that each part needs, without sorting.
+
+    Args:
+        part: (k,) of each packet, 0 to parts - 1; negative: of none.
+        parts: how many there are.
+        payload: (k,) row of each packet's payload, 0 to payloads - 1.
+        payloads: how many there are.
+
+    Returns:
+        The packets of all parts, each part's in their order, (h,); the first of each part in these, (parts + 1,); the
+        row of each packet's payload among those of its part, (h,); the payloads of all parts, (p,); the first of each
+        part in these, (parts + 1,).
+    """
+    first_row, first_payload = np.zeros(parts + 1, np.int64), np.zeros(parts + 1, np.int64)
+    for of in part:
+        if of >= 0:
+            first_row[of + 1] += 1
+    for of in range(parts):
+        first_row[of + 1] += first_row[of]
+    order, end = np.empty(first_row[parts], np.int64), first_row.copy()
+    for k in range(len(part)):
+        if part[k] >= 0:
+            order[end[part[k]]] = k
+            end[part[k]] += 1
+    place, kept, count = np.empty_like(order), np.empty_like(order), 0
+    last_part, number = np.full(payloads, -1), np.empty(payloads, np.int64)  # of each payload
+    for of in range(parts):
+        first_payload[of] = count
+        for at in range(first_row[of], first_row[of + 1]):
+            row = payload[order[at]]
+            if last_part[row] != of:
+                last_part[row], number[row], kept[count] = of, count - first_payload[of], row
+                count += 1
+            place[at] = number[row]
+    first_payload[parts] = count
+    return order, first_row, place, kept[:count], first_payload
 
 
 def split_tx_status(tx_status: TxStatuses, owner: IntArray, parts: int) -> list[TxStatuses]:

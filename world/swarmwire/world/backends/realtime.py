@@ -33,7 +33,7 @@ from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.interfaces import SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, ActuatorCommands, LedChanges, Notes, Readings, Values
+from swarmwire.comms.tick_io import Actions, Readings, joined_tables
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Allocation, rows_of
@@ -96,10 +96,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         self._sent: list[SubtickPackets] = []
         self._numbers = Counter[str]()  # of "packets" frames to each runner
         self.now_ns = 0
-        self._notes: list[Notes] = []
-        self._leds: list[LedChanges] = []
-        self._actuator_commands: list[ActuatorCommands] = []
-        self._values: list[Values] = []
+        self._answers: list[Actions] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.tx_status_dropped = 0
 
@@ -175,15 +172,12 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         self._stop(np.flatnonzero(timed_out))
         rows = np.arange(len(self._drive))
         linear_mps, angular_radps, lateral_mps = self._command
-        sent, notes = SentPackets.joined([put.sent for put in self.puts()]), self._latest_notes()
-        leds, custom, values = (
-            LedChanges.joined(self._leds),
-            ActuatorCommands.joined(self._actuator_commands),
-            Values.joined(self._values),
-        )
-        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, notes, leds, custom, values)
-        self._drive, self._command = np.zeros_like(self._drive), np.zeros_like(self._command)
-        self._notes, self._leds, self._actuator_commands, self._values = [], [], [], []
+        sent, tables = SentPackets.joined([put.sent for put in self.puts()]), joined_tables(self._answers)
+        # The latest note of each robot, also of one with several answers.
+        _, back = np.unique(tables["notes"].rows[::-1], return_index=True)
+        tables["notes"] = tables["notes"].select(len(tables["notes"]) - 1 - back)
+        actions = Actions(rows, self._drive, linear_mps, angular_radps, lateral_mps, sent, **tables)
+        self._drive, self._command, self._answers = np.zeros_like(self._drive), np.zeros_like(self._command), []
         return actions
 
     def _acted(self, allocation: RealTimeAllocation, frame: Frame) -> None:
@@ -201,10 +195,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
         self._command[:, commanded] = command[:, actions.drive]
         self._sent.append(SubtickPackets(self.now_ns, frame.tick, actions.sent))
-        self._notes.append(actions.notes)
-        self._leds.append(actions.leds)
-        self._actuator_commands.append(actions.own)
-        self._values.append(actions.values)
+        self._answers.append(actions)
 
     def _sent_between(self, allocation: RealTimeAllocation, frame: Frame) -> None:
         if not self.subtick:
@@ -229,13 +220,6 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
             self._pending_since_ns[allocation.all_rows] = NO_PENDING  # no frame is pending: nothing for the watchdog
         if allocation.state == "dead" or self._on_loss == "stand":
             self._stop(allocation.all_rows)
-
-    def _latest_notes(self) -> Notes:
-        """The latest note of each robot, also of one with several answers since the last take."""
-        notes = Notes.joined(self._notes)
-        _, back = np.unique(notes.rows[::-1], return_index=True)
-        last = len(notes) - 1 - back
-        return Notes(notes.rows[last], notes.code[last], notes.names)
 
     def _drop(self, frame_sent: _SentFrame) -> None:
         self.frames_dropped += 1

@@ -14,8 +14,9 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomActuatorSpec
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.comms.tick_io import ActuatorCommands
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.truth import Group
+from swarmwire.world.actuation.actuators import fitting
 from swarmwire.world.sensors.loading import attribute_of, entry_point, instance_of
 from swarmwire.world.sensors.sensor import Scene
 
@@ -94,22 +95,19 @@ class CustomActuators:
         self.any = bool(self._fitted)
         arenas, robots = len(scene.keys), len(scene.radius_m)
         places = [sum(spec.width for spec in group.body.actuators.values()) for group in groups]
-        self._places = np.tile(np.repeat(places, [group.stop - group.start for group in groups]), arenas)
+        self._places = np.repeat(places, [group.stop - group.start for group in groups])
         self._index: IntArray = np.tile(np.arange(robots, dtype=np.int64), arenas)
         self.not_there: IntArray = np.zeros(arenas, np.int64)
-        self._robots, self._ticks = robots, 0
+        self._ticks = 0
 
-    def act(self, actuations: ActuatorCommands, alive: BoolArray) -> None:
+    def act(self, commands: SparseTable, alive: BoolArray) -> None:
         """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
-        rows, place = actuations.rows, actuations.place
-        there = place < self._places[rows]
-        np.add.at(self.not_there, rows[~there] // self._robots, 1)
-        there &= alive[rows]
-        commands = np.full((len(alive), self._places.max(initial=0)), np.nan)
-        commands[rows[there], place[there]] = actuations.value[there]
+        commands = fitting(commands, self._places, alive, self.not_there)
+        numbers = np.full((len(alive), self._places.max(initial=0)), np.nan)
+        numbers[commands.rows, commands.place] = commands.value
         for what, actuator, places in self._fitted:
             here = (self._index >= actuator.group.start) & (self._index < actuator.group.stop)
-            values = commands[:, places]
+            values = numbers[:, places]
             set_ = np.flatnonzero(here & ~np.isnan(values).any(axis=1))
             _call(what, actuator.act, self._ticks, set_, values[set_])
             self._check(what)

@@ -21,7 +21,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, LedChanges, Readings
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
@@ -68,7 +68,7 @@ class GatewayGroup:
         """The commands of foreign programs since the last call."""
         commands = self.gateway.take()
         self.driven |= commands.drive & self._commanded_alive
-        leds = LedChanges(commands.leds.rows + self.rows[0], commands.leds.which, commands.leds.rgb)
+        leds = replace(commands.leds, rows=commands.leds.rows + self.rows[0])
         return Actions(
             self.rows, commands.drive, commands.linear_mps, commands.angular_radps, commands.lateral_mps, leds=leds
         )

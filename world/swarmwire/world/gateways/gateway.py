@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import NoParameters
 from swarmwire.comms.plugins import installed_class, installed_points
-from swarmwire.comms.tick_io import LedChanges
+from swarmwire.comms.tick_io import SparseTable
 
 GROUP = "swarmwire.gateways"  # of entry points
 
@@ -26,7 +26,7 @@ class Commands:
     linear_mps: FloatArray  # (n,)
     angular_radps: FloatArray  # (n,)
     lateral_mps: FloatArray  # (n,)
-    leds: LedChanges  # rows are indices in the group, 0 to n - 1
+    leds: SparseTable  # rows are indices in the group, 0 to n - 1
 
 
 class Gateway(ABC):

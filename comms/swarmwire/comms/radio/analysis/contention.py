@@ -48,12 +48,12 @@ def contention(
     payloads = Payloads.of([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(warm_up_s * rate_hz), round((warm_up_s + measured_s) * rate_hz)
-    medium.hold(np.zeros((rows, 3)), np.ones(rows, np.bool_))
+    pose = np.zeros((rows, 3))
     counted = (last - first) * rows
     received = delay_ns = gave_up = 0
     for tick in range(last + round(LATE_S * rate_hz) + 1):
         at_ns = tick_start_ns(tick, rate_hz)
-        finished = medium.advance(at_ns).finished
+        finished = medium.step(at_ns, pose).finished
         due = (finished.sequence >= first) & (finished.sequence < last)
         reached = due & (finished.fate == Fate.RECEIVED)
         received += int(finished.receivers[reached].sum())

@@ -12,7 +12,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Wheels
+from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import (
     COMMAND_BYTES,
@@ -44,8 +44,7 @@ def wheel_steps(linear_mps: float, angular_radps: float, wheel_base_m: float) ->
     >>> wheel_steps(0.1, 0.0, 0.053), wheel_steps(0.0, 1.0, 0.053), wheel_steps(0.1, 50.0, 0.053)
     ((796, 796), (-211, 211), (-946, 1100))
     """
-    difference_mps = 0.5 * wheel_base_m * angular_radps
-    left, right = (linear_mps - difference_mps) / M_PER_STEP, (linear_mps + difference_mps) / M_PER_STEP
+    left, right = (mps / M_PER_STEP for mps in wheels_of_twist(linear_mps, angular_radps, wheel_base_m))
     scale = min(1.0, MAX_STEPS_PER_S / max(abs(left), abs(right), 1.0))
     return round(left * scale), round(right * scale)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import IMU, ODOMETRY
@@ -57,7 +58,7 @@ class WheelPoses:
         travel_m = np.where(np.isnan(travel_m), self._before_m, travel_m)
         by_m, for_ns = travel_m - self._before_m, time_ns - self._before_ns
         self._before_ns, self._before_m = time_ns, travel_m
-        arc_m, turn_rad = 0.5 * (by_m[0] + by_m[1]), (by_m[1] - by_m[0]) / self._wheel_base_m
+        arc_m, turn_rad = twist_of_wheels(by_m[0], by_m[1], self._wheel_base_m)
         chord_m = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
         course_rad = self.pose[:, 2] + 0.5 * turn_rad
         self.pose += np.stack([chord_m * np.cos(course_rad), chord_m * np.sin(course_rad), turn_rad], axis=1)
@@ -98,7 +99,7 @@ class WheelTravel:
     def __init__(self, wheel_base_m: float, max_linear_mps: float) -> None:
         self.left_m = self.right_m = 0.0
         self.jumps = 0
-        self._half_base_m, self._max_mps = 0.5 * wheel_base_m, max_linear_mps
+        self._wheel_base_m, self._max_mps = wheel_base_m, max_linear_mps
         self._last: tuple[int, Pose] | None = None
 
     def follow(self, message: Any) -> None:
@@ -121,8 +122,8 @@ class WheelTravel:
         ahead = by[0] * cos(yaw_rad + half_rad) + by[1] * sin(yaw_rad + half_rad)
         arc_m = chord_m * (half_rad / sin(half_rad) if abs(half_rad) > STRAIGHT_RAD else 1.0)
         arc_m = arc_m if ahead >= 0.0 else -arc_m
-        self.left_m += arc_m - turn_rad * self._half_base_m
-        self.right_m += arc_m + turn_rad * self._half_base_m
+        left_m, right_m = wheels_of_twist(arc_m, turn_rad, self._wheel_base_m)
+        self.left_m, self.right_m = self.left_m + left_m, self.right_m + right_m
 
 
 class Motion(NamedTuple):

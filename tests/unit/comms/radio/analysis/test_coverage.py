@@ -39,8 +39,7 @@ def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_b
 def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
     pose = scattered(ROBOTS)
     medium = make_medium(radio, ROBOTS, obstacles=[OBSTACLES])
-    medium.hold(pose, np.ones(ROBOTS, np.bool_))
-    edges = medium.edges(pose, np.ones(ROBOTS, np.bool_))
+    edges = medium.step(0, pose).edges
     a, b = np.triu_indices(ROBOTS, 1)
     coverage = coverage_of(radio, OBSTACLES, radio.max_payload_bytes)
     joined = coverage.delivery(pose[a, :2], pose[b, :2]) >= radio.min_delivery - 1e-9

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
 from swarmwire.comms.radio.phy.results import ResultBuffer
 from tests.support.comms.radio.phy.radios import ALL_GIVEN, METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, living, make_medium, packets, run, scattered
 from tests.support.comms.radio.traffic import OBSTACLES, random_traffic
 
 
@@ -85,11 +85,9 @@ def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int,
     pose, tally = scattered(robots, seed) * [10.0, 10.0, 1.0], []
     disruption = [random_disruption(robots, rng) for _ in range(6)]
     for tick in range(6):
-        medium.disrupt(disruption[tick])
-        if rng.random() < 0.3:
-            medium.tune(replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0)))
-        tally.append(medium.advance(tick * 10**8).tally)
-        medium.hold(pose, disruption[tick].alive)
+        other = replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0))
+        new_radio = other if rng.random() < 0.3 else None
+        tally.append(medium.step(tick * 10**8, pose, disruption[tick], new_radio).tally)
         living = np.flatnonzero(disruption[tick].alive)
         if len(living):
             medium.send(tick * 10**8, tick, packets(rng.choice(living, 2 * robots)))
@@ -128,9 +126,10 @@ def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
 def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
     """Two frames of each robot, the run over at their first bits."""
     medium = make_medium(with_access(method), 3)
-    medium.hold(at((0, 0), (1, 0), (2, 0)), np.ones(3, bool))
+    pose = at((0, 0), (1, 0), (2, 0))
+    medium.step(0, pose)
     medium.send(0, 0, packets([0, 0, 1, 1, 2], [BROADCAST] * 4 + [1]))
-    first = medium.advance(1000)
+    first = medium.step(1000, pose)
     last = medium.end()
     assert first.tally.intended.tolist() == [9]
     assert last.fates[0, Fate.IN_FLIGHT] == 9
@@ -200,11 +199,11 @@ def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyP
 def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
     """Robot 2 is dead; of what a full queue refuses, too, and then it would have been in range."""
     radio = replace(with_access("aloha"), queue_limit=queue_limit, send_offset="tick")
-    medium, alive = make_medium(radio, 4), np.array([True, True, False, True])
+    medium, pose = make_medium(radio, 4), at((0, 0), (1, 0), (0, 1), (500, 0))
     told = Run(medium)
-    medium.hold(at((0, 0), (1, 0), (0, 1), (500, 0)), alive)
+    medium.step(0, pose, living([True, True, False, True]))
     medium.send(0, 0, packets([0, 0, 0, 0], [-1, -1, 2, 1]))
-    told.news.append(medium.advance(5 * TICK_NS))
+    told.news.append(medium.step(5 * TICK_NS, pose))
     told.last = medium.end()
     refused = {
         0: {"RECEIVED": 1, "OUT_OF_RANGE": 1, "QUEUE_FULL": 4},
@@ -217,16 +216,11 @@ def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
 
 def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
     """Frames of 90 ms: at 100 ms the second is on air, and the third waits."""
-    medium, held = (
-        make_medium(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2),
-        Disruption.none(2),
-    )
-    told = Run(medium)
-    medium.hold(at((0, 0), (1, 0)), np.ones(2, np.bool_))
+    medium = make_medium(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2)
+    told, pose = Run(medium), at((0, 0), (1, 0))
+    medium.step(0, pose)
     medium.send(0, 0, packets([0, 0, 0]))
-    held.alive[0] = False
-    medium.disrupt(held)
-    told.news += [medium.advance(TICK_NS), medium.advance(5 * TICK_NS)]
+    told.news += [medium.step(TICK_NS, pose, living([False, True])), medium.step(5 * TICK_NS, pose)]
     assert told.fates() == {"RECEIVED": 2, "SENDER_DEAD": 1}
     assert told.tally.in_range.tolist() == [3]
 
@@ -234,12 +228,11 @@ def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
 def test_ranges_are_those_at_which_frames_went_on_air():
     """Two frames that end in the same tick; one went on air in the tick before, when the robots were nearer."""
     radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, measures=Measures(RangeMeasure(0.0)))
-    medium, alive = make_medium(radio, 2), np.ones(2, np.bool_)
+    medium = make_medium(radio, 2)
     told = Run(medium)
     for tick, (x_m, sender, size) in enumerate([(1.0, 0, 90), (2.0, 1, 10), (4.0, 0, 10)]):
-        told.news.append(medium.advance(tick * TICK_NS))
-        medium.hold(at((0, 0), (x_m, 0)), alive)
+        told.news.append(medium.step(tick * TICK_NS, at((0, 0), (x_m, 0))))
         medium.send(tick * TICK_NS, tick, packets([sender], size=size))
-    told.news.append(medium.advance(4 * TICK_NS))
+    told.news.append(medium.step(4 * TICK_NS, at((0, 0), (4, 0))))
     assert [len(one.received.receiver) for one in told.news] == [0, 0, 2, 1]
     assert told.given("range_m").tolist() == pytest.approx([2.0, 1.0, 4.0])  # by receiver

@@ -50,10 +50,11 @@ def test_time_may_pass_in_any_pieces(method: str):
         medium = make_medium(drawing(method), ROBOTS)
         told = Run(medium)
         for tick in range(4):
-            medium.hold(pose + 0.01 * tick, np.ones(ROBOTS, bool))
+            told.news.append(medium.step(tick * 10**8, pose + 0.01 * tick))
             medium.send(tick * 10**8, tick, traffic(1))
             for piece in range(1, pieces + 1):
-                told.news.append(medium.advance(tick * 10**8 + 10**8 * piece // pieces))
+                medium.advance(tick * 10**8 + 10**8 * piece // pieces)
+        told.news.append(medium.step(4 * 10**8, pose))
         stories.append(story(told))
     assert len(stories[0]) > 200
     assert stories[0] == stories[1] == stories[2]

@@ -34,12 +34,9 @@ def ran(
     told, held = Run(medium), Disruption.none(len(pose))
     held.jammers = now
     for tick in range(ticks + quiet_ticks):
-        medium.disrupt(held)
-        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
-        medium.hold(pose, held.alive)
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, held))
         if tick < ticks:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, sent)
-    told.edges = medium.edges(pose, held.alive)
     told.last = medium.end()
     return told
 
@@ -114,13 +111,11 @@ def test_pieces_of_time_do_not_matter():
         medium = make_medium(radio, 8)
         told = Run(medium)
         for tick in range(4):
-            medium.disrupt(held)
-            told.news.append(medium.advance(tick * 10**8))
-            medium.hold(pose, held.alive)
+            told.news.append(medium.step(tick * 10**8, pose, held))
             medium.send(tick * 10**8, tick, packets([0, 1, 2]))
             for at_ns in range(tick * 10**8 + piece_ns, (tick + 1) * 10**8, piece_ns):
-                told.news.append(medium.advance(at_ns))
-        told.news.append(medium.advance(4 * 10**8))
+                medium.advance(at_ns)
+        told.news.append(medium.step(4 * 10**8, pose))
         stories.append((sorted(received(told)), np.sort(told.on_air("on_air_at_ns")).tolist()))
     assert len(stories[0][0]) > 5
     assert stories[0] == stories[1] == stories[2]

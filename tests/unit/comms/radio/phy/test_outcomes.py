@@ -211,10 +211,8 @@ def test_the_dead_learn_nothing_and_a_radio_that_is_off_is_not_answered():
     ):
         ask, of = Asking(2), Run(make_medium(radio, 2))
         for tick in range(30):
-            if tick == 1:
-                of.medium.disrupt(disrupted(np.array(alive), np.array(radio_on)))
-            of.news.append(of.medium.advance(tick * 10**8))
-            of.medium.hold(NEAR, np.array(alive) if tick else np.ones(2, bool))
+            disruption = disrupted(np.array(alive), np.array(radio_on)) if tick == 1 else None
+            of.news.append(of.medium.step(tick * 10**8, NEAR, disruption))
             of.medium.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
         assert [result for one in told(of) for _, _, result in listed(one)] == expected
 

@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.phy import Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
 from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio.runs import at, everybody, living, make_medium, packets, run, scattered
 
 
 @pytest.mark.parametrize("distance_m", [60.0, 95.0, 105.0, 115.0, 120.0])
@@ -137,8 +137,8 @@ def test_a_lone_frame_of_80211_goes_on_air_after_difs():
 def test_the_radio_graph_joins_those_whom_a_lone_packet_reaches():
     medium = make_medium(with_access("none"), 3)
     pose = at((0, 0), (90, 0), (230, 0))
-    assert medium.edges(pose, np.ones(3, bool)).tolist() == [[0, 1]]
-    assert medium.edges(pose, np.array([True, False, True])).tolist() == []
+    assert medium.step(0, pose).edges.tolist() == [[0, 1]]
+    assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
 
 
 def test_bursts_take_packets_of_disks_and_signals_alike():

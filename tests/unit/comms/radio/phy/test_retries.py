@@ -25,9 +25,7 @@ def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks
         now = Disruption.none(2)
         for name, value in plan(tick).items():
             setattr(now, name, np.array(value, getattr(now, name).dtype))
-        medium.disrupt(now)
-        out.news.append(medium.advance(tick * TICK_NS))
-        medium.hold(at((0, 0), (metres, 0)), now.alive)
+        out.news.append(medium.step(tick * TICK_NS, at((0, 0), (metres, 0)), now))
         if tick < sends:
             one = packets([0], 1, 100)
             medium.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
@@ -88,7 +86,7 @@ def test_newest_only_keeps_one_packet_also_if_an_attempt_fails_meanwhile():
 
 def test_a_broadcast_that_nobody_could_hear_departs_all_the_same():
     medium = make_medium(with_access("csma-802154"), 1)
-    medium.hold(at((0, 0)), np.ones(1, np.bool_))
+    medium.step(0, at((0, 0)))
     medium.send(0, 0, packets([0], -1, 10))
-    news = medium.advance(TICK_NS)
+    news = medium.step(TICK_NS, at((0, 0)))
     assert news.departed.sequence.tolist() == [0]

@@ -128,16 +128,14 @@ def test_a_delay_comes_after_reception():
 
 def test_the_graph_has_the_pairs_that_strength_and_ratio_join_both_ways():
     rows = [(0, 0, 1, -60), (0, 1, 0, -60), (0, 0, 2, -60), (0, 2, 0, -130), (2, 2, 0, -70)]
-    strong, alive = trace_of("rssi_dbm", rows), np.ones(TRIO, np.bool_)
+    strong = trace_of("rssi_dbm", rows)
     rare = trace_of("delivery_ratio", [(0, 0, 1, 0.05), (1, 0, 1, 0.5)])
     for others, expected in (("none", []), ("model", [[1, 2]])):
         for ratio, at_first in ((None, [[0, 1]]), (rare, [])):
             radio = replace(ALONE, trace=Trace("a.csv", others))
             medium = make_medium(radio, TRIO, traces=LinkTraces(ratio, strong))
             for now_ns, edges in ((0, at_first), (2 * TICK_NS, [[0, 1], [0, 2]])):
-                medium.advance(now_ns)
-                medium.hold(NEAR, alive)
-                assert medium.edges(NEAR, alive).tolist() == [*edges, *expected]
+                assert medium.step(now_ns, NEAR).edges.tolist() == [*edges, *expected]
 
 
 @given(st.sampled_from(METHODS), st.integers(0, 1000), st.sampled_from(["none", "model"]), st.integers(1, 2))

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from tests.support.comms.radio.phy.radios import METHODS, with_access
 from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, Run, at, everybody, make_medium, packets, scattered
 
-Change = Callable[[RadioMedium, Disruption], None]
+Change = Callable[[Disruption], Radio | None]
 FEW = scattered(8) * [20.0, 20.0, 1.0]
 
 
@@ -32,25 +32,22 @@ def ran(
     """Changes are made before the tick that they are listed under."""
     told, held = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks + 1):
-        changes.get(tick, lambda _medium, _held: None)(medium, held)
+        radio = changes.get(tick, lambda _: None)(held)
         coming = Disruption.none(len(pose))
         coming.become(held)
-        medium.disrupt(coming)
-        told.news.append(medium.advance(tick_start_ns(tick, RATE_HZ)))
-        medium.hold(pose, held.alive)
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
         if tick < ticks:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))
-    told.edges = medium.edges(pose, held.alive)
     told.last = medium.end()
     return told
 
 
 def tuned(radio: Radio) -> Change:
-    return lambda medium, _: medium.tune(radio)
+    return lambda _: radio
 
 
 def gained(send_db: FloatArray | float = 0.0, receive_db: FloatArray | float = 0.0) -> Change:
-    def change(_: RadioMedium, held: Disruption) -> None:
+    def change(held: Disruption) -> None:
         held.send_gain_db = np.zeros(len(held.alive)) + send_db
         held.receive_gain_db = np.zeros(len(held.alive)) + receive_db
 
@@ -58,7 +55,7 @@ def gained(send_db: FloatArray | float = 0.0, receive_db: FloatArray | float = 0
 
 
 def switched(backlog: int, *off: int) -> Change:
-    def change(_: RadioMedium, held: Disruption) -> None:
+    def change(held: Disruption) -> None:
         held.radio_on = np.ones(len(held.alive), np.bool_)
         held.radio_on[list(off)] = False
         held.backlog = np.full(len(held.alive), backlog)
@@ -229,7 +226,7 @@ def test_addressed_packets_wait_too_and_are_received_once(method: str):
 
 
 def test_one_way_the_radio_graph_of_signals_has_no_edge():
-    def apart(_: RadioMedium, held: Disruption) -> None:
+    def apart(held: Disruption) -> None:
         held.one_way = np.array([[1, 2]])
 
     told = ran(make_medium(with_access("aloha"), 2), PAIR, lambda _: packets([0]), {0: apart}, 4)

@@ -86,11 +86,11 @@ def test_a_refusal_is_final_when_it_was_sent():
     """Offset 150 ms: in the second tick, whose poses tell who would have been in range."""
     radio = Radio(2.0, bit_rate_bps=1000, send_offset=0.15, queue_limit=0)  # on air for 80 ms
     medium = make_medium(radio, 2)
-    medium.hold(at((0, 0), (3, 0)), np.ones(2, bool))
+    near = at((0, 0), (1, 0))
+    medium.step(0, at((0, 0), (3, 0)))
     medium.send(0, 0, packets([0, 0]))
-    assert medium.advance(TICK_NS).tally.fates.sum() == 0
-    medium.hold(at((0, 0), (1, 0)), np.ones(2, bool))
-    tally = medium.advance(2 * TICK_NS).tally
+    assert medium.step(TICK_NS, near).tally.fates.sum() == 0
+    tally = medium.step(2 * TICK_NS, near).tally
     assert tally.fates[0].sum() == tally.fates[0, Fate.QUEUE_FULL] == 1
     assert tally.in_range.tolist() == [1]
 

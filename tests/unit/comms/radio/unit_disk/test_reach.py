@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, R
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.runs import RATE_HZ, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio.runs import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
 
 MEASURES = Measures(RangeMeasure(), BearingMeasure())
 BETWEEN = {
@@ -56,11 +56,12 @@ def test_an_addressed_packet_reaches_only_its_receiver():
 @pytest.mark.parametrize("to", [-3, 0, 3])
 def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(to: int):
     medium = make_medium(Radio(2.0, send_offset="tick"), 3)
-    medium.hold(at((0, 0), (1, 0), (0, 1)), np.ones(3, bool))
+    pose = at((0, 0), (1, 0), (0, 1))
+    medium.step(0, pose)
     with pytest.raises(ValueError, match="to: expected another robot"):
         medium.send(0, 0, packets([0, 0], [1, to]))
     medium.send(0, 0, packets([0], 1))
-    news = medium.advance(10**8)
+    news = medium.step(10**8, pose)
     assert news.received.sequence.tolist() == [0]
     assert news.tally.sent.tolist() == [1]
 
@@ -125,7 +126,7 @@ def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: flo
     obstacles = [*BETWEEN.values(), Obstacle("cylinder", 1.5, 1.0, radius_m=0.5)]
     medium = make_medium(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
     pose = scattered(24, seed)
-    edges = medium.edges(pose, np.ones(24, bool))
+    edges = medium.step(0, pose).edges
     told = run(medium, pose, everybody(24), 1)
     sender = told.received("receiver") // 12 * 12 + told.received("sender")
     links = np.column_stack([sender, told.received("receiver")])
@@ -136,10 +137,11 @@ def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: flo
 
 
 def test_edges_join_robots_alive_where_packets_get_through_often_enough():
-    pose, alive = at((0, 0), (1, 0), (2, 0)), np.array([True, True, False])
+    pose = at((0, 0), (1, 0), (2, 0))
     for loss, joined in ((0.0, 1), (0.9, 1), (0.91, 0)):
-        assert len(make_medium(Radio(1.5, loss=loss), 3).edges(pose, alive)) == joined
-    assert make_medium(Radio(1.5), 3).edges(pose, np.zeros(3, bool)).shape == (0, 2)
+        medium = make_medium(Radio(1.5, loss=loss), 3)
+        assert len(medium.step(0, pose, living([True, True, False])).edges) == joined
+    assert make_medium(Radio(1.5), 3).step(0, pose, living([False] * 3)).edges.shape == (0, 2)
 
 
 def test_fate_of_a_link_is_listed_once():
@@ -194,7 +196,7 @@ def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: floa
     assert out.given("range_m") == pytest.approx(np.hypot(*shortest.T), abs=1e-12)
     bearing = np.arctan2(shortest[:, 1], shortest[:, 0]) - pose[receiver, 2]
     assert np.cos(out.given("bearing_rad") - bearing) == pytest.approx(1.0, abs=1e-12)
-    edges = torus(Radio(range_m=range_m), 40, arenas=2).edges(pose, np.ones(80, np.bool_))
+    edges = torus(Radio(range_m=range_m), 40, arenas=2).step(0, pose).edges
     assert pairs(*edges.T) == {pair for pair in found if pair[0] < pair[1]}
 
 
@@ -238,7 +240,7 @@ def test_obstacles_block_across_the_seam() -> None:
                 blocked += crosses and nearest < 0.0
     assert blocked > 100
     radio = Radio(range_m=5.0, line_of_sight=True)
-    edges = torus(radio, 60, obstacles=obstacles).edges(pose, np.ones(60, np.bool_))
+    edges = torus(radio, 60, obstacles=obstacles).step(0, pose).edges
     clear = {
         (a, b)
         for a, b in expected_pairs(pose, 60, 5.0)

@@ -16,7 +16,7 @@ from swarmwire.comms.robots.epuck2 import readings
 from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S, RobotCommand, body_speeds
 from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
-from swarmwire.comms.tick_io import LedChanges
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
@@ -74,9 +74,9 @@ class ReceivedCommands:
         drive, linear_mps, angular_radps = np.zeros(self._robots, bool), *np.zeros((2, self._robots))
         for robot, (linear, angular) in speeds.items():
             drive[robot], linear_mps[robot], angular_radps[robot] = True, linear, angular
-        changes = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T
+        rows, place, rgb = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T.copy()
         lateral_mps = np.zeros(self._robots)
-        return Commands(drive, linear_mps, angular_radps, lateral_mps, LedChanges(*changes.copy()))
+        return Commands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float)))
 
 
 class SensorPackets:

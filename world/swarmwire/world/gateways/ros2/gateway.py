@@ -15,7 +15,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.ros2.keys import CLOCK, RmwNode, bridge_itself, bridge_key, rmw_key, ros_name
 from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, open_router
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.tick_io import NO_LED_CHANGES
+from swarmwire.comms.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
 from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, tellers_of
@@ -90,7 +90,7 @@ class Ros2Gateway(Gateway):
         told = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
         drive = np.array([command is not None for command in newest], np.bool_)
         lateral_mps = told[:, 2] if isinstance(self.body.drive, Holonomic) else np.zeros(len(told))
-        return Commands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NO_LED_CHANGES)
+        return Commands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NOTHING_SET)
 
     def counts(self) -> dict[str, int]:
         """As `Gateway.counts`."""
