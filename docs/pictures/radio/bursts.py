@@ -9,7 +9,9 @@ from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.reception.bursts import BurstStates
+from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.stages.burst_loss import BurstLoss
+from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.metrics.radio_fit.expected_runs import expected_runs
 
 BURSTS = Bursts(bad_s=0.5, good_s=2.0)
@@ -42,12 +44,16 @@ def draw() -> None:
 
 def losses(packets: int) -> BoolArray:
     """Which packets of each link are lost, (links, packets)."""
-    states = BurstStates(BURSTS, np.array([derive_key("figure of bursts")], np.uint64), ROBOTS)
+    chain, keys = LossChain([BurstLoss(BURSTS, ROBOTS)]), np.array([derive_key("figure of bursts")], np.uint64)
     links = ROBOTS * ROBOTS
     sender, receiver = np.divmod(np.arange(links), ROBOTS)
-    at_ns = [round(n * INTERVAL_S * NS_PER_S) for n in range(packets)]
-    told = [states.lost(sender, receiver, np.full(links, n), np.full(links, at)) for n, at in enumerate(at_ns)]
-    return np.stack(told, axis=1)
+    lost = np.empty((links, packets), np.bool_)
+    for n in range(packets):
+        sequence, at_ns = np.full(links, n), np.full(links, round(n * INTERVAL_S * NS_PER_S))
+        table = Links.under_way(sequence, sender, receiver, sequence, at_ns, 0)
+        chain.decide(table, np.zeros((ROBOTS, 3)), keys, count_only=False)
+        lost[:, n] = table.fate != RECEIVED
+    return lost
 
 
 def run_lengths(lost: BoolArray) -> np.ndarray:

@@ -54,6 +54,20 @@ def cell_of(at_m, origin_m, cell_m, cells):
     return min(max(int(np.floor((at_m - origin_m) / cell_m)), 0), cells - 1)
 
 
+@kernel()
+def strip(x, y, arena, cells, row):
+    """First and stop in grid order of the three adjacent cells `row` rows above (x, y) in m.
+
+    `cells` is a grid of `build`; cells beyond its edge are empty.
+    """
+    i = cell_of(x, cells.left_m, cells.cell_m, cells.nx)
+    j = cell_of(y, cells.bottom_m, cells.cell_m, cells.ny) + row
+    if j < 0 or j >= cells.ny:
+        return 0, 0
+    left = (arena * cells.ny + j) * cells.nx
+    return cells.start[left + max(i - 1, 0)], cells.start[left + min(i + 1, cells.nx - 1) + 1]
+
+
 @njit()
 def is_empty(cells, arena):
     """Whether no robot of an arena is in the grid."""

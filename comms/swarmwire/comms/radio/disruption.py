@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.packets import Fate
 
 NO_ROBOTS = -1
 
@@ -125,6 +126,21 @@ class Disruption:
         for side in self.one_way:
             separated |= (side[sender] == 1) & (side[receiver] == 2)
         return separated
+
+    def end(self, fate: AnyArray, sender: IntArray, receiver: IntArray) -> None:
+        """Set the fates of links between robot rows that it ends and that are still RECEIVED, in place, (k,).
+
+        RECEIVER_DEAD before BLACKOUT before PARTITIONED. Senders that are dead or off end packets at their queue.
+        """
+        if not self.anything:
+            return
+        under_way = fate == Fate.RECEIVED
+        for ends, reason in (
+            (self.apart(sender, receiver), Fate.PARTITIONED),
+            (~self.radio_on[receiver], Fate.BLACKOUT),
+            (~self.alive[receiver], Fate.RECEIVER_DEAD),
+        ):
+            fate[under_way & ends] = reason
 
     def joined(self, a: IntArray, b: IntArray) -> BoolArray:
         """Whether both radios of each pair of robot rows are on, and no partition separates them either way, (k,)."""

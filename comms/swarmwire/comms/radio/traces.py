@@ -4,14 +4,59 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.kernels import kernel, njit
 
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
+NEVER_NS = 2**63 - 1
+
+
+class TraceValues(NamedTuple):
+    """Values of directed links over time, as input of kernels; see `LinkTrace`."""
+
+    link: IntArray  # (links,)
+    start: IntArray  # (links + 1,)
+    time_ns: IntArray  # (values,)
+    value: FloatArray  # (values,)
+
+
+NO_VALUES = TraceValues(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64), np.empty(0))
+
+
+@kernel()
+def value_at(values, link, at_ns):
+    """The value of a link at a time; NaN before its first and for links without any."""
+    place = _first_above(values.link, 0, len(values.link), link) - 1
+    if place < 0 or values.link[place] != link:
+        return np.nan
+    first = values.start[place]
+    latest = _first_above(values.time_ns, first, values.start[place + 1], at_ns) - 1
+    return values.value[latest] if latest >= first else np.nan
+
+
+@kernel()
+def _first_above(numbers, low, high, number):
+    """The first place from `low` to `high` whose number is above `number`, by bisection; `high` if there is none."""
+    while low < high:
+        middle = (low + high) // 2
+        if numbers[middle] > number:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit()
+def _at(values, link, at_ns):
+    out = np.empty(len(link))
+    for i in range(len(link)):
+        out[i] = value_at(values, link[i], at_ns[i])
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +79,12 @@ class LinkTrace:
 
         Sender and receiver are indices in the arena. About 0.5 us each, for random links among ten thousand.
         """
-        return _at(self.link, self.start, self.time_ns, self.value, sender * self.robots + receiver, at_ns)
+        return _at(self.values, sender * self.robots + receiver, at_ns)
+
+    @property
+    def values(self) -> TraceValues:
+        """The values as input of kernels."""
+        return TraceValues(self.link, self.start, self.time_ns, self.value)
 
 
 class RefusedRow(ValueError):
@@ -83,19 +133,6 @@ def _refuse(is_invalid: AnyArray, column: str, expected: str) -> None:
         raise RefusedRow(int(np.argmax(is_invalid)), column, expected)
 
 
-@njit()
-def _at(links, start, time_ns, value, link, at_ns):
-    values = np.full(len(link), np.nan)
-    for i in range(len(link)):
-        place = np.searchsorted(links, link[i])
-        if place < len(links) and links[place] == link[i]:
-            first, stop = start[place], start[place + 1]
-            latest = first + np.searchsorted(time_ns[first:stop], at_ns[i], side="right") - 1
-            if latest >= first:
-                values[i] = value[latest]
-    return values
-
-
 @dataclass(frozen=True, eq=False)
 class LinkTraces:
     """The traces of one file, each quantity with its own rows; None: not measured."""
@@ -110,9 +147,19 @@ class LinkTraces:
         traces = self.delivery_ratio, self.rssi_dbm, self.delay_s
         return tuple(trace for trace in traces if trace is not None)
 
+    @cached_property
+    def first_values(self) -> TraceValues:
+        """From when on each link has a value of any quantity: values of 1 from there on."""
+        if not self.all:
+            return NO_VALUES
+        link = np.unique(np.concatenate([trace.link for trace in self.all]))
+        time_ns = np.full(len(link), NEVER_NS)
+        for trace in self.all:
+            place = np.searchsorted(link, trace.link)
+            time_ns[place] = np.minimum(time_ns[place], trace.time_ns[trace.start[:-1]])
+        return TraceValues(link, np.arange(len(link) + 1), time_ns, np.ones(len(link)))
+
     def known(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> BoolArray:
         """Whether each link (k,), indices in the arena, has a value of any quantity at `at_ns`."""
-        values = np.zeros(len(sender), np.bool_)
-        for trace in self.all:
-            values |= ~np.isnan(trace.at(sender, receiver, at_ns))
-        return values
+        robots = max((trace.robots for trace in self.all), default=0)
+        return ~np.isnan(_at(self.first_values, sender * robots + receiver, at_ns))

@@ -3,6 +3,7 @@
 import inspect
 
 from swarmwire.comms.radio.stages.chain import ORDER
+from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.deploy.catalogue.docs import first_line, paragraphs
 from swarmwire.deploy.catalogue.entry import Entry, ParameterTable
@@ -14,7 +15,7 @@ def radio_stages() -> list[Entry]:
     return [_stage(kind, place) for place, kind in enumerate(ORDER, start=1)]
 
 
-def _stage(kind: type[Stage], place: int) -> Entry:
+def _stage(kind: type[Stage | LossModel], place: int) -> Entry:
     tables = tuple(f"radio.{key}." for key in kind.keys)
     keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
     return Entry(

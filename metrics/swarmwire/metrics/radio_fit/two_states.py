@@ -1,6 +1,6 @@
 """The likelihood of losses under a link that changes between a good and a bad state in continuous time.
 
-The chain of Gilbert and Elliott as the emulator has it (comms/radio/reception/bursts.py). The state is hidden, so that
+The chain of Gilbert and Elliott as the emulator has it (comms/radio/stages/burst_loss.py). The state is hidden, so that
 the likelihood of a sequence is a product of 2 x 2 matrices, one a packet: diag(what each state says of the packet)
 times the transition since the one before. The product is taken in pairs, and pairs of pairs, so that arrays do the
 work. Its entries are four columns: from good to good, from bad to good, from good to bad, from bad to bad.

@@ -165,9 +165,8 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
 def test_nothing_received_is_no_frame(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
-        monkeypatch.setattr(
-            "swarmwire.world.gateways.radio_bridge.encode_bridged", lambda *_: published.append(1) or b""
-        )
+        encode = "swarmwire.world.gateways.radio_bridge.encode_bridged"
+        monkeypatch.setattr(encode, lambda *_: published.append(1) or b"")
         bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
         bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # nobody behind the bridge received it
         assert not published

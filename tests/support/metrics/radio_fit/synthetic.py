@@ -9,8 +9,8 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
+from tests.support.comms.radio.bursts import BurstLinks
 
 EXPONENT, RSSI_AT_1_M_DBM = 2.7, -40.0
 NOISE_DB = 1.5
@@ -55,7 +55,7 @@ def made(key: int, shadowing: Shadowing, bursts: Bursts | None, links: int = 25,
 def losses(key: int, bursts: Bursts, t_s: np.ndarray) -> np.ndarray:
     """Which packets (packets, links) at these times are lost."""
     packets, links = t_s.shape
-    states = BurstStates(bursts, np.array([derive_key("fit", key)], np.uint64), links)
+    states = BurstLinks(bursts, np.array([derive_key("fit", key)], np.uint64), links)
     sender, receiver = np.arange(links), (np.arange(links) + 1) % links
     at_ns = np.round(t_s * NS_PER_S).astype(np.int64)
     return np.stack([states.lost(sender, receiver, np.full(links, n), at_ns[n]) for n in range(packets)])

@@ -10,7 +10,7 @@ from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeas
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, RobotAntenna
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
-from swarmwire.comms.radio.reception.bursts import BurstStates
+from tests.support.comms.radio.bursts import BurstLinks
 from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium, packets, scattered
 
 PAIR = at((0, 0), (1, 0))
@@ -60,7 +60,7 @@ def test_slower_bursts_find_the_same_links_however_many_others_had_been_kept():
     others = tuple(column[others[0] != others[1]] for column in others)
 
     def bad_at_last(crowded: bool) -> list[bool]:
-        states = BurstStates(Bursts(0.01, 0.01), np.array([7], np.uint64), robots)
+        states = BurstLinks(Bursts(0.01, 0.01), np.array([7], np.uint64), robots)
         states.lost(sender, receiver, np.zeros(links_, np.int64), np.full(links_, 0))
         if crowded:
             for sequence in range(2):

@@ -15,9 +15,9 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.radio.config.phy import Shadowing, Walls
+from swarmwire.comms.radio.config.phy import Antennas, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.phy.losses import passing_share
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
@@ -25,6 +25,8 @@ from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.radio.propagation.path_loss import loss_between_db, rssi_dbm
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
+from swarmwire.comms.radio.stages.losses import LossChain
+from swarmwire.comms.radio.stages.stage import ChannelContext
 
 GAINS = 2000  # of fading, over which delivery is averaged
 STEP_DB, DEEP_DB = 0.1, 40.0  # of the table of delivery by power; how far fading reaches below and above the mean
@@ -41,7 +43,7 @@ class Coverage:
     def __init__(self, radio: Radio, key: np.uint64, obstacles: Obstacles, payload_bytes: int) -> None:
         """`key` is that of the arena, `obstacles` are those of this arena alone; packets have so many bytes."""
         self._radio, self._obstacles = radio, obstacles
-        self._passes = passing_share(radio)
+        self._losses = LossChain.of(_context_of(radio, key, obstacles))
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
         if radio.is_phy:
@@ -78,10 +80,17 @@ class Coverage:
 
     def delivery(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """The probability that a lone packet gets through, over all fading and bursts, (k,)."""
-        mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passes, 0.0)
+        mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passing(start, end), 0.0)
         if mean_dbm is None:
             return passes
         return np.where(mean_dbm < cut_off_dbm(self._radio), 0.0, passes * np.interp(mean_dbm, *self._by_power))
+
+    def _passing(self, start: FloatArray, end: FloatArray) -> FloatArray | float:
+        """The share of frames that pass all losses; each link counts as an arena of two robots."""
+        pose = np.zeros((2 * len(start), 3))
+        pose[0::2, :2], pose[1::2, :2] = start, end
+        rows = np.arange(len(pose))
+        return self._losses.passing * self._losses.delivery(rows[0::2], rows[1::2], pose, 0)
 
     def is_free(self, place: FloatArray) -> BoolArray:
         """Whether no obstacle covers each of the places (k, 2) in m."""
@@ -104,6 +113,14 @@ class Coverage:
             return mean_dbm, lone_deliveries(rules, mean_dbm, bits)
         gain_db = _gains_db(fading_model(self._radio.fading, self._radio.frequency_hz), key)
         return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
+
+
+def _context_of(radio: Radio, key: np.uint64, obstacles: Obstacles) -> ChannelContext:
+    """The context of two robots without bodies."""
+    keys, none, antennas = np.array([key], np.uint64), Disruption.none(2), Antennas.alike(2)
+    return ChannelContext(
+        radio, keys, 2, obstacles, (math.inf, math.inf), np.zeros(2), none, antennas, np.ones(1, np.bool_)
+    )
 
 
 @njit()

@@ -1,6 +1,6 @@
 """The radio graph of the PHY: pairs of robots that a lone packet connects both ways, fast fading left out.
 
-Jammers and measured delivery ratios count; carrier sense does not.
+Jammers and losses count; carrier sense does not.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -12,14 +12,14 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.graph import edges, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
-from swarmwire.comms.radio.phy.losses import MeasuredLinks, passing_share
 from swarmwire.comms.radio.phy.pairs import Pairs
 from swarmwire.comms.radio.phy.params import PhyParams
 from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
+from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
-from swarmwire.comms.radio.unit_disk.model import ROUNDING
 
 NEGLIGIBLE_POWER_RATIO = 1e-3  # power of a jammer over the noise power
 
@@ -28,58 +28,59 @@ class RadioGraph:
     """Computes the edges from the link table under the current poses."""
 
     def __init__(
-        self,
-        context: ChannelContext,
-        params: PhyParams,
-        links: LinkTable,
-        jam: JammerTable,
-        measured: MeasuredLinks | None,
-    ):
-        self._disruption, self._links, self._jam, self._measured = context.disruption, links, jam, measured
+        self, context: ChannelContext, params: PhyParams, links: LinkTable, jam: JammerTable, losses: LossChain
+    ) -> None:
+        self._disruption, self._links, self._jam, self._losses = context.disruption, links, jam, losses
         self.tune(context.radio, params)
 
     def tune(self, radio: Radio, params: PhyParams) -> None:
-        """Use these parameters from now on."""
+        """Use these parameters from now on; the losses are tuned before."""
         self._params, self._bits = params, 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-        others = passing_share(radio)
+        others = self._losses.passing
+        # Of the delivery without these losses, so that powers can be compared instead.
         self._min_delivery = (
             radio.min_delivery / others if others > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
         )
         self._min_dbm = min_power_where(
-            lambda dbm: lone_delivery(params, dbm, self._bits) >= self._min_delivery - ROUNDING
+            lambda dbm: bool(is_enough(lone_delivery(params, dbm, self._bits), self._min_delivery))
         )
 
-    def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Edges (a, b), robot rows a < b, with the robots at `pose` (rows, 3); sorted, (e, 2)."""
-        links = self._links
-        pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
-        joined = alive[pairs.a] & alive[pairs.b] & (pairs.blocked == 0)
-        if self._disruption.anything:
-            joined &= self._disruption.joined(pairs.a, pairs.b)
-        if self._jam.anything or self._measured is not None:
-            joined &= self._get_through(pairs)
-        else:
-            joined &= np.minimum(*links.mean_dbm(pairs)) >= self._min_dbm
-        return np.stack(np.divmod(np.sort((pairs.a * len(pose) + pairs.b)[joined]), len(pose)), axis=1)
+    def edges(self, pose: FloatArray, alive: BoolArray, hold_ns: int) -> IntArray:
+        """Edges, robot rows a < b, with the robots at `pose` (rows, 3); sorted, (e, 2).
 
-    def _get_through(self, pairs: Pairs) -> BoolArray:
-        """Whether each pair is joined, (k,).
+        Measured values are those at `hold_ns`.
+        """
+        links, rows = self._links, len(pose)
+        pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
+        candidates = alive[pairs.a] & alive[pairs.b] & ~pairs.blocked
+        if self._disruption.anything:
+            candidates &= self._disruption.joined(pairs.a, pairs.b)
+        by_power = not (self._jam.anything or self._losses.varies)
+        if by_power:
+            candidates &= np.minimum(*links.mean_dbm(pairs)) >= self._min_dbm
+        key = (pairs.a * rows + pairs.b)[candidates]
+        if by_power:
+            return np.stack(np.divmod(np.sort(key), rows), axis=1)
+        order = np.argsort(key)
+        delivery = self._delivery(pairs, pose, hold_ns)[candidates][order]
+        return edges(np.stack(np.divmod(key[order], rows), axis=1), delivery, self._min_delivery)
+
+    def _delivery(self, pairs: Pairs, pose: FloatArray, at_ns: int) -> FloatArray:
+        """Delivery of each pair in the worse direction, without the losses that are the same on every link, (k,).
 
         A packet meets all continuous jammers, and either none or all of the pulsed ones.
         """
         noise_mw = self._params.noise_mw
         steady_mw, all_mw, clear = self._jam.by_robot(NEGLIGIBLE_POWER_RATIO * noise_mw)
         steady_db, all_db = 10.0 * np.log10(1.0 + steady_mw / noise_mw), 10.0 * np.log10(1.0 + all_mw / noise_mw)
-        joined = np.ones(len(pairs.a), np.bool_)
+        worse = np.full(len(pairs.a), np.inf)
         directions = (pairs.a, pairs.b), (pairs.b, pairs.a)
         for mean_dbm, (sender, receiver) in zip(self._links.mean_dbm(pairs), directions, strict=True):
             lone = lone_deliveries(self._params, mean_dbm - steady_db[receiver], self._bits)
             jammed = lone_deliveries(self._params, mean_dbm - all_db[receiver], self._bits)
             delivery = clear[receiver] * lone + (1.0 - clear[receiver]) * jammed
-            if self._measured is not None:
-                delivery *= self._measured.ratio(sender, receiver)
-            joined &= delivery >= self._min_delivery - ROUNDING
-        return joined
+            worse = np.minimum(worse, delivery * self._losses.delivery(sender, receiver, pose, at_ns))
+        return worse
 
 
 def min_power_where(is_enough: Callable[[float], bool]) -> float:

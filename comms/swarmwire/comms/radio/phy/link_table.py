@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.phy.losses import MeasuredLinks
-from swarmwire.comms.radio.phy.pairs import Pairs, pairs_of
+from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.truth import NO_ROBOT
 
@@ -122,7 +122,7 @@ class LinkTable:
         measured: MeasuredLinks | None,
     ) -> None:
         """`measured` holds the links of the radio's trace; the caller keeps it up to date."""
-        self._context, self._measured = context, measured
+        self._context, self._line_of_sight, self._measured = context, LineOfSight.of(context), measured
         self.propagation, self._thresholds = propagation, thresholds
         rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 3))
@@ -132,8 +132,8 @@ class LinkTable:
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """Pairs of robots at `pose` (rows, 3)."""
         context = self._context
-        arenas = context.keys, context.running
-        return pairs_of(pose, context.size_m, *arenas, context.obstacles, self.propagation, self._measured)
+        arenas = context.size_m, context.keys, context.running, context.obstacles
+        return pairs_of(pose, *arenas, self.propagation, self._line_of_sight, self._measured)
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """Mean power in dBm of each pair, from a to b and from b to a, (k,) each."""
@@ -187,12 +187,8 @@ def _ranges(first: IntArray, counts: IntArray) -> IntArray:
     return np.repeat(first - before, counts) + np.arange(counts.sum())
 
 
-def _fates(disruption: Disruption, sender: IntArray, receiver: IntArray, blocked: IntArray) -> ByteArray:
+def _fates(disruption: Disruption, sender: IntArray, receiver: IntArray, blocked: BoolArray) -> ByteArray:
     """RECEIVED for open links, else the drop reason of each packet on them, (k,)."""
-    fate = np.full(len(sender), int(Fate.RECEIVED), np.uint8)
-    if disruption.anything:
-        fate[disruption.apart(sender, receiver)] = Fate.PARTITIONED
-        fate[~disruption.radio_on[receiver]] = Fate.BLACKOUT
-        fate[~disruption.alive[receiver]] = Fate.RECEIVER_DEAD
-    fate[blocked > 0] = Fate.BLOCKED
+    fate = np.where(blocked, np.uint8(Fate.BLOCKED), np.uint8(RECEIVED))
+    disruption.end(fate, sender, receiver)
     return fate

@@ -12,7 +12,6 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxStatuses
-from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -23,14 +22,14 @@ from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
-from swarmwire.comms.radio.phy.losses import NOT_TRACED, Losses, MeasuredLinks, losses_of
 from swarmwire.comms.radio.phy.packets import PacketTable, final_statuses, statuses_to_nowhere
+from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
 from swarmwire.comms.radio.phy.results import RECEIVED, ResultBuffer, result_buffer, take_rows
 from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, Table, idle_receptions, idle_robots
-from swarmwire.comms.radio.reception.bursts import BurstStates
 from swarmwire.comms.radio.stages.chain import chain_after_reception
+from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.truth import NO_ROBOT
@@ -125,19 +124,18 @@ class SinrPhy(RadioModel):
         self._context, self._radio = context, context.radio
         rows = len(context.keys) * context.robots
         self._params = phy_params_of(context.radio, context.robots)
-        self._measured = MeasuredLinks.of(context)
+        self._measured, self._losses = MeasuredLinks.of(context), LossChain.of(context)
         thresholds = thresholds_of(context.radio, self._params)
         self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured)
         self._jam, self._was_jammed = JammerTable(context), False
-        self._graph = RadioGraph(context, self._params, self._links, self._jam, self._measured)
+        self._graph = RadioGraph(context, self._params, self._links, self._jam, self._losses)
         self._reports = Reporter(context, self._links)
         self._admission = Admission(rows)
-        self._bursts = BurstStates(context.radio.bursts or Bursts(), context.keys, context.robots)
         self._events = event_queue(rows)
         self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
         self._packets = PacketTable()
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
-        self._now_ns = self._last_rows = 0
+        self._now_ns = self._hold_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
 
     @property
@@ -147,7 +145,7 @@ class SinrPhy(RadioModel):
 
     def hold(self, pose: FloatArray) -> None:
         """Robots are at `pose` (rows, 3) from now on."""
-        self._hold += 1
+        self._hold, self._hold_ns = self._hold + 1, self._now_ns
         # Poses of frames on air, and of packets that may still fail: their last attempt may be long ago.
         needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != IDLE)
         holds = set(self._robot["hold"][needed].tolist())
@@ -166,11 +164,11 @@ class SinrPhy(RadioModel):
     def tune(self, at_ns: int, radio: Radio) -> None:
         """Use the parameters of `radio` from `at_ns` on; chunks received until then count by the old ones."""
         self._refresh()
-        if radio.bursts is not None:
-            self._bursts.change(radio.bursts, at_ns)
+        context = replace(self._context, radio=radio)
         self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
+        self._losses.tune(context, at_ns)
         self._graph.tune(radio, self._params)
-        self._reports.tune(replace(self._context, radio=radio))
+        self._reports.tune(context)
         self._links.tune(self._propagation_params(), thresholds_of(radio, self._params))
         self._refresh()
 
@@ -187,7 +185,8 @@ class SinrPhy(RadioModel):
         parts: list[ResultBuffer] = []
         if len(self._packets) or self._events.size[0] or self._jam.anything:
             state, start = self._state(self._context.disruption, until_ns)
-            losses = self._losses()
+            pose, links = self._poses[self._hold], len(self._links.link)
+            losses = self._losses.losses(pose, self._hold_ns, self._now_ns, links)
             mac.order_queues(state, self._events, start)
             max_links = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
             buffer = result_buffer(
@@ -198,7 +197,6 @@ class SinrPhy(RadioModel):
                 done = mac.run_until(self._params, losses, state, self._events, buffer, max_links, until_ns)
                 parts.append(take_rows(buffer))
             self._last_rows = sum(len(part.packet) for part in parts)
-            self._bursts.count_added(losses.bursts)
         self._now_ns = until_ns
         return self._decided(parts, liveness)
 
@@ -225,7 +223,7 @@ class SinrPhy(RadioModel):
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
-        return self._graph.edges(pose, alive)
+        return self._graph.edges(pose, alive, self._hold_ns)
 
     def _propagation_params(self) -> PropagationParams:
         now = self._context.disruption
@@ -253,12 +251,6 @@ class SinrPhy(RadioModel):
             self._jam.between(self._now_ns, until_ns),
         )
         return state, start
-
-    def _losses(self) -> Losses:
-        if self._radio.bursts is not None:
-            self._bursts.make_room(self._now_ns, len(self._links.link))
-        traced = NOT_TRACED if self._measured is None else self._measured.traced
-        return losses_of(self._radio, traced, self._bursts)
 
     def _decided(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> Decided:
         """Packets and links of the result rows; packets that are done leave the queue."""

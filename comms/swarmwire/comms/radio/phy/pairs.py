@@ -2,7 +2,8 @@
 
 Power = transmit power + both antenna gains - path loss - shadowing - walls - bodies, and fading on top. All but the
 sender's power and the gains set by events is the same in both directions and depends on poses alone, so each pair is
-computed once. A pair is left out if path loss alone, or everything but fading, leaves it below the cut-off.
+computed once. A pair is left out if path loss alone, or everything but fading, leaves it below the cut-off. Measured
+strengths replace modelled ones.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,16 +15,17 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
+from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import kernel, njit
-from swarmwire.comms.radio.phy.losses import MeasuredLinks
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
 from swarmwire.comms.radio.propagation.fading import gain_of
 from swarmwire.comms.radio.propagation.obstruction import bodies_between, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.propagation.shadowing import SUMS
-from swarmwire.comms.radio.unit_disk.neighbours import CELL_SLACK, strip
+from swarmwire.comms.radio.stages.blocking import LineOfSight
+from swarmwire.comms.radio.stages.stage import ChannelContext
+from swarmwire.comms.radio.traces import LinkTraces
 
 
 class Pairs(NamedTuple):
@@ -34,7 +36,7 @@ class Pairs(NamedTuple):
     loss_db: FloatArray  # (k,) from a to b, without antenna gains and fading
     reverse_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
     gain: FloatArray  # (k,) power gain of fading, a ratio
-    blocked: IntArray  # (k,) 1 where an obstacle blocks a required line of sight
+    blocked: BoolArray  # (k,) whether an obstacle blocks a required line of sight
 
 
 def pairs_of(
@@ -44,7 +46,8 @@ def pairs_of(
     running: BoolArray,
     obstacles: Obstacles,
     propagation: PropagationParams,
-    measured: MeasuredLinks | None = None,
+    line_of_sight: LineOfSight | None = None,
+    measured: "MeasuredLinks | None" = None,
 ) -> Pairs:
     """All pairs above the cut-off of robots at `pose` (rows, 3), and all pairs of measured strength.
 
@@ -52,37 +55,34 @@ def pairs_of(
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
-    cells = robot_index.build(x, y, len(keys), size_m, propagation.reach_m * CELL_SLACK, running)
+    cells = robot_index.build(x, y, len(keys), size_m, propagation.reach_m * robot_index.SLACK, running)
     a, b, loss = _near(x, y, robots, cells, propagation)
     if propagation.shadows:
         _add_shadows(loss, x, y, robots, cells.order, propagation.field, propagation.amplitude_db, a, b)
     if propagation.walls:
         _add_walls(loss, x, y, robots, obstacles, propagation.crossing_db, propagation.inside_db_per_m, a, b)
     if propagation.bodies:
-        _add_bodies(
-            loss, x, y, robots, cells, propagation.radius_m, propagation.max_radius_m, propagation.body_db, a, b
-        )
+        loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, cells, robots, a, b)
     kept = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
     a, b, loss = a[:kept], b[:kept], loss[:kept]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
-    gain, blocked = np.ones(len(a)), np.zeros(len(a), np.int64)
+    gain = np.ones(len(a))
     if propagation.fades:
         _fade(gain, x, y, robots, keys, cells.order, propagation.scatter, propagation.fading_model, a, b)
-    if propagation.line_of_sight:
-        _find_blocked(blocked, x, y, robots, obstacles, a, b)
+    blocked = np.zeros(len(a), np.bool_) if line_of_sight is None else line_of_sight.blocked(pose, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
     return pairs if measured is None else _measured(pairs, measured)
 
 
-def _measured(pairs: Pairs, measured: MeasuredLinks) -> Pairs:
+def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
     """The pairs with measured losses in place of modelled ones, per direction; these include any blocking."""
-    a, b, blocked = pairs.a, pairs.b, pairs.blocked > 0
+    a, b, blocked = pairs.a, pairs.b, pairs.blocked
     forward_db, forward_measured = measured.loss_db(a, b, pairs.loss_db)
     reverse_db, reverse_measured = measured.loss_db(b, a, pairs.loss_db)
     forward_db[blocked & reverse_measured & ~forward_measured] = np.inf
     reverse_db[blocked & forward_measured & ~reverse_measured] = np.inf
-    still_blocked = np.where(forward_measured | reverse_measured, 0, pairs.blocked)
+    still_blocked = blocked & ~(forward_measured | reverse_measured)
     return pairs._replace(loss_db=forward_db, reverse_db=reverse_db, blocked=still_blocked)
 
 
@@ -109,7 +109,7 @@ def _look_ahead(ahead, x, y, robots, cells):
     for at in range(len(cells.order)):
         s = cells.order[at]
         for j in range(2):
-            first, stop = strip(x[s], y[s], s // robots, cells, j)
+            first, stop = robot_index.strip(x[s], y[s], s // robots, cells, j)
             first = at + 1 if j == 0 else first
             ahead[at, j, 0], ahead[at, j, 1] = first, stop
             capacity += stop - first
@@ -165,12 +165,6 @@ def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b
         loss[i] += wall_loss_db(obstacles, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
 
 
-@njit()
-def _add_bodies(loss, x, y, robots, cells, radius_m, max_radius_m, body_db, a, b):
-    for i in range(len(a)):
-        loss[i] += body_db * bodies_between(x, y, radius_m, max_radius_m, cells, robots, a[i], b[i])
-
-
 @kernel(from_python=True)
 def _above(min_dbm, send_dbm, receive_dbi, a, b, loss):
     """Move pairs of at least `min_dbm` in either direction to the front and return their number."""
@@ -208,8 +202,66 @@ def _gains(gain, x, y, at, number, fading_model, a, b, real, imaginary):
         gain[i] = gain_of(fading_model, h, math.sqrt(dx * dx + dy * dy))
 
 
-@njit()
-def _find_blocked(blocked, x, y, robots, obstacles, a, b):
-    for i in range(len(a)):
-        s, r = a[i], b[i]
-        blocked[i] = is_blocked(obstacles, s // robots, x[s], y[s], x[r], y[r])
+class MeasuredLinks:
+    """Measured strength of each directed link at one time, in place of the modelled one; the same in all arenas."""
+
+    def __init__(
+        self, traces: LinkTraces, others: str, robots: int, arenas: int, send_dbm: FloatArray, receive_dbi: FloatArray
+    ) -> None:
+        """`others` is the radio's `trace.others`; `robots` stand in each arena.
+
+        `send_dbm` and `receive_dbi` (robots,) are the antenna values during the measurement: gains that events change
+        count on top.
+        """
+        self._send_dbm, self._receive_dbi = send_dbm, receive_dbi
+        self._traces, self._others_end = traces, others == "none"
+        self._robots, self._arenas = robots, arenas
+        self._link = np.unique(np.concatenate([np.empty(0, np.int64), *(trace.link for trace in traces.all)]))
+        self.move_to(0)
+
+    @classmethod
+    def of(cls, context: ChannelContext) -> "MeasuredLinks | None":
+        """The links of the radio's trace; None without a trace."""
+        if context.traces is None or context.radio.trace is None:
+            return None
+        antennas, antenna = context.antennas, context.radio.antenna_or_default
+        antenna_values = antennas.send_dbm(antenna), antennas.receive_dbi(antenna)
+        return cls(context.traces, context.radio.trace.others, context.robots, len(context.keys), *antenna_values)
+
+    def move_to(self, now_ns: int) -> None:
+        """Look up the values at `now_ns`."""
+        sender, receiver = np.divmod(self._link, self._robots)
+        at_ns = np.full(len(sender), now_ns)
+        unknown = np.full(len(sender), np.nan)
+        strength = self._traces.rssi_dbm
+        self._rssi_dbm = unknown if strength is None else strength.at(sender, receiver, at_ns)
+        self._known = self._traces.known(sender, receiver, at_ns)
+
+    def with_unlisted(self, a: IntArray, b: IntArray, loss_db: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Pairs of robot rows a < b (k,), then missing pairs of measured strength, with loss inf."""
+        rows = self._robots * self._arenas
+        one, other = np.divmod(self._link[~np.isnan(self._rssi_dbm)], self._robots)
+        first = self._robots * np.arange(self._arenas)[:, None]
+        known = ((first + np.minimum(one, other)) * rows + first + np.maximum(one, other)).ravel()
+        more_a, more_b = np.divmod(np.setdiff1d(known, a * rows + b), rows)
+        a, b = np.concatenate([a, more_a]), np.concatenate([b, more_b])
+        return a, b, np.concatenate([loss_db, np.full(len(more_a), np.inf)])
+
+    def loss_db(self, sender: IntArray, receiver: IntArray, modelled_db: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Loss of links between robot rows, (k,), and whether it was measured; else `modelled_db`."""
+        budget_db = self._send_dbm[sender % self._robots] + self._receive_dbi[receiver % self._robots]
+        rssi_dbm = self._of(self._rssi_dbm, np.nan, sender, receiver)
+        is_measured = ~np.isnan(rssi_dbm)
+        loss = np.where(is_measured, budget_db - rssi_dbm, modelled_db)
+        if self._others_end:
+            loss[~self._of(self._known, False, sender, receiver)] = np.inf
+        return loss, is_measured
+
+    def _of(self, values, missing, sender: IntArray, receiver: IntArray):
+        """Values of the links between robot rows, (k,); `missing` for links that were never measured."""
+        robots = self._robots
+        link = sender % robots * robots + receiver % robots
+        if not len(self._link):
+            return np.full(len(link), missing)
+        place = np.minimum(np.searchsorted(self._link, link), len(self._link) - 1)
+        return np.where(self._link[place] == link, values[place], missing)

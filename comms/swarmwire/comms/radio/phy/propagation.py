@@ -81,7 +81,6 @@ class PropagationParams(NamedTuple):
     bodies: bool
     body_db: float
     radius_m: FloatArray  # (rows,)
-    max_radius_m: float
     fades: bool
     fading_model: FadingModel
     scatter: FloatArray  # (arenas, 5, n), see `scatter_waves`
@@ -90,7 +89,7 @@ class PropagationParams(NamedTuple):
 def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationParams:
     """Parameters of the links of `radio`, which may be tuned, under the active disruption."""
     send_dbm, receive_dbi = _antennas_of(radio, context)
-    keys, radius_m = context.keys, context.radius_m
+    keys = context.keys
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve = radio.loss_model.curve(radio.frequency_hz)
     model = fading_model(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
@@ -113,8 +112,7 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
         line_of_sight=radio.needs_line_of_sight,
         bodies=bodies is not None,
         body_db=(bodies or Bodies()).crossing_db,
-        radius_m=radius_m,
-        max_radius_m=float(radius_m.max()),
+        radius_m=context.radius_m,
         fades=fading is not None,
         fading_model=model,
         scatter=np.array([scatter_waves(key, model.wave_number) for key in keys]),

@@ -19,10 +19,11 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
-from swarmwire.comms.radio.phy.losses import has_no_loss, loss_fate
 from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, DATA, RECEIVING, SILENT, TURNAROUND
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
+from swarmwire.comms.radio.stages.loss import Frame
+from swarmwire.comms.radio.stages.losses import frame_fate
 from swarmwire.comms.truth import NO_ROBOT
 
 MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
@@ -99,8 +100,8 @@ def fate_of_frame(params, losses, state, s, i, log_right):
             return JAMMED
         alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits))
         return COLLIDED if u < alone else TOO_WEAK
-    link = s * np.int64(len(state.robot)) + receiver
-    return loss_fate(losses, key, params.robots, link, a, b, sequence, attempt, is_ack, radio.on_air_ns)
+    frame = Frame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.hold_ns)
+    return frame_fate(losses, frame)
 
 
 @kernel()
@@ -183,7 +184,7 @@ def end_frame(params, losses, state, events, s, now_ns):
         radio.on_air = SILENT
         return
     # Only noise can corrupt the frame.
-    is_sure = has_no_loss(losses) and radio.on_air == DATA
+    is_sure = len(losses.order) == 0 and radio.on_air == DATA
     first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
     for i in range(first, weak):
         if link[i].fate != RECEIVED:

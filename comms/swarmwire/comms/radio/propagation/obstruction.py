@@ -8,6 +8,8 @@ radio that any obstacle blocks uses `line_of_sight` instead.
 
 import math
 
+import numpy as np
+
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.kernels import njit
 
@@ -80,13 +82,20 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
 
 
 @njit()
-def bodies_between(x, y, radius_m, max_radius_m, cells, robots, a, b):
-    """Number of other robots with their disc on the line between rows a and b; equal both ways.
+def bodies_between(x, y, radius_m, cells, robots, a, b):
+    """Number of other robots, dead or alive, with their disc on each line between rows a and b, (k,); equal both ways.
 
-    `x`, `y`, `radius_m` (rows,) in m; `max_radius_m` is the greatest radius; `cells` is an index of
-    `robot_index.build` with `robots` in each arena. The cost grows with the cells in the line's bounding box.
+    `x`, `y`, `radius_m` (rows,) in m; `cells` is an index of `robot_index.build` with `robots` in each arena. The cost
+    grows with the cells in the line's bounding box.
     """
-    a, b = min(a, b), max(a, b)
+    counts, max_radius_m = np.empty(len(a), np.int64), radius_m.max()
+    for i in range(len(a)):
+        counts[i] = _bodies_on_line(x, y, radius_m, max_radius_m, cells, robots, min(a[i], b[i]), max(a[i], b[i]))
+    return counts
+
+
+@njit()
+def _bodies_on_line(x, y, radius_m, max_radius_m, cells, robots, a, b):
     left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
     right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
     first_row = (a // robots) * cells.ny

@@ -7,12 +7,12 @@ Disruption ends links to dead robots, to radios that are off, and across partiti
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
@@ -24,7 +24,7 @@ class LineOfSight(Stage):
     keys = ("line_of_sight",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
+    def of(cls, context: ChannelContext) -> "LineOfSight | None":
         """The stage, where the radio needs a line of sight and there are obstacles."""
         any_obstacle = len(context.obstacles.circle) or len(context.obstacles.polygon)
         return LineOfSight(context) if context.radio.needs_line_of_sight and any_obstacle else None
@@ -34,26 +34,26 @@ class LineOfSight(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Blocked links end, and were not in range."""
-        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
+        ends = self.blocked(pose, links.sender, links.receiver)
         links.fate[ends] = Fate.BLOCKED
         links.in_range[ends] = 0
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
         """0 where blocked, else 1."""
-        ends = blocked(self._obstacles, self._robots, self._wrap_m, pose, links.sender, links.receiver, links.fate)
-        return (~ends).astype(np.float64)
+        return (~self.blocked(pose, links.sender, links.receiver)).astype(np.float64)
+
+    def blocked(self, pose: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
+        """Whether an obstacle blocks the line between robot rows, (k,)."""
+        return _blocked(self._obstacles, self._robots, self._wrap_m, pose, a, b)
 
 
 @njit()
-def blocked(obstacles, robots, wrap_m, pose, sender, receiver, fate):
-    """Whether an obstacle blocks each link under way, (k,)."""
+def _blocked(obstacles, robots, wrap_m, pose, sender, receiver):
     ends = np.zeros(len(sender), np.bool_)
     wraps = wrap_m[0] > 0.0
     for i in range(len(ends)):
         # From the lower row to the higher: both directions of a link then agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        if fate[i] != RECEIVED:
-            continue
         ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
         if wraps:
             ends[i] = is_blocked_on(obstacles, a // robots, ax, ay, bx, by, *wrap_m)
@@ -94,21 +94,7 @@ class BodiesBlock(Stage):
     def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
         x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
         cells = robot_index.build(x, y, len(self._running), self._size_m, self._range_m, self._running)
-        return behind_bodies(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver, links.fate)
-
-
-@njit()
-def behind_bodies(x, y, radius_m, cells, robots, sender, receiver, fate):
-    """Whether a robot is between the ends of each link under way, (k,); equal both ways.
-
-    `x`, `y`, `radius_m` (rows,) in m; `cells` is an index of `robot_index.build` with `robots` in each arena.
-    """
-    ends = np.zeros(len(sender), np.bool_)
-    max_radius_m = radius_m.max()
-    for i in range(len(ends)):
-        if fate[i] == RECEIVED:
-            ends[i] = bodies_between(x, y, radius_m, max_radius_m, cells, robots, sender[i], receiver[i]) > 0
-    return ends
+        return bodies_between(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver) > 0
 
 
 class Disrupted(Stage):
@@ -126,17 +112,8 @@ class Disrupted(Stage):
         self._disruption = context.disruption
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """RECEIVER_DEAD before BLACKOUT before PARTITIONED; senders that are dead or off end at their queue."""
-        disruption, receiver = self._disruption, links.receiver
-        if not disruption.anything:
-            return
-        under_way = links.fate == RECEIVED
-        for ends, fate in (
-            (disruption.apart(links.sender, receiver), Fate.PARTITIONED),
-            (~disruption.radio_on[receiver], Fate.BLACKOUT),
-            (~disruption.alive[receiver], Fate.RECEIVER_DEAD),
-        ):
-            links.fate[under_way & ends] = fate
+        """End links by `Disruption.end`."""
+        self._disruption.end(links.fate, links.sender, links.receiver)
 
     @property
     def lets_all_pass(self) -> bool:

@@ -1,157 +1,189 @@
-"""Stages that lose packets, independently for each receiver: fixed loss, burst loss and trace replay."""
+"""All loss models, and the compiled dispatcher by which both radio models call their kernels."""
 
 # pyright: basic, reportUnknownMemberType=false
 
+import math
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.links import RECEIVED, Links
-from swarmwire.comms.radio.reception.bursts import BurstStates
+from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.kernels import kernel
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
+from swarmwire.comms.radio.stages.burst_loss import BurstLoss
+from swarmwire.comms.radio.stages.fixed_loss import FixedLoss
+from swarmwire.comms.radio.stages.loss import Frame, LossModel
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
-from swarmwire.comms.radio.traces import LinkTrace
+from swarmwire.comms.radio.stages.trace import TraceLoss
 
-LOSS, TRACE = purpose("fixed loss"), purpose("trace")
+# The order of the tests in a unit disk; a PHY tests those that remember last.
+LOSS_MODELS: tuple[type[LossModel], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
 
-class FixedLoss(Stage):
-    """A Bernoulli trial with probability `loss` for each packet and receiver."""
+NO_HOLD = -1
 
-    name = "fixed_loss"
-    keys = ("loss",)
+
+class Losses(NamedTuple):
+    """The losses of a radio as input of kernels."""
+
+    order: IntArray  # places in LOSS_MODELS of the losses that the radio has, in the order of the tests
+    hold_ns: int  # time of the current poses, see `Frame`; NO_HOLD in a unit disk
+    params: tuple[Any, ...]  # of each of LOSS_MODELS
+
+
+@kernel()
+def frame_fate(losses, frame):
+    """The fate of a frame that was received without errors: RECEIVED, or that of the first loss that ends it."""
+    for i in range(len(losses.order)):
+        fate = _fate_by(losses.order[i], losses.params, frame)
+        if fate != RECEIVED:
+            return fate
+    return RECEIVED
+
+
+def _dispatcher(models: tuple[type[LossModel], ...]) -> Any:
+    """The kernel that calls the kernel of the loss model at a place: one case after the other, unrolled."""
+    *others, last = models
+    case, at = last.kernel, len(others)
+    if not others:
+
+        @kernel(cache=False)  # its callers are cached, with all that they call
+        def fate_by(place, params, frame):  # noqa: ARG001 - the only place
+            return case(params[at], frame)
+
+        return fate_by
+    otherwise = _dispatcher(tuple(others))
+
+    @kernel(cache=False)
+    def fate_by_one(place, params, frame):
+        if place == at:
+            return case(params[at], frame)
+        return otherwise(place, params, frame)
+
+    return fate_by_one
+
+
+_fate_by = _dispatcher(LOSS_MODELS)
+
+
+class LossChain:
+    """The losses that a radio has: `models`, in the order of LOSS_MODELS."""
+
+    def __init__(self, models: list[LossModel]) -> None:
+        self.models = models
+
+    @classmethod
+    def of(cls, context: ChannelContext) -> "LossChain":
+        """The losses of this medium."""
+        models = (kind.of(context) for kind in LOSS_MODELS)
+        return LossChain([model for model in models if model is not None])
+
+    def tune(self, context: ChannelContext, at_ns: int) -> None:
+        """Use the radio parameters of `context` from `at_ns` on; losses keep their state."""
+        previous, self.models = {type(model): model for model in self.models}, LossChain.of(context).models
+        for model in self.models:
+            if type(model) in previous:
+                model.go_on_from(previous[type(model)], at_ns)
+
+    def losses(self, pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
+        """Input of `frame_fate` in a PHY, for frames at `from_ns` or later on at most so many links.
+
+        The robots have been at `pose` (rows, 3) since `hold_ns`. Losses that remember come last: they see no frame that
+        another loss ends.
+        """
+        models = sorted(self.models, key=lambda model: model.remembers)
+        return _losses_of(models, pose, hold_ns, from_ns, links)
+
+    def decide(self, links: Links, pose: FloatArray, keys: KeyArray, count_only: bool) -> None:
+        """Set the fates of links of a unit disk that a loss ends; in place.
+
+        With `count_only`, losses that remember are left out. `keys` (arenas,) are those of the arenas.
+        """
+        models = [model for model in self.models if not (count_only and model.remembers)]
+        if not models or not len(links.fate):
+            return
+        index = np.empty(0, np.int64)
+        if any(model.remembers for model in models):  # frames of a link are tested in the order of time
+            index = np.argsort(links.final_at_ns, kind="stable")
+        losses = _losses_of(models, pose, NO_HOLD, int(links.final_at_ns.min()), len(links.fate))
+        columns = links.sender, links.receiver, links.sequence, links.final_at_ns, links.fate, links.in_range
+        _decide(losses, keys, len(pose) // len(keys), index, *columns)
+
+    @property
+    def passing(self) -> float:
+        """Long-run share of frames that pass all losses on every link; those that vary by link come on top."""
+        return math.prod((model.passing for model in self.models), start=1.0)
+
+    @property
+    def varies(self) -> bool:
+        """Whether `delivery` depends on the link."""
+        return any(model.varies for model in self.models)
+
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray | float:
+        """Probability that a frame passes beside `passing`, by link between robot rows, (k,)."""
+        share: FloatArray | float = 1.0
+        for model in self.models:
+            share = share * model.delivery(sender, receiver, pose, at_ns)
+        return share
+
+
+def _losses_of(models: list[LossModel], pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
+    params = {type(model): model.params(pose, from_ns, links) for model in models}
+    order = np.array([LOSS_MODELS.index(kind) for kind in params], np.int64)
+    return Losses(order, hold_ns, tuple(params.get(kind, kind.no_params) for kind in LOSS_MODELS))
+
+
+@kernel(from_python=True)
+def _decide(losses, keys, robots, index, sender, receiver, sequence, at_ns, fate, in_range):
+    """Set the fates of links under way, one loss after the other, in the order of `index` (k,), if it is not empty.
+
+    A lost frame was in range, unless it is OUT_OF_RANGE.
+    """
+    for k in range(len(losses.order)):
+        place = losses.order[k]
+        for n in range(len(fate)):
+            i = index[n] if len(index) > 0 else n
+            if fate[i] == RECEIVED:
+                a, b, now_ns = sender[i], receiver[i], at_ns[i]
+                frame = Frame(keys[a // robots], a, b, a % robots, b % robots, sequence[i], 0, False, now_ns, now_ns)
+                end = _fate_by(place, losses.params, frame)
+                fate[i] = end
+                in_range[i] *= end != OUT_OF_RANGE
+
+
+class LossStage(Stage):
+    """All losses as a stage of the unit disk."""
+
+    name = "losses"
+    keys = tuple(key for kind in LOSS_MODELS for key in kind.keys)
 
     @classmethod
     def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio loses anything."""
-        return FixedLoss(context) if context.radio.loss > 0.0 else None
+        """The stage, where the radio has any loss."""
+        losses = LossChain.of(context)
+        return LossStage(context, losses) if losses.models else None
 
-    def __init__(self, context: ChannelContext) -> None:
-        self._loss, self._keys, self._robots = context.radio.loss, context.keys, context.robots
-
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Lost links end; they were in range."""
-        ends = lost(self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, self._loss)
-        links.fate[ends] = Fate.LOST
-
-    def delivery(self, links: Links, pose: FloatArray) -> float:
-        """1 - loss."""
-        return 1.0 - self._loss
-
-
-@njit()
-def lost(keys, robots, sender, receiver, sequence, fate, loss):
-    """Whether each link under way is lost: u < loss, u keyed by (sender, receiver, sequence), (k,)."""
-    ends = np.zeros(len(sender), np.bool_)
-    for i in range(len(ends)):
-        if fate[i] == RECEIVED:
-            key = keys[sender[i] // robots]
-            ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], LOSS) < loss
-    return ends
-
-
-class BurstLoss(Stage):
-    """The Gilbert-Elliott chain for each directed link, in continuous time."""
-
-    name = "burst_loss"
-    keys = ("bursts",)
-
-    @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where a unit disk has bursts; in a PHY they are part of reception."""
-        return BurstLoss(context) if context.radio.bursts is not None and not context.radio.is_phy else None
-
-    remembers = True
-
-    def __init__(self, context: ChannelContext) -> None:
-        assert context.radio.bursts is not None
-        self._bursts, self._loss = context.radio.bursts, context.radio.bursts.loss
-        self._states = BurstStates(context.radio.bursts, context.keys, context.robots)
+    def __init__(self, context: ChannelContext, losses: LossChain) -> None:
+        self._context, self._losses = context, losses
 
     def go_on_from(self, previous: Stage, at_ns: int) -> None:
-        """Keep the state of all links."""
-        assert isinstance(previous, BurstLoss)
-        previous._states.change(self._bursts, at_ns)
-        self._states = previous._states
+        """Losses keep their state."""
+        assert isinstance(previous, LossStage)
+        previous._losses.tune(self._context, at_ns)
+        self._losses = previous._losses
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """End links lost in a burst; they were in range. Packets of a link are handled in the order of time."""
-        index = np.flatnonzero(links.fate == RECEIVED)
-        index = index[np.argsort(links.final_at_ns[index], kind="stable")]
-        sender, receiver, at_ns = links.sender[index], links.receiver[index], links.final_at_ns[index]
-        ends = self._states.lost(sender, receiver, links.sequence[index], at_ns)
-        links.fate[index[ends]] = Fate.BURST
+        """Lost links end."""
+        self._losses.decide(links, pose, self._context.keys, count_only=False)
 
-    def delivery(self, links: Links, pose: FloatArray) -> float:
-        """1 - loss, in the long run."""
-        return 1.0 - self._loss
+    def count_in_range(self, links: Links, pose: FloatArray) -> None:
+        """As `decide`, for packets that never go on air: the state of links stays."""
+        self._losses.decide(links, pose, self._context.keys, count_only=True)
 
-
-class TraceReplay(Stage):
-    """A Bernoulli trial with the measured delivery ratio for each packet and receiver, then the measured delay.
-
-    Values are those at the end of the airtime. Links without values are out of range, unless `others` is "model".
-    """
-
-    name = "trace"
-    keys = ("trace",)
-
-    @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has a trace; in a PHY it applies the delays alone."""
-        return None if context.traces is None else TraceReplay(context)
-
-    def __init__(self, context: ChannelContext) -> None:
-        assert context.traces is not None
-        assert context.radio.trace is not None
-        self._traces, self._keys, self._robots = context.traces, context.keys, context.robots
-        self._others_end = context.radio.trace.others == "none"
-        self._only_delays = context.radio.is_phy
-
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """End links that are lost or without measurement; received ones become final later."""
-        sender, receiver = links.sender % self._robots, links.receiver % self._robots
-        if not self._only_delays:
-            self._end(links, sender, receiver)
-        if self._traces.delay_s is not None:
-            delay_s = np.nan_to_num(self._traces.delay_s.at(sender, receiver, links.final_at_ns))
-            delays_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
-            np.add(links.final_at_ns, delays_ns.astype(np.int64), out=links.final_at_ns)
-
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """The ratio of the worse direction at the time of the links."""
-        a, b = links.sender % self._robots, links.receiver % self._robots
-        return np.minimum(self._ratio(a, b, links.final_at_ns), self._ratio(b, a, links.final_at_ns))
-
-    def _end(self, links: Links, sender: IntArray, receiver: IntArray) -> None:
-        under_way, at_ns = links.fate == RECEIVED, links.final_at_ns
-        if self._others_end:
-            ends = under_way & ~self._traces.known(sender, receiver, at_ns)
-            links.fate[ends] = Fate.OUT_OF_RANGE
-            links.in_range[ends] = 0
-        ratio = _measured(self._traces.delivery_ratio, sender, receiver, at_ns)
-        ends = trace_lost(self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, ratio)
-        links.fate[ends] = Fate.LOST
-
-    def _ratio(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
-        ratio = _measured(self._traces.delivery_ratio, sender, receiver, at_ns)
-        return ratio * self._traces.known(sender, receiver, at_ns) if self._others_end else ratio
-
-
-def _measured(trace: LinkTrace | None, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
-    """The delivery ratio, (k,); 1 where none was measured."""
-    return np.ones(len(sender)) if trace is None else np.nan_to_num(trace.at(sender, receiver, at_ns), nan=1.0)
-
-
-@njit()
-def trace_lost(keys, robots, sender, receiver, sequence, fate, ratio):
-    """Whether each link under way is lost: u >= ratio, u keyed by (sender, receiver, sequence), (k,)."""
-    ends = np.zeros(len(sender), np.bool_)
-    for i in range(len(ends)):
-        if fate[i] == RECEIVED and ratio[i] < 1.0:
-            key = keys[sender[i] // robots]
-            ends[i] = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], TRACE) >= ratio[i]
-    return ends
+    def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
+        """The probability of the worse direction."""
+        losses, at_ns = self._losses, int(links.final_at_ns.max(initial=0))
+        if not losses.varies:
+            return losses.passing
+        forward = losses.delivery(links.sender, links.receiver, pose, at_ns)
+        return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, pose, at_ns))

@@ -36,11 +36,10 @@ class ChannelContext:
 
 
 class Stage(ABC):
-    """One step of a packet on its way from the sender's radio to one receiver."""
+    """One step of a packet on its way from the sender's radio to one receiver; for a loss see `LossModel`."""
 
     name: ClassVar[str]  # as in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
-    remembers = False  # whether it has state, so that it must not see packets that never go on air
 
     @classmethod
     @abstractmethod
@@ -54,6 +53,10 @@ class Stage(ABC):
         Only links with fate RECEIVED are still under way. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in m,
         heading in rad. A stage before reception that ends a link also sets its `in_range` to 0.
         """
+
+    def count_in_range(self, links: Links, pose: FloatArray) -> None:
+        """As `decide`, for packets that never go on air: only `in_range` counts, and no state changes."""
+        self.decide(links, pose)
 
     def go_on_from(self, previous: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages have no state
         """Take over the state of the same stage with the radio parameters valid until `at_ns`."""

@@ -12,6 +12,7 @@ from swarmwire.comms.packets import BROADCAST, Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.graph import edges
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.model import Decided, RadioModel
 from swarmwire.comms.radio.stages.chain import chain
@@ -20,8 +21,6 @@ from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import Reach, links_in_reach, pairs_in_reach, reach, reach_on_torus
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
 
-# Tolerance: 1 - 0.9 is slightly below 0.1 in floating point.
-ROUNDING = 1e-9
 NEVER_NS = 2**63 - 1
 
 
@@ -38,7 +37,7 @@ class Channel:
 
     def tune(self, at_ns: int, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
-        previous = {type(stage): stage for stage in self._stages if stage.remembers}
+        previous = {type(stage): stage for stage in self._stages}
         self._radio, self._stages, self._neighbours_pose = context.radio, chain(context), None
         for stage in self._stages:
             if type(stage) in previous:
@@ -73,8 +72,7 @@ class Channel:
         zero = np.zeros(len(packets.sender), np.int64)
         links = Links.with_the_rest(packets, packet, receiver, zero, self._columns).first(len(packet))
         for stage in self._stages:
-            if not stage.remembers:
-                stage.decide(links, pose)
+            stage.count_in_range(links, pose)
         reachable = zero.copy()
         np.add.at(reachable, links.packet, links.in_range)
         return reachable
@@ -91,8 +89,7 @@ class Channel:
         probability = np.ones(len(pair))
         for stage in stages:
             probability *= stage.delivery(links, pose)
-        joined = probability >= self._radio.min_delivery - ROUNDING
-        return pair if joined.all() else pair[joined]
+        return edges(pair, probability, self._radio.min_delivery)
 
     def _reach(self, pose: FloatArray) -> Reach:
         """The robots in range of each other, cached by pose: a tick's poses serve its packets and its radio graph."""

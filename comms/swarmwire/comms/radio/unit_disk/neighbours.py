@@ -12,11 +12,9 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST
 
-# Two robots exactly `range_m` apart must not fall two cells apart by rounding.
-CELL_SLACK = 1.0 + 1e-9
 # Cells in a row that cover the range on a torus: the last cell at a seam may be cut, so that two cells count as one.
 CELLS = 5
 
@@ -34,7 +32,7 @@ def reach(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], ran
     Arenas that are not `running` (arenas,) have none.
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = robot_index.build(x, y, len(running), size_m, range_m * CELL_SLACK, running)
+    cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
     return Reach(*_within(x, y, len(x) // len(running), cells, range_m))
 
 
@@ -119,24 +117,10 @@ def _strips(x, y, robots, cells):
     return first, stop
 
 
-@kernel()
-def strip(x, y, arena, cells, row):
-    """First and stop in grid order of the three adjacent cells `row` rows above (x, y) in m.
-
-    `cells` is an index of `robot_index.build`; cells beyond its edge are empty.
-    """
-    i = robot_index.cell_of(x, cells.left_m, cells.cell_m, cells.nx)
-    j = robot_index.cell_of(y, cells.bottom_m, cells.cell_m, cells.ny) + row
-    if j < 0 or j >= cells.ny:
-        return 0, 0
-    left = (arena * cells.ny + j) * cells.nx
-    return cells.start[left + max(i - 1, 0)], cells.start[left + min(i + 1, cells.nx - 1) + 1]
-
-
 def reach_on_torus(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Reach:
     """As `reach`, where opposite sides of each arena meet: shortest distances count."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = robot_index.build(x, y, len(running), size_m, range_m * CELL_SLACK, running)
+    cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
     return Reach(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
 
 

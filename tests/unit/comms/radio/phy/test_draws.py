@@ -13,7 +13,6 @@ import pytest
 from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.phy.losses import passing_share
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
 from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
@@ -226,12 +225,6 @@ def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
     fates = run(make_medium(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
     assert set(fates) == {"RECEIVED", "BURST"}
     assert min(fates.values()) > 50
-
-
-def test_losses_of_all_kinds_leave_a_share():
-    radio = replace(with_access("none"), loss=0.25)
-    assert passing_share(radio) == 0.75
-    assert passing_share(replace(radio, bursts=Bursts(0.1, 0.2))) == 0.75 * (1.0 - Bursts(0.1, 0.2).loss) < 0.75
 
 
 def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():

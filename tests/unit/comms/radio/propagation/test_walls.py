@@ -104,9 +104,8 @@ def test_bodies_on_the_line_are_counted_but_not_its_ends():
     cells = robot_index.build(x, y, 1, (10.0, 10.0), 5.0)
     radius_m = np.full(6, 0.1)
     # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
-    assert bodies_between(x, y, radius_m, 0.1, cells, 6, 0, 3) == 2
-    assert bodies_between(x, y, radius_m, 0.1, cells, 6, 3, 0) == 2
-    assert bodies_between(x, y, radius_m, 0.1, cells, 6, 0, 1) == 0
+    a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
+    assert bodies_between(x, y, radius_m, cells, 6, a, b).tolist() == [2, 2, 0]
 
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
@@ -116,13 +115,12 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
     x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
     radius_m = places.uniform(0.05, 0.4, arenas * robots)
     cells = robot_index.build(x, y, arenas, (10.0, 10.0), cell_m)
-    total = 0
-    for a, b in places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)):
+    pairs, expected = places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)), []
+    for a, b in pairs:
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]
-        expected = sum(is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]) for k in others)
-        assert bodies_between(x, y, radius_m, radius_m.max(), cells, robots, a, b) == expected
-        total += expected
-    assert total > 100
+        expected.append(sum(is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]) for k in others))
+    assert bodies_between(x, y, radius_m, cells, robots, *pairs.T.copy()).tolist() == expected
+    assert sum(expected) > 100
 
 
 @given(PLACES, PLACES, PLACES, PLACES, PLACES, PLACES, st.floats(0.05, 2.0))

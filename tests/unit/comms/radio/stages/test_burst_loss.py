@@ -13,7 +13,8 @@ from scipy import stats
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
-from swarmwire.comms.radio.reception.bursts import MIN_CAPACITY, BurstStates, bad_after
+from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
+from tests.support.comms.radio.bursts import BurstLinks
 
 KEYS = np.array([derive_key("bursts", arena) for arena in range(2)], np.uint64)
 ROBOTS = 20
@@ -26,7 +27,7 @@ RATES = st.floats(1e-3, 1e3)
 
 def losses(bursts: Bursts, interval_s: float, packets: int, keys: np.ndarray = KEYS[:1]) -> np.ndarray:
     """Which packets of each of LINKS links are lost, (links, packets), sent every `interval_s`."""
-    states = BurstStates(bursts, keys, ROBOTS)
+    states = BurstLinks(bursts, keys, ROBOTS)
     sender, receiver = np.arange(LINKS) // ROBOTS, np.arange(LINKS) % ROBOTS
     told = [
         states.lost(sender, receiver, np.full(LINKS, n), np.full(LINKS, round(n * interval_s * NS_PER_S)))
@@ -154,8 +155,8 @@ def packets(seed: int, count: int) -> tuple[np.ndarray, ...]:
 def test_batches_do_not_change_fates(batch: int):
     table = packets(1, 2000)
     bursts = Bursts(0.8, 0.8, 0.9, 0.1)
-    whole = BurstStates(bursts, KEYS, ROBOTS).lost(*table)
-    states = BurstStates(bursts, KEYS, ROBOTS)
+    whole = BurstLinks(bursts, KEYS, ROBOTS).lost(*table)
+    states = BurstLinks(bursts, KEYS, ROBOTS)
     parts = [states.lost(*(column[i : i + batch] for column in table)) for i in range(0, 2000, batch)]
     assert np.array_equal(np.concatenate(parts), whole)
     assert 0.4 < whole.mean() < 0.6
@@ -171,8 +172,8 @@ def test_what_is_forgotten_does_not_change_fates_and_frees_room():
     sender.reshape(ticks, -1)[:, :300], receiver.reshape(ticks, -1)[:, :300] = sender[:300], receiver[:300]
     table = sender, receiver, np.repeat(np.arange(ticks), per_tick), at_ns
     bursts = Bursts(0.05, 0.05)
-    whole = BurstStates(bursts, KEYS[:1], robots)
-    states = BurstStates(bursts, KEYS[:1], robots)
+    whole = BurstLinks(bursts, KEYS[:1], robots)
+    states = BurstLinks(bursts, KEYS[:1], robots)
     kept, parts = [], []
     for tick in range(ticks):
         parts.append(states.lost(*(column[tick * per_tick : (tick + 1) * per_tick] for column in table)))
@@ -185,4 +186,4 @@ def test_what_is_forgotten_does_not_change_fates_and_frees_room():
 
 def test_no_packets_lose_nothing():
     nothing = np.empty(0, np.int64)
-    assert BurstStates(Bursts(), KEYS, ROBOTS).lost(nothing, nothing, nothing, nothing).shape == (0,)
+    assert BurstLinks(Bursts(), KEYS, ROBOTS).lost(nothing, nothing, nothing, nothing).shape == (0,)

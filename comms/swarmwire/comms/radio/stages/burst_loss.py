@@ -1,0 +1,173 @@
+"""Burst loss: a link changes between a good and a bad state and loses a share of its packets in either.
+
+The chain of E. N. Gilbert (Bell Syst. Tech. J. 39, 1960) and E. O. Elliott (42, 1963) in continuous time, so that a
+burst's duration does not depend on the packet rate: good turns bad at rate a, bad turns good at rate b, and
+
+    P(bad at t + dt) = pi + (bad at t - pi) exp(-(a + b) dt),     pi = a / (a + b).
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.draws import purpose
+from swarmwire.comms.draws_compiled import uniform
+from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.stages.loss import LossModel
+from swarmwire.comms.radio.stages.stage import ChannelContext
+
+# Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
+FORGOTTEN = 40.0
+STATE, LOSS = purpose("burst state"), purpose("burst loss")
+RECEIVED, BURST = int(Fate.RECEIVED), int(Fate.BURST)
+NO_LINK = -1  # a free place of the table
+MIN_CAPACITY = 1024
+HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
+
+
+@njit()
+def bad_after(was_bad, dt_s, a, b, u):
+    """Whether a link is bad `dt_s` after it was in a known state; rates a and b in 1/s, u uniform in [0, 1).
+
+    dt_s = inf is the stationary state, and so is anything beyond `FORGOTTEN` relaxation times.
+    """
+    share = a / (a + b)
+    elapsed = (a + b) * dt_s
+    if elapsed >= FORGOTTEN:
+        return u < share
+    return u < share + ((1.0 if was_bad else 0.0) - share) * math.exp(-elapsed)
+
+
+class BurstParams(NamedTuple):
+    """The hash table of link states, and the parameters of the chain, as input of kernels."""
+
+    rows: int  # number of robots of all arenas
+    link: IntArray  # (capacity,) sender x rows + receiver, or NO_LINK
+    at_ns: IntArray  # (capacity,) time of its last use
+    bad: BoolArray  # (capacity,)
+    links: IntArray  # (1,) number of links in the table
+    a: float  # in 1/s: good turns bad
+    b: float  # in 1/s: bad turns good
+    loss_bad: float
+    loss_good: float
+
+
+@njit()
+def _place(links, link):
+    """The place of a link in the table, or the free place for it."""
+    mask = np.uint64(len(links) - 1)
+    # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
+    at = ((np.uint64(link) * HASH_FACTOR) >> np.uint64(32)) & mask
+    while links[at] != NO_LINK and links[at] != link:
+        at = (at + np.uint64(1)) & mask
+    return at
+
+
+@kernel()
+def burst_loss(params, frame):
+    """BURST by the link's state, which changes with the time since its last frame; acknowledgements always pass."""
+    if frame.is_ack:
+        return RECEIVED
+    link = frame.sender * params.rows + frame.receiver
+    at = _place(params.link, link)
+    silent_s = np.inf
+    if params.link[at] == NO_LINK:
+        params.link[at] = link
+        params.links[0] += 1
+    else:
+        silent_s = (frame.at_ns - params.at_ns[at]) / NS_PER_S
+    u = uniform(frame.key, frame.s, frame.r, frame.sequence, STATE + frame.attempt)
+    bad = bad_after(params.bad[at], silent_s, params.a, params.b, u)
+    params.at_ns[at], params.bad[at] = frame.at_ns, bad
+    u = uniform(frame.key, frame.s, frame.r, frame.sequence, LOSS + frame.attempt)
+    return BURST if u < (params.loss_bad if bad else params.loss_good) else RECEIVED
+
+
+NO_BURSTS = BurstParams(
+    0, np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.bool_), np.zeros(1, np.int64), 1.0, 1.0, 0.0, 0.0
+)
+
+
+class BurstLoss(LossModel):
+    """The Gilbert-Elliott chain for each directed link, in continuous time.
+
+    The states are in a sparse table: a hash by sender and receiver row, open addressing, at most half full. A link that
+    was silent for so long that its past has no effect is dropped, which changes nothing.
+    """
+
+    name = "burst_loss"
+    keys = ("bursts",)
+    kernel = burst_loss
+    no_params = NO_BURSTS
+    remembers = True
+
+    @classmethod
+    def of(cls, context: ChannelContext) -> LossModel | None:
+        """The loss, where the radio has bursts."""
+        bursts = context.radio.bursts
+        return None if bursts is None else BurstLoss(bursts, len(context.keys) * context.robots)
+
+    def __init__(self, bursts: Bursts, rows: int) -> None:
+        """`rows` is the number of robots of all arenas."""
+        self._bursts, self._rows = bursts, rows
+        self._clear(MIN_CAPACITY)
+
+    def __len__(self) -> int:
+        """Number of links in the table."""
+        return int(self._links[0])
+
+    def params(self, pose: FloatArray, from_ns: int, links: int) -> BurstParams:
+        """The table, with room for so many more links."""
+        if 2 * (len(self) + links) > len(self._link):
+            self._rebuild(from_ns, links)
+        a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
+        loss_bad, loss_good = float(self._bursts.loss_bad), float(self._bursts.loss_good)
+        return BurstParams(self._rows, self._link, self._at_ns, self._bad, self._links, a, b, loss_bad, loss_good)
+
+    @property
+    def passing(self) -> float:
+        """1 - loss, in the long run."""
+        return 1.0 - self._bursts.loss
+
+    def go_on_from(self, previous: LossModel, at_ns: int) -> None:
+        """Keep the state of all links."""
+        assert isinstance(previous, BurstLoss)
+        # Drop outdated states now: slower bursts must not depend on outdated states that happen to be kept.
+        previous._rebuild(at_ns, 0)
+        self._link, self._at_ns, self._bad, self._links = (
+            previous._link,
+            previous._at_ns,
+            previous._bad,
+            previous._links,
+        )
+
+    def _clear(self, capacity: int) -> None:
+        self._link = np.full(capacity, NO_LINK, np.int64)
+        self._at_ns = np.zeros(capacity, np.int64)
+        self._bad = np.zeros(capacity, np.bool_)
+        self._links = np.zeros(1, np.int64)
+
+    def _rebuild(self, now_ns: int, room: int) -> None:
+        """Rebuild the table for states valid at `now_ns` and `room` more links, at most a quarter full."""
+        relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
+        # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
+        silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
+        counts = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
+        link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
+        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), MIN_CAPACITY))
+        _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
+        self._links[0] = len(link)
+
+
+@njit()
+def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
+    for i in range(len(link)):
+        at = _place(links, link[i])
+        links[at], links_at_ns[at], links_bad[at] = link[i], at_ns[i], bad[i]

@@ -1,0 +1,68 @@
+"""The interface of a loss model: one kernel decides a frame at one receiver, in the unit disk and in the PHY."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.radio.stages.stage import ChannelContext
+
+
+class Frame(NamedTuple):
+    """One frame at one receiver, as input of kernels.
+
+    Key draws by `key`, (s, r, sequence) and a purpose of the loss model + `attempt`; acknowledgements have purposes of
+    their own, since the acknowledged packet has the same numbers.
+    """
+
+    key: int  # of the arena
+    sender: int  # robot row
+    receiver: int | np.int64  # robot row
+    s: int  # index of the sender in the arena
+    r: int  # index of the receiver in the arena
+    sequence: int  # of the packet, or of the acknowledged packet
+    attempt: int  # from 0; a unit disk has no other
+    is_ack: bool
+    at_ns: int  # unit disk: end of the airtime; PHY: start of the airtime
+    hold_ns: int  # time for measured values. Unit disk: as `at_ns`; PHY: start of the current poses
+
+
+class LossModel(ABC):
+    """A cause of lost frames beside noise and interference.
+
+    The unit disk tests the links of a packet when it goes on air, the PHY each frame that was received without errors,
+    at its end.
+    """
+
+    name: ClassVar[str]  # as in `swarmwire describe`
+    keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
+    kernel: ClassVar[Callable[..., Any]]  # (params, frame): RECEIVED, or the Fate of a lost frame
+    no_params: ClassVar[tuple[Any, ...]]  # of the type of `params`, for a radio without this loss
+    remembers: ClassVar[bool] = False  # whether links have state; frames of a link then come in the order of time
+    varies: ClassVar[bool] = False  # whether `delivery` depends on the link
+
+    @classmethod
+    @abstractmethod
+    def of(cls, context: ChannelContext) -> "LossModel | None":
+        """The loss model of this medium; None where the radio does not have it."""
+
+    @abstractmethod
+    def params(self, pose: FloatArray, from_ns: int, links: int) -> tuple[Any, ...]:
+        """A NamedTuple for the kernel, for frames at `from_ns` or later on at most so many links.
+
+        `pose` (rows, 3) holds at that time: x, y in m, heading in rad. A PHY takes the pose at the end of the frame.
+        """
+
+    @property
+    def passing(self) -> float:
+        """Long-run share of frames that pass on every link."""
+        return 1.0
+
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray | float:
+        """Probability that a frame passes beside `passing`, by link between robot rows, (k,)."""
+        return 1.0
+
+    def go_on_from(self, previous: "LossModel", at_ns: int) -> None:  # noqa: B027 - most have no state
+        """Take over the state of the same loss model with the radio parameters valid until `at_ns`."""
