@@ -56,10 +56,10 @@ def write_campaign(folder: Path, seeds: int) -> int:
     run = np.arange(len(points) * seeds)
     point, seed = run // seeds, run % seeds + 1
     loss, count = (np.array(values, dtype=np.float64)[point] for values in zip(*points, strict=True))
-    pdr = np.clip(1.0 - loss + 0.02 * _drawn(run, "pdr"), 0.0, 1.0)
+    link_pdr = np.clip(1.0 - loss + 0.02 * _drawn(run, "link_pdr"), 0.0, 1.0)
     columns: dict[str, Any] = {"run": run, "point": point, "seed": seed, "radio.loss": loss}
     columns |= {"robots.flock.count": count.astype(np.int64), "ended": ["duration"] * len(run)}
-    columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.pdr": pdr}
+    columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.link_pdr": link_pdr}
     for place, metric in enumerate(METRICS):
         columns[f"{metric}.final"] = (1 + place) / (1.0 + np.exp(20.0 * loss - 4.0)) + 0.1 * _drawn(run, metric)
     for time in TIMES:
@@ -75,7 +75,7 @@ def _drawn(run: IntArray, what: str) -> FloatArray:
 
 
 def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
-    numbers = [*(f"{metric}.final" for metric in METRICS), "radio.pdr"]
+    numbers = [*(f"{metric}.final" for metric in METRICS), "radio.link_pdr"]
     tx_status = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
     tx_status += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
     return {

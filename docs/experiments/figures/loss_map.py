@@ -23,7 +23,7 @@ CHECKS = {  # each beside the column without losses of the map whose break it ex
     "loss-map-pso-early": ("pso", "bests told 3 s before an update"),
 }
 CAMPAIGNS = (*(f"loss-map-{behaviour}{radio}" for behaviour in BEHAVIOURS for radio in RADIOS), *CHECKS)
-COLUMNS = ("radio.pdr",)
+COLUMNS = ("radio.link_pdr",)
 
 TITLES = {
     "avoidance": "avoidance\nnobody touches in 60 s",
@@ -46,7 +46,7 @@ def outcomes(runs: pl.DataFrame, behaviour: str) -> pl.DataFrame:
     success = ~stopped if behaviour in STOPPED_IS_FAILURE else stopped
     ran = runs.filter(pl.col("ended") != "failed")
     latency = pl.col("radio.latency_s").alias("latency_s")
-    return ran.select(loss.alias("loss"), latency, "seed", "radio.pdr", success.alias("success"))
+    return ran.select(loss.alias("loss"), latency, "seed", "radio.link_pdr", success.alias("success"))
 
 
 def shares(of: pl.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:

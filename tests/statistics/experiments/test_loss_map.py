@@ -53,7 +53,7 @@ def test_without_losses_both_radios_give_the_same_runs(corners, behaviour):
 def test_both_radios_lose_as_much_in_the_mean(corners):
     for name in ("loss-map-flocking", "loss-map-flocking-bursts"):
         late = outcomes(corners[name], "flocking").filter(loss=0.9, latency_s=0.0)
-        assert late["radio.pdr"].mean() == pytest.approx(0.1, abs=0.03), name
+        assert late["radio.link_pdr"].mean() == pytest.approx(0.1, abs=0.03), name
 
 
 def test_maps_are_drawn_and_cells_told(corners):

@@ -16,7 +16,8 @@ OF_RADIO = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
     "in_range": ("", "of these, receivers in range"),
-    "pdr": ("", "received / in range"),
+    "pdr": ("", "packet delivery ratio: received / intended"),
+    "link_pdr": ("", "delivery ratio of links: received / in range"),
 }
 PERCENTILES = ("p50", "p90", "p99")
 LATENCY_HELP = {

@@ -24,7 +24,7 @@ def compare_command(
     """Compare two campaigns: medians, their difference and how sure it is, at each design point that both have.
 
     Points that agree in every parameter that both vary are compared, and seeds that both ran one by one. Unless
-    outcomes are named they are all times, the last values of metrics, and the delivery ratio. For example:
+    outcomes are named they are all times, the last values of metrics, and the link PDR. For example:
 
       swarmwire compare runs/plain runs/smoothed --outcome order
 

@@ -27,8 +27,8 @@ def report_command(
 ) -> None:
     """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
 
-    Also of what is not finished. Unless outcomes are named they are times, last values of metrics and the delivery
-    ratio, of those that differ between runs; tables that are folded hold the others. For example:
+    Also of what is not finished. Unless outcomes are named they are times, last values of metrics and the link PDR, of
+    those that differ between runs; tables that are folded hold the others. For example:
 
       swarmwire report campaigns/loss --outcome aggregation_time_s --outcome order
     """

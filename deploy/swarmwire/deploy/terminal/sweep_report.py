@@ -11,7 +11,7 @@ from rich.text import Text
 from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.formats import FAILED
-from swarmwire.metrics.campaign.outcome import FINAL, PDR, Outcome
+from swarmwire.metrics.campaign.outcome import FINAL, LINK_PDR, Outcome
 from swarmwire.metrics.campaign.point_values import value_text
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
@@ -60,11 +60,11 @@ def _table(folder: CampaignFolder) -> Table:
 
 
 def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
-    """The first usual ones that have any value, and last the delivery ratio."""
+    """The first usual ones that have any value, and last the link PDR."""
     runs = folder.runs
     usual = [of for of in folder.outcomes if of.is_usual and of.column in runs.columns and runs[of.column].count()]
-    first, pdr = [of for of in usual if of.column != PDR], [of for of in usual if of.column == PDR]
-    return first[: MAX_OUTCOMES - len(pdr)] + pdr
+    first, last = [of for of in usual if of.column != LINK_PDR], [of for of in usual if of.column == LINK_PDR]
+    return first[: MAX_OUTCOMES - len(last)] + last
 
 
 def _median(sample: Sample) -> str:

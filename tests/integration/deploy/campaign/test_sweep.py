@@ -43,7 +43,7 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert row["trajectory_sha256"] == alone.trajectory_sha256[0]
     assert (row["ended"], row["error"], row["ticks"], row["sim_time_s"]) == ("duration", None, 5, 0.5)
     assert row["order.mean"] == alone.metrics["order"].mean
-    assert (row["radio.sent"], row["radio.pdr"]) == (radio.sent, radio.pdr)
+    assert (row["radio.sent"], row["radio.pdr"], row["radio.link_pdr"]) == (radio.sent, radio.pdr, radio.link_pdr)
     assert row["radio.fates.lost"] == radio.fates["lost"]
     assert row["radio.latency_air_s.p90"] == radio.latency_air_s.p90
     assert row["target_best.final"] is None

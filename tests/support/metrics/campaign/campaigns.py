@@ -31,7 +31,7 @@ NUMBERS: dict[str, Make] = {
     "order.mean": order,
     "order.min": order,
     "order.max": order,
-    "radio.pdr": lambda point, _: 1.0 - point.get("radio.loss", 0.0),
+    "radio.link_pdr": lambda point, _: 1.0 - point.get("radio.loss", 0.0),
     "counts.late_answers": lambda _, rng: float(rng.poisson(2.0)),
 }
 TIMES: dict[str, Make] = {"aggregation_time_s": aggregation_time_s}

@@ -33,7 +33,7 @@ def test_outcomes_are_told_with_unit_and_kind(scenario):
     assert found["min_gap.final"].unit == "m"
     assert {of.kind for of in found.values()} == {"number"}
     assert list(found)[:4] == ["order.final", "order.mean", "order.min", "order.max"]
-    assert "radio.pdr" in found
+    assert "radio.link_pdr" in found
 
 
 def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):

@@ -48,7 +48,7 @@ def test_points_that_both_have_meet_whatever_their_order(plain, better):
 
 def test_times_and_last_values_are_compared_unless_others_are_named(plain, better):
     columns = [row.outcome.column for row in compared(plain, better, where=["radio.loss=0.2"]).rows]
-    assert columns == ["order.final", "radio.pdr", "aggregation_time_s"]
+    assert columns == ["order.final", "radio.link_pdr", "aggregation_time_s"]
     assert [row.outcome.column for row in compared(plain, better, "counts.late_answers").rows] == [
         "counts.late_answers"
     ] * 2

@@ -14,7 +14,7 @@ PREFERRED = (
     "target_mean.final",
     "order.final",
     "largest_component.final",
-    "radio.pdr",
+    "radio.link_pdr",
 )
 
 

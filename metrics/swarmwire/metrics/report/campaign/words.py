@@ -11,7 +11,8 @@ _ENDINGS = {
     "max": ", greatest in the run",
 }
 _KNOWN = {
-    "radio.pdr": "delivery ratio (PDR)",
+    "radio.pdr": "delivery ratio (PDR), of intended receivers",
+    "radio.link_pdr": "delivery ratio of links (link PDR)",
     "stop_time_s": "time until it stopped in s",
     "radio.sent": "packets sent",
     "radio.intended": "receivers meant",
