@@ -21,6 +21,7 @@ from swarmwire.deploy.arguments import (
     subtick_of,
     tick_count,
 )
+from swarmwire.deploy.assemble_result import assemble_result
 from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.control.status import Status
@@ -37,7 +38,6 @@ from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_medium import new_medium
-from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.origin import Origin
@@ -262,7 +262,7 @@ class Simulation:
                 parts.update(observer.end(last))
             failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
             backend = self._backend
-            self._result = outcome(
+            self._result = assemble_result(
                 self.static,
                 parts,
                 ended=self._ended(error),

@@ -7,7 +7,7 @@ from swarmwire.deploy.campaign.campaign_folder import CampaignFolder as Written
 from swarmwire.deploy.campaign.task import PieceResult
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 
 CAMPAIGN = Campaign(
     name="loss",
@@ -26,7 +26,7 @@ CAMPAIGN = Campaign(
     point_overrides=((), ()),
     duration_s=20,
     robots=3,
-    outcomes=(Outcome("order.final", "", "number", "order"), Outcome("found_s", "s", "time", "first find")),
+    responses=(Response("order.final", "", "number", "order"), Response("found_s", "s", "time", "first find")),
     series=True,
     record_seeds=(),
     pack=None,

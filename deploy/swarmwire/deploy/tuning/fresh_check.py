@@ -55,7 +55,7 @@ class CheckRun:
             if not sweeps[-1].is_over:
                 return None
         own, tried = (sweep.folder for sweep in sweeps)
-        column = self.tuning.goal.outcome.column
+        column = self.tuning.goal.response.column
         return FreshCheck(_sample(own, column), _sample(tried, column), own, tried)
 
     def _swept(self, name: str, file: Path) -> Sweep:
@@ -72,7 +72,7 @@ class CheckRun:
 
 def _sample(folder: Path, column: str) -> Sample:
     campaign = CampaignFolder(folder)
-    if column in (outcome.column for outcome in campaign.outcomes):
+    if column in (response.column for response in campaign.responses):
         return campaign.sample(column, 0)
     return number_sample(np.empty(0))  # a choice brought the metric along
 

@@ -158,7 +158,7 @@ def test_files_of_others_in_the_folder_are_left_alone(half, whole):
         ("pack", "few"),
         ("record_seeds", [77]),
         ("versions", []),
-        ("outcomes", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
+        ("responses", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
     ],
 )
 def test_what_campaigns_never_say_is_refused_by_its_key(whole, key, value):

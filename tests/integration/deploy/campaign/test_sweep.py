@@ -160,7 +160,7 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
         assert (row["ended"] == "duration") == (row["ticks"] == 10)
     lengths = series_in(tmp_path / "packed").group_by("run").len().sort("run")["len"].to_list()
     assert lengths == [row["ticks"] for row in rows]
-    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").outcomes if of.kind == "time"}
+    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").responses if of.kind == "time"}
     assert times == {"stop_time_s": "time", "aggregation_time_s": "time"}
     assert list(rows[0])[3:10] == [
         "ended", "error", "ticks", "sim_time_s", "trajectory_sha256", "stop_time_s", "stopped_by"

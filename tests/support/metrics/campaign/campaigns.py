@@ -95,7 +95,7 @@ def _about(
     limit_s: float,
 ) -> dict[str, Any]:
     """campaign.json."""
-    outcomes = [
+    responses = [
         {"column": column, "unit": unit, "kind": kind, "help": f"made-up {column}", "listed": False, "hold_s": 0.0}
         for columns, unit, kind in ((numbers, "", "number"), (times, "s", "time"))
         for column in columns
@@ -116,7 +116,7 @@ def _about(
         "points": [dict(point) for point in points],
         "overrides": [],
         "duration_s": limit_s,
-        "outcomes": outcomes,
+        "responses": responses,
     }
 
 

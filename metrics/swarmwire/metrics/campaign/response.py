@@ -1,4 +1,4 @@
-"""TxStatuses of a campaign: columns of its table that say what came of each run."""
+"""Responses of a campaign: columns of its table that hold what was measured of each run."""
 
 from dataclasses import dataclass
 from typing import get_args
@@ -14,7 +14,7 @@ LINK_PDR = "radio.link_pdr"  # the column of the delivery ratio of links
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Response:
     """One column. A `number` is what it is; a `time` may lack, since the run ended before it: right-censored."""
 
     column: str  # in summary.parquet, e.g. order.final
