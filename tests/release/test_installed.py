@@ -61,7 +61,7 @@ def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: In
     everything.run("swarmwire", "run", "mine/scenario.toml", *QUICK, "--out", "first", "--quiet")
     summary = json.loads((everything.cwd / "first" / "summary.json").read_text())
     assert (summary["ended"], summary["ticks"]) == ("duration", 5)
-    assert "whole: everything is there" in everything.run("swarmwire", "verify", "first")
+    assert "intact: everything is there" in everything.run("swarmwire", "verify", "first")
 
 
 def test_what_is_deployed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:

@@ -73,7 +73,7 @@ def test_each_arena_ends_when_its_own_metric_has_held_and_others_go_on(tmp_path,
     assert summary["stop"] == ["order at least 0.85 for 0.5 s"]
     assert [end["stop_time_s"] for end in summary["by_arena"]] == [arena.stop_time_s for arena in result.arenas]
     assert RunFolder(tmp_path / "run").summary == summary
-    assert {finding.state for finding in verify(tmp_path / "run")} <= {State.WHOLE, State.NOT_RECORDED}
+    assert {finding.state for finding in verify(tmp_path / "run")} <= {State.INTACT, State.NOT_RECORDED}
 
 
 def test_an_arena_comes_to_the_same_alone_as_beside_others(scenario):

@@ -237,7 +237,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
     recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
     with pytest.raises(ValueError, match="refused"):
         recording.end(None)
-    assert check_recording(tmp_path / "run.rrd")[0] is State.WHOLE
+    assert check_recording(tmp_path / "run.rrd")[0] is State.INTACT
     assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
 
 
