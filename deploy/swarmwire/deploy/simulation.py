@@ -85,7 +85,7 @@ class Simulation:
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
-        code: the specs of all classes of users': agents, own senses, actuators and metrics.
+        code: the specs of all classes of users': agents, custom sensors, actuators and metrics.
         inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.

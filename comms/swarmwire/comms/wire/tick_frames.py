@@ -168,8 +168,8 @@ def encode_actions(
     if len(actions.leds):
         arrays["leds"] = np.array((actions.leds.rows, actions.leds.which, actions.leds.rgb))
     if len(actions.own):
-        arrays["own"] = np.array((actions.own.rows, actions.own.place))
-        arrays["own/value"] = actions.own.value
+        arrays["actuators"] = np.array((actions.own.rows, actions.own.place))
+        arrays["actuators/value"] = actions.own.value
     if len(actions.values):
         arrays["values"] = actions.values.rows
         arrays["values/value"] = actions.values.value
@@ -201,7 +201,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
     notes = _notes(frame, rows) if "notes" in frame.arrays else Notes.none()
     leds = _leds(frame, rows) if "leds" in frame.arrays else NO_LED_CHANGES
-    commands = _actuator_commands(frame, rows) if "own" in frame.arrays else NO_ACTUATOR_COMMANDS
+    commands = _actuator_commands(frame, rows) if "actuators" in frame.arrays else NO_ACTUATOR_COMMANDS
     values = _values(frame, rows) if "values" in frame.arrays else NO_VALUES
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, notes, leds, commands, values)
 
@@ -251,10 +251,10 @@ def _leds(frame: Frame, rows: IntArray) -> LedChanges:
 
 
 def _actuator_commands(frame: Frame, rows: IntArray) -> ActuatorCommands:
-    actuated, place = checked_array(frame, "own", "<i8", (2, None))
-    value = checked_array(frame, "own/value", "<f8", (len(actuated),))
+    actuated, place = checked_array(frame, "actuators", "<i8", (2, None))
+    value = checked_array(frame, "actuators/value", "<f8", (len(actuated),))
     if not _are_among(actuated, rows) or (place < 0).any() or not np.isfinite(value).all():
-        raise BadFrame("malformed", "own: expected finite numbers for actuators of the runner's own robots")
+        raise BadFrame("malformed", "actuators: expected finite numbers for actuators of the runner's own robots")
     return ActuatorCommands(actuated, place, value)
 
 

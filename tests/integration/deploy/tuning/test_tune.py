@@ -29,7 +29,7 @@ def test_a_known_optimum_is_found(tmp_path, scenario, sampler, within):
 
 def test_the_best_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
-    own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("own", f"trial-{found.best.number}"))
+    own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{found.best.number}"))
     assert own.about.seeds == best.about.seeds == (4, 5, 6, 7, 8)
     assert own.sample("bowl", 0).value == pytest.approx([0.36] * 5)
     assert set(best.sample("bowl", 0).value) == {found.best.result.value}

@@ -237,7 +237,7 @@ def test_actuators_and_leds_come_over_whole_and_what_was_not_done_takes_no_room(
     assert all(same(getattr(got.own, name), getattr(ACTUATED, name)) for name in ("rows", "place", "value"))
     assert all(same(getattr(got.leds, name), getattr(LEDS, name)) for name in ("rows", "which", "rgb"))
     silent = frames.decode(encode_actions(0, sound(sent=SentPackets.none())))
-    assert not [name for name in silent.arrays if name.startswith(("sent", "own", "leds"))]
+    assert not [name for name in silent.arrays if name.startswith(("sent", "actuators", "leds"))]
     assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).own)) == (0, 0)
 
 
@@ -272,11 +272,11 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
         ("leds", [[4], [0]]),
         ("leds", [4, 0, 1]),
         ("leds", [[4.0], [0.0], [1.0]]),
-        ("own", [[4, 4, 8], [0, 3, 1]]),  # another's robot
-        ("own", [[4, 4, 9], [0, -1, 1]]),
-        ("own", [[4, 9], [0, 1]]),
-        ("own", [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]),
-        *(("own/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
+        ("actuators", [[4, 4, 8], [0, 3, 1]]),  # another's robot
+        ("actuators", [[4, 4, 9], [0, -1, 1]]),
+        ("actuators", [[4, 9], [0, 1]]),
+        ("actuators", [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]),
+        *(("actuators/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
     ],
     ids=repr,
 )

@@ -28,7 +28,7 @@ SENSORS, ACTUATORS = "swarmwire.sensors", "swarmwire.actuators"  # groups of ent
 
 
 def fitted(body: Body, where: str) -> Body:
-    """The body with what the classes of its own senses and actuators tell agents; BadInput names what is wrong."""
+    """The body with what the classes of its custom sensors and actuators tell agents; BadInput names what is wrong."""
     sensors = {name: _sensor(spec, where, f"sensors.{name}") for name, spec in body.sensors.items()}
     actuators = {name: _actuator(spec, where, f"actuators.{name}") for name, spec in body.actuators.items()}
     return replace(body, sensors=sensors, actuators=actuators)
