@@ -43,7 +43,7 @@ class Campaign:
     responses: tuple[Response, ...]
     series: bool  # whether each tick's metrics are kept
     record_seeds: tuple[int, ...]  # whose runs have run folders
-    pack: int | None  # arenas in a world at most; None: as many as make sense
+    batch: int | None  # arenas in a world at most; None: as many as make sense
 
     @property
     def runs(self) -> int:
@@ -91,12 +91,12 @@ def read_campaign(folder: Path) -> Campaign:
 
 def _check(campaign: Campaign, where: str) -> None:
     """BadInput for what only those who run a campaign need of it."""
-    overrides, pack = campaign.point_overrides, campaign.pack
+    overrides, batch = campaign.point_overrides, campaign.batch
     texts: Any = [text for of_point in overrides for text in of_point]
     good = {
         "point_overrides": len(overrides) == len(campaign.points) and all(isinstance(text, str) for text in texts),
         "robots": _is_count(campaign.robots),
-        "pack": pack is None or _is_count(pack),
+        "batch": batch is None or _is_count(batch),
         "record_seeds": set(campaign.record_seeds) <= set(campaign.seeds),
     }
     for key, is_good in good.items():

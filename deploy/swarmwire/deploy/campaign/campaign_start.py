@@ -56,7 +56,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
         responses=plan.responses,
         series=asked.series,
         record_seeds=asked.record_seeds,
-        pack=asked.pack,
+        batch=asked.batch,
     )
 
 

@@ -43,7 +43,7 @@ class Columns:
         return pl.DataFrame([{name: self._cell(name, row.get(name)) for name in names} for row in rows], schema)
 
     def joined(self, frames: Iterable["pl.DataFrame"]) -> "pl.DataFrame":
-        """The tables of several pieces as one, by run, of each run the last row; what was never counted was 0."""
+        """The tables of several tasks as one, by run, of each run the last row; what was never counted was 0."""
         import polars as pl
 
         whole = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")

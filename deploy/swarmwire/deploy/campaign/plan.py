@@ -35,7 +35,7 @@ class Asked:
     design_seed: int = 1
     overrides: tuple[str, ...] = ()
     name: str | None = None  # None: the scenario's
-    pack: int | None = None
+    batch: int | None = None
     series: bool = True
     record_seeds: tuple[int, ...] = ()
 
@@ -77,8 +77,8 @@ def planned(asked: Asked) -> Plan:
     strange = [seed for seed in asked.record_seeds if seed not in asked.seeds]
     if strange:
         raise BadInput("--record-seeds", "", f"expected seeds of the campaign, got {strange[0]}")
-    if asked.pack is not None and asked.pack < 1:
-        raise BadInput("--pack", "", f"expected at least 1, got {asked.pack}")
+    if asked.batch is not None and asked.batch < 1:
+        raise BadInput("--batch", "", f"expected at least 1, got {asked.batch}")
     mapping = mapping_of(scenario)
     scenarios, code = list[Scenario](), dict[str, None]()
     for point in points:

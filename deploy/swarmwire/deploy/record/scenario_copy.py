@@ -34,7 +34,8 @@ class CopiedFile:
 
     path: str  # within the run folder
     sha256: str
-    what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
+    # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
+    what: str
 
 
 def copy_scenario(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from swarmwire.deploy.campaign.batches import batch_for, shares
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Executor
-from swarmwire.deploy.campaign.pieces import pack_for, shares
-from swarmwire.deploy.campaign.task import PieceResult, Row, Task
+from swarmwire.deploy.campaign.task import Row, Task, TaskResult
 from swarmwire.deploy.tuning.goal import Goal, sample_of
 from swarmwire.deploy.tuning.proposals import proposals
 from swarmwire.deploy.tuning.study_file import StudyFile
@@ -70,7 +70,7 @@ class TrialsRun:
         """Run these; each is kept as soon as all its seeds have been run. False if stopped before the end."""
         found: dict[int, list[Row]] = {trial.number: [] for trial in trials}
 
-        def keep(task: Task, result: PieceResult) -> None:
+        def keep(task: Task, result: TaskResult) -> None:
             rows = found[task.point]
             rows += result.rows
             if len(rows) == len(self.tuning.seeds):
@@ -81,7 +81,7 @@ class TrialsRun:
 
     def _tasks(self, trials: Sequence[Trial]) -> list[Task]:
         tuning = self.tuning
-        size = pack_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
+        size = batch_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
         return [
             Task(
                 scenario=str(scenario_file(self.folder)),

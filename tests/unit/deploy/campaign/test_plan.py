@@ -68,7 +68,7 @@ def test_a_point_that_cannot_be_run_is_refused_in_a_line_that_names_what_varies(
 def test_other_arguments_are_checked_too(scenario):
     for asked, told in (
         ({"record_seeds": (3,)}, "--record-seeds: .*3"),
-        ({"pack": 0}, "--pack: expected at least 1"),
+        ({"batch": 0}, "--batch: expected at least 1"),
         ({"overrides": ("radio.los=1",)}, "--set radio.los=1: "),
     ):
         with pytest.raises(BadInput, match=f"^{told}"):
