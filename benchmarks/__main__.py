@@ -11,11 +11,11 @@ from functools import partial
 
 from benchmarks.agent_overhead import agent_overhead
 from benchmarks.campaign import campaign
+from benchmarks.deploy_fleet import deploy_fleet
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import BOID, FLOCKING, plain_processes, processes
-from benchmarks.push_fleet import push_fleet
 from benchmarks.radio import CASES as AIRS
 from benchmarks.radio import air_cost, air_scaling
 from benchmarks.realtime import realtime
@@ -53,7 +53,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),
     "robot-step-ros2": partial(robot_step, kind="ros2"),
-    "push-20": partial(push_fleet, hosts=20),
+    "deploy-20": partial(deploy_fleet, hosts=20),
 }
 
 

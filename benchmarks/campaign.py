@@ -40,7 +40,7 @@ def campaign(name: str, repeats: int) -> None:
     report(name, median(packed_s), "s", first, {**config, **spread(packed_s)})
 
 
-def _wall_s(scene: dict[str, Any], name: str, seeds: int, pack: int | None) -> float:
+def _wall_s(scene: dict[str, Any], name: str, seeds: int, batch: int | None) -> float:
     clock = WallClock()
     with TemporaryDirectory() as folder:
         began_ns = clock.now_ns()
@@ -48,7 +48,7 @@ def _wall_s(scene: dict[str, Any], name: str, seeds: int, pack: int | None) -> f
             scenario_from(scene, name),
             seeds=seeds,
             vary={"radio.loss": LOSSES},
-            pack=pack,
+            batch=batch,
             out=Path(folder) / "campaign",
         )
         wall_s = to_s(clock.now_ns() - began_ns)

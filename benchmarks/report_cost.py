@@ -23,7 +23,7 @@ COUNTS = (5, 10, 20, 40, 80)
 LIMIT_S = 600.0
 METRICS = ("order", "largest_component", "min_gap", "collisions", "target_best", "target_mean", "components")
 TIMES = ("aggregation_time_s", "stop_time_s")
-PLAIN = {"help": "made up", "listed": False, "hold_s": 0.0}  # of an outcome
+PLAIN = {"help": "made up", "listed": False, "hold_s": 0.0}  # of a response
 
 
 def report_cost(name: str, repeats: int, *, seeds: int) -> None:
@@ -44,22 +44,22 @@ def report_cost(name: str, repeats: int, *, seeds: int) -> None:
             taken_s.append((clock.now_ns() - start_ns) / 1e9)
             most_mb.append(usage.ru_maxrss / 1e3)
         size_mb = Path(folder, "report.html").stat().st_size / 1e6
-    config = {"points": len(LOSSES) * len(COUNTS), "runs": runs, "outcomes": len(METRICS) + len(TIMES) + 1}
+    config = {"points": len(LOSSES) * len(COUNTS), "runs": runs, "responses": len(METRICS) + len(TIMES) + 1}
     told = {**config, "page_mb": round(size_mb, 1)}
     print_line(name, statistics.median(taken_s), "s", {**told, **spread(taken_s)})
     print_line(f"{name}-memory", statistics.median(most_mb), "MB", {**told, **spread(most_mb)})
 
 
 def write_campaign(folder: Path, seeds: int) -> int:
-    """Write a campaign with made-up outcomes over loss and number of robots; the number of its runs."""
+    """Write a campaign with made-up responses over loss and number of robots; the number of its runs."""
     points: list[tuple[float, int]] = list(product(LOSSES, COUNTS))
     run = np.arange(len(points) * seeds)
     point, seed = run // seeds, run % seeds + 1
     loss, count = (np.array(values, dtype=np.float64)[point] for values in zip(*points, strict=True))
-    pdr = np.clip(1.0 - loss + 0.02 * _drawn(run, "pdr"), 0.0, 1.0)
+    link_pdr = np.clip(1.0 - loss + 0.02 * _drawn(run, "link_pdr"), 0.0, 1.0)
     columns: dict[str, Any] = {"run": run, "point": point, "seed": seed, "radio.loss": loss}
     columns |= {"robots.flock.count": count.astype(np.int64), "ended": ["duration"] * len(run)}
-    columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.pdr": pdr}
+    columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.link_pdr": link_pdr}
     for place, metric in enumerate(METRICS):
         columns[f"{metric}.final"] = (1 + place) / (1.0 + np.exp(20.0 * loss - 4.0)) + 0.1 * _drawn(run, metric)
     for time in TIMES:
@@ -75,9 +75,9 @@ def _drawn(run: IntArray, what: str) -> FloatArray:
 
 
 def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
-    numbers = [*(f"{metric}.final" for metric in METRICS), "radio.pdr"]
-    tx_status = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
-    tx_status += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
+    numbers = [*(f"{metric}.final" for metric in METRICS), "radio.link_pdr"]
+    responses = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
+    responses += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
     return {
         "format": 1,
         "name": "made up",
@@ -94,5 +94,5 @@ def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
         "points": [{"radio.loss": loss, "robots.flock.count": count} for loss, count in points],
         "overrides": [],
         "duration_s": LIMIT_S,
-        "outcomes": tx_status,
+        "responses": responses,
     }

@@ -85,7 +85,7 @@ TARGETS = {
     "robot-step-memory": most(60, "the most memory that the process of such an agent held"),
     "robot-step-ros2": most(1, "the same on a TurtleBot behind a bridge of ROS 2"),
     "robot-step-ros2-memory": most(60, "the most memory of its process"),
-    "push-20": most(10, "a new release to twenty hosts at once over OpenSSH, all on one machine, a trial run each"),
-    "report-10000": most(30, "`swarmwire report` of 50 points x 200 seeds with 10 outcomes, from the call to its end"),
+    "deploy-20": most(10, "a new release to twenty hosts at once over OpenSSH, all on one machine, a trial run each"),
+    "report-10000": most(30, "`swarmwire report` of 50 points x 200 seeds with 10 responses, from the call to its end"),
     "report-10000-memory": most(1000, "the most memory that it held"),
 }

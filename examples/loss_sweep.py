@@ -23,8 +23,8 @@ def table(scenario: Path, seeds: int, duration_s: float) -> pl.DataFrame:
         overrides = [f"radio.loss={loss}", f"duration_s={duration_s}"]
         result = run(scenario, seeds=range(1, seeds + 1), overrides=overrides)
         for arena in result.arenas:
-            pdr = arena.radio.pdr if arena.radio else None
-            rows.append({"loss": loss, "seed": arena.seed, "pdr": pdr, "order": arena.metrics["order"].final})
+            link_pdr = arena.radio.link_pdr if arena.radio else None
+            rows.append({"loss": loss, "seed": arena.seed, "link_pdr": link_pdr, "order": arena.metrics["order"].final})
     return pl.DataFrame(rows)
 
 
@@ -35,7 +35,7 @@ def main() -> None:
     options.add_argument("--duration", type=float, default=30.0, help="simulated seconds of each run")
     asked = options.parse_args()
     runs = table(asked.scenario, asked.seeds, asked.duration)
-    medians = runs.group_by("loss", maintain_order=True).agg(pl.col("pdr", "order").median(), runs=pl.len())
+    medians = runs.group_by("loss", maintain_order=True).agg(pl.col("link_pdr", "order").median(), runs=pl.len())
     with pl.Config(tbl_formatting="ASCII_MARKDOWN", tbl_hide_column_data_types=True, tbl_hide_dataframe_shape=True):
         print(medians)
 

@@ -13,7 +13,7 @@ from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.report.figures.column_axes import plain_legend
-from swarmwire.metrics.report.figures.response_curve import Response, response_curve
+from swarmwire.metrics.report.figures.response_curve import MedianLine, response_curve
 from swarmwire.metrics.statistics.interval import Interval
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import summary
@@ -45,7 +45,7 @@ class _Degradation:
         loss, latency = campaign.parameters
         parts: list[pl.DataFrame] = []
         for number, point in enumerate(campaign.points):
-            sample = campaign.sample(self.shown.outcome, number)
+            sample = campaign.sample(self.shown.response, number)
             rows = pl.DataFrame({"seed": sample.seed, "value": sample.value, "observed": sample.observed})
             at = {LOSS: point[loss], LATENCY: point[latency]}
             said = [pl.lit(float(str(value))).alias(key) for key, value in at.items()]
@@ -53,21 +53,21 @@ class _Degradation:
         return pl.concat(parts)
 
     def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
-        """The outcome over loss, a line for each latency."""
+        """The response over loss, a line for each latency."""
         frame = runs[self.name]
         losses = _levels(frame, LOSS)
-        responses = [
-            _response(f"{latency:g} s late", losses, [_sample(frame, loss, latency) for loss in losses])
+        lines = [
+            _line(f"{latency:g} s late", losses, [_sample(frame, loss, latency) for loss in losses])
             for latency in _levels(frame, LATENCY)
         ]
         cut_off = frame.filter(~pl.col("observed"))["value"]
         limit = float(np.max(cut_off.to_numpy())) if len(cut_off) else None
-        figure = response_curve(responses, self.shown.title, f"share of the {self.shown.lost} lost", limit)
+        figure = response_curve(lines, self.shown.title, f"share of the {self.shown.lost} lost", limit)
         axes = figure.axes[0]
         top = axes.get_ylim()[1]
         axes.set_ylim(0.0, HEAD_ROOM * top)  # from 0: what hardly changes should look so
         axes.set_yticks([tick for tick in axes.get_yticks() if 0.0 <= tick <= top])  # none beside the legend
-        plain_legend(axes, loc="upper center", ncols=len(responses), columnspacing=1.2)
+        plain_legend(axes, loc="upper center", ncols=len(lines), columnspacing=1.2)
         return figure
 
     def told(self, runs: Mapping[str, pl.DataFrame]) -> str:
@@ -105,13 +105,13 @@ def _middle(sample: Sample) -> tuple[float, Interval]:
     return (of.q50, of.q50_interval) if sample.kind == "time" else (of.mean, of.mean_interval)
 
 
-def _response(label: str, x: list[float], samples: list[Sample]) -> Response:
+def _line(label: str, x: list[float], samples: list[Sample]) -> MedianLine:
     found = [_middle(sample) for sample in samples]
     table = np.array([(middle, of.low, of.high) for middle, of in found])
     if samples[0].kind == "time":
         table[np.isnan(table)] = np.inf  # beyond the limit
     middle, low, high = table.T
-    return Response(label, np.array(x), middle, low, high, middle, middle)
+    return MedianLine(label, np.array(x), middle, low, high, middle, middle)
 
 
 def _words(sample: Sample) -> str:

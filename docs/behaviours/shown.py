@@ -1,4 +1,4 @@
-"""What is shown of each behaviour: the picture's trails and metrics, and the outcome that loss and latency spoil."""
+"""What is shown of each behaviour: the picture's trails and metrics, and the response that loss and latency spoil."""
 
 from dataclasses import dataclass
 
@@ -16,8 +16,8 @@ FOUND = "time until half of them are at the light, s"
 class Shown:
     """Of one behaviour."""
 
-    title: str  # the outcome, in words, with its unit
-    outcome: str  # its column in the campaign's summary
+    title: str  # the response, in words, with its unit
+    response: str  # its column in the campaign's summary
     metrics: tuple[str, ...]  # beside the picture
     trail_s: float = 60.0  # how much of the robots' ways is drawn
     at_s: float | None = None  # when the picture is taken; None: at the end

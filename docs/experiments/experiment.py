@@ -1,7 +1,7 @@
 """An experiment, as its file among the figures describes it.
 
 CAMPAIGNS = ("vicsek", "dense")      campaign files, and what their digests are called
-COLUMNS = ("order.mean",)            outcomes that the digests keep
+COLUMNS = ("order.mean",)            responses that the digests keep
 def draw(runs): ...                  from digests by campaign to a matplotlib figure
 def told(runs): ...                  to Markdown: tables of the numbers that the page cites
 def digested(folder, runs): ...      where a choice of columns is not enough: from a campaign's folder and table

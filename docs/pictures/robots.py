@@ -46,7 +46,7 @@ def _company() -> list[str]:
     return [
         _titled(left, 10, YOURS, "your computer", "swarmwire robots, swarmwire certs"),
         _titled(right, 10, YOURS, "tracker", "camera system: where each robot is"),
-        text((left + right + BOX_WIDTH) / 2, 34, "push, start, stop: by SSH to the agents' hosts", anchor="middle"),
+        text((left + right + BOX_WIDTH) / 2, 34, "deploy, start, stop: by SSH to the agents' hosts", anchor="middle"),
         arrow(left + 60, 62, left + 60, NETWORK_Y - 2),
         text(left + 70, 94, "estop, status"),
         arrow(right + 60, 62, right + 60, NETWORK_Y - 2),

@@ -24,5 +24,5 @@ def test_a_row_shows_target_value_and_whether_it_is_met():
 def test_the_campaign_that_is_made_up_is_one(tmp_path):
     assert write_campaign(tmp_path, 20) == 1000
     campaign = CampaignFolder(tmp_path)
-    assert (campaign.finished, len(campaign.points), len(campaign.outcomes)) == (True, 50, 10)
+    assert (campaign.finished, len(campaign.points), len(campaign.responses)) == (True, 50, 10)
     assert campaign.sample("stop_time_s", 45).censored > 0.0

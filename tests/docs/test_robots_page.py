@@ -70,7 +70,7 @@ def test_the_rehearsal_on_the_page_moves_robots_that_hear_one_another(tmp_path, 
         assert sum("swarmwire-agent run --config" in line for line in table) == 3
         with terminal(lines["agents"]) as agents:
             read_until(agents, "Flocking on epuck2 by epuck2")
-            read_until(world, "delivery so far 0")
+            read_until(world, "link PDR so far 0")
 
 
 @pytest.fixture

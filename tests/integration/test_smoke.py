@@ -64,7 +64,7 @@ def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path, monke
     code, out, errors = called(monkeypatch, capsys, "sweep", LOSSY, *vary, "--out", tmp_path / "losses")
     assert code == 0, out + errors
     rows = pl.read_parquet(tmp_path / "losses" / "summary.parquet")
-    pdr = {loss: rows.filter(pl.col("radio.loss") == loss)["radio.pdr"].mean() for loss in (0.0, 0.9)}
+    pdr = {loss: rows.filter(pl.col("radio.loss") == loss)["radio.link_pdr"].mean() for loss in (0.0, 0.9)}
     assert len(rows) == 4
     assert pdr[0.0] == 1.0
     assert pdr[0.9] == pytest.approx(0.1, abs=0.05)

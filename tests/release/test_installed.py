@@ -12,7 +12,7 @@ ON_ROBOTS = {"eclipse-zenoh", "msgpack", "msgspec", "numpy", "swarmwire-agent", 
 QUICK = ("--set", "duration_s=0.5", "--set", "physics.engine=pymunk")
 PLACES = "import json, sys, swarmwire; print(json.dumps([sys.prefix, *swarmwire.__path__]))"
 LISTED = "import importlib.metadata as m, json; print(json.dumps([of.name for of in m.distributions()]))"
-PUSHED = "from swarmwire.deploy.fleet.environment.own_packages import own_entries as o; print(*(e.name for e in o()))"
+DEPLOYED = "from swarmwire.deploy.fleet.environment.own_packages import own_entries as o; print(*(e.name for e in o()))"
 AGENT = """
 from swarmwire.agent import Agent
 
@@ -61,13 +61,13 @@ def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: In
     everything.run("swarmwire", "run", "mine/scenario.toml", *QUICK, "--out", "first", "--quiet")
     summary = json.loads((everything.cwd / "first" / "summary.json").read_text())
     assert (summary["ended"], summary["ticks"]) == ("duration", 5)
-    assert "whole: everything is there" in everything.run("swarmwire", "verify", "first")
+    assert "intact: everything is there" in everything.run("swarmwire", "verify", "first")
 
 
-def test_what_is_pushed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:
-    pushed = everything.python(PUSHED).split()
-    assert {"swarmwire/agent/py.typed", "swarmwire/comms/bodies/epuck2.toml"} <= set(pushed)
-    assert sum(name.endswith("METADATA") for name in pushed) == 2
+def test_what_is_deployed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:
+    deployed = everything.python(DEPLOYED).split()
+    assert {"swarmwire/agent/py.typed", "swarmwire/comms/bodies/epuck2.toml"} <= set(deployed)
+    assert sum(name.endswith("METADATA") for name in deployed) == 2
 
 
 def test_a_robot_gets_nothing_heavy_and_runs_agents(robot: Installed) -> None:

@@ -41,7 +41,8 @@ class RadioResult:
     intended: int  # receivers that they were meant for
     in_range: int  # of these, receivers in range
     fates: dict[str, int]  # receivers; they add up to `intended`
-    pdr: float | None  # received / in_range
+    pdr: float | None  # packet delivery ratio: received / intended; None without intended receivers
+    link_pdr: float | None  # delivery ratio of links: received / in_range; None if no receiver was in range
     latency_air_s: Percentiles  # from sending to hearing
     latency_agent_s: Percentiles  # from sending to the tick at which the receiver could act
 

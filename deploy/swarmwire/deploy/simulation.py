@@ -21,6 +21,7 @@ from swarmwire.deploy.arguments import (
     subtick_of,
     tick_count,
 )
+from swarmwire.deploy.assemble_result import assemble_result
 from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.control.status import Status
@@ -37,7 +38,6 @@ from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.new_medium import new_medium
-from swarmwire.deploy.outcome import outcome
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.origin import Origin
@@ -85,7 +85,7 @@ class Simulation:
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
         agents: the spec of each group's agent.
-        code: the specs of all classes of users': agents, own senses, actuators and metrics.
+        code: the specs of all classes of users': agents, custom sensors, actuators and metrics.
         inputs: of a run that is repeated, what came into it from outside.
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
@@ -262,7 +262,7 @@ class Simulation:
                 parts.update(observer.end(last))
             failed = {f"observer_failed_{observer.name}": 1 for observer in self._observers if observer.failed}
             backend = self._backend
-            self._result = outcome(
+            self._result = assemble_result(
                 self.static,
                 parts,
                 ended=self._ended(error),

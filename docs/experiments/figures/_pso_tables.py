@@ -16,8 +16,8 @@ def against_model(robots: pl.DataFrame, model: pl.DataFrame, column: str, name: 
     rows: list[list[str]] = []
     for value in robots[column].unique(maintain_order=True):
         row = [f"{value:g}"]
-        for outcome in (FIRST, HALF):
-            one, other = (times(runs.filter(pl.col(column) == value), outcome) for runs in (model, robots))
+        for response in (FIRST, HALF):
+            one, other = (times(runs.filter(pl.col(column) == value), response) for runs in (model, robots))
             row += [quartiles(summary(other)), quartiles(summary(one)), difference_text(one, other)]
         rows.append(row)
     return table(head, rows)

@@ -31,7 +31,7 @@ def points(runs: Mapping[str, pl.DataFrame], column: str) -> list[tuple[float, f
 
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
-    """A panel for each outcome over loss, a line for each latency: means with their intervals."""
+    """A panel for each response over loss, a line for each latency: means with their intervals."""
     from swarmwire.metrics.drawing.looks import INK, SOFT, TEXT_PT
     from swarmwire.metrics.drawing.plain_axes import plain_axes
     from swarmwire.metrics.report.figures.ordered_colors import ordered_colors

@@ -23,7 +23,7 @@ CHECKS = {  # each beside the column without losses of the map whose break it ex
     "loss-map-pso-early": ("pso", "bests told 3 s before an update"),
 }
 CAMPAIGNS = (*(f"loss-map-{behaviour}{radio}" for behaviour in BEHAVIOURS for radio in RADIOS), *CHECKS)
-COLUMNS = ("radio.pdr",)
+COLUMNS = ("radio.link_pdr",)
 
 TITLES = {
     "avoidance": "avoidance\nnobody touches in 60 s",
@@ -39,14 +39,14 @@ HALF = 0.5 - 1e-6  # a cell of just one half is within the line
 COLORS = "cividis"  # as ordered for those who cannot tell red from green
 
 
-def outcomes(runs: pl.DataFrame, behaviour: str) -> pl.DataFrame:
+def results(runs: pl.DataFrame, behaviour: str) -> pl.DataFrame:
     """A row per run: loss, latency_s, seed, success; runs that failed to run are left out."""
     loss = next((pl.col(name) for name in LOSSES if name in runs.columns), pl.lit(0.0))
     stopped = pl.col("stop_time_s").is_not_null()
     success = ~stopped if behaviour in STOPPED_IS_FAILURE else stopped
     ran = runs.filter(pl.col("ended") != "failed")
     latency = pl.col("radio.latency_s").alias("latency_s")
-    return ran.select(loss.alias("loss"), latency, "seed", "radio.pdr", success.alias("success"))
+    return ran.select(loss.alias("loss"), latency, "seed", "radio.link_pdr", success.alias("success"))
 
 
 def shares(of: pl.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -64,7 +64,7 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     image = None
     for row, radio in zip(panels, RADIOS, strict=True):
         for axes, behaviour in zip(row, BEHAVIOURS, strict=True):
-            image = _map(axes, *shares(outcomes(runs[f"loss-map-{behaviour}{radio}"], behaviour)))
+            image = _map(axes, *shares(results(runs[f"loss-map-{behaviour}{radio}"], behaviour)))
         row[0].set_ylabel(f"{LABELS[radio]}\nlatency in s", fontsize=TEXT_PT, color=INK)
     for axes, behaviour in zip(panels[0], BEHAVIOURS, strict=True):
         axes.set_title(TITLES[behaviour], loc="left", fontsize=TEXT_PT, color=INK, pad=5)
@@ -108,7 +108,7 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
         f"|{' --- |' * 6}",
     ]
     for behaviour in BEHAVIOURS:
-        one, other = (outcomes(runs[f"loss-map-{behaviour}{radio}"], behaviour) for radio in RADIOS)
+        one, other = (results(runs[f"loss-map-{behaviour}{radio}"], behaviour) for radio in RADIOS)
         lines += [line for cell in CELLS if (line := _cell_line(behaviour, one, other, *cell))]
         lines.append(f"| {behaviour} | all | all | {_mean(one)} | {_mean(other)} | {_difference(one, other)} |")
     return "\n".join([*lines, "", *_check_lines(runs)])
@@ -129,8 +129,8 @@ def _check_lines(runs: Mapping[str, pl.DataFrame]) -> list[str]:
     """A table of what heals a break, latency by latency, without losses."""
     lines = ["| | latency, s | as in the map | with the cure | difference |", f"|{' --- |' * 5}"]
     for name, (behaviour, cure) in CHECKS.items():
-        cured = outcomes(runs[name], behaviour)
-        plain = outcomes(runs[f"loss-map-{behaviour}"], behaviour).filter(pl.col("loss") == 0.0)
+        cured = results(runs[name], behaviour)
+        plain = results(runs[f"loss-map-{behaviour}"], behaviour).filter(pl.col("loss") == 0.0)
         for latency_s in cured["latency_s"].unique().sort():
             pair = (plain.filter(latency_s=latency_s), cured.filter(latency_s=latency_s))
             said = f"{_share(pair[0])} | {_share(pair[1])} | {_difference(*pair)}"

@@ -88,7 +88,7 @@ def _by_range(shares: Any, soon: Any, runs: Mapping[str, pl.DataFrame]) -> None:
     ranges = values(runs["pso-range"], "radio.range_m")
     for kind in KINDS[:2]:
         some = [at(runs[f"pso-range{kind.suffix}"], radio__range_m=range_m) for range_m in ranges]
-        half, first = ([times(each, outcome) for each in some] for outcome in (HALF, FIRST))
+        half, first = ([times(each, response) for each in some] for response in (HALF, FIRST))
         share_curve(shares, ranges, half, kind.look)
         few: Look = {**kind.look, "ls": ":", "lw": 0.9, "ms": 2, "label": f"{kind.who}: the first"}
         share_curve(shares, ranges, first, few)

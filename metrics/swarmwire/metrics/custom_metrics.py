@@ -6,7 +6,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import custom_class
 from swarmwire.metrics.metric import Kind, Metric
 from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
-from swarmwire.metrics.registry import DELIVERY, METRICS
+from swarmwire.metrics.registry import METRICS
 
 COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 
@@ -25,7 +25,7 @@ def _fault(kind: type[Metric]) -> str | None:
     of: dict[str, Any] = {name: getattr(kind, name, None) for name in ("name", "help", "unit", "kind", "bounds")}
     if not isinstance(of["name"], str) or not of["name"].isidentifier():
         return f"expected a name of letters, digits and _; got {of['name']!r}"
-    if of["name"] in {*METRICS, *COLUMNS, DELIVERY}:
+    if of["name"] in {*METRICS, *COLUMNS}:
         return f"expected a name that is not taken; got {of['name']!r}"
     for text in ("help", "unit"):
         if not isinstance(of[text], str):

@@ -13,7 +13,7 @@ from swarmwire.metrics.network.fragmentation_count import Fragmentations
 from swarmwire.metrics.network.fragmented import Fragmented
 from swarmwire.metrics.network.largest_component import LargestComponent
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
-from swarmwire.metrics.network.pdr import PacketDeliveryRatio
+from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio, PacketDeliveryRatio
 from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
 from swarmwire.metrics.network.throughput import Throughput
 from swarmwire.metrics.network.unrejoined import Unrejoined
@@ -41,7 +41,7 @@ from swarmwire.metrics.task.coverage_time import CoverageTime
 from swarmwire.metrics.task.find_time import FindTime
 from swarmwire.metrics.task.target_distance import TargetBest, TargetMean
 
-DELIVERY = "delivery"  # drawn beside the metrics, of packets in the last second: no metric may have its name
+LINK_PDR = LinkPacketDeliveryRatio.name  # drawn of every run with a radio: if not measured, over the last second
 
 # By name, those of users too.
 METRICS: dict[str, type[Metric]] = {
@@ -80,6 +80,7 @@ METRICS: dict[str, type[Metric]] = {
         Articulation,
         Fragmented,
         PacketDeliveryRatio,
+        LinkPacketDeliveryRatio,
         LatencyOnAir,
         LatencyToAgent,
         FindTime,
@@ -93,7 +94,7 @@ METRICS: dict[str, type[Metric]] = {
 
 def register(kind: type[Metric]) -> type[Metric]:
     """Make a metric known by its name (also as a decorator); BadInput if the name is taken."""
-    if kind.name == DELIVERY or METRICS.get(kind.name, kind) is not kind:
+    if METRICS.get(kind.name, kind) is not kind:
         raise BadInput("", f"metrics.{kind.name}", "expected a name that is not taken")
     METRICS[kind.name] = kind
     return kind

@@ -17,9 +17,9 @@ def test_help_waits_for_no_heavy_library():
 
 def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
-    _, out, _ = called(monkeypatch, capsys, "robots", "push", "--help")
+    _, out, _ = called(monkeypatch, capsys, "robots", "deploy", "--help")
     assert "as it was, and others go on; to do it again does only what is missing. Robots" in out
-    assert "  swarmwire robots push fleet.toml --group red --restart" in out
+    assert "  swarmwire robots deploy fleet.toml --group red --restart" in out
 
 
 def test_it_says_its_version(monkeypatch, capsys):

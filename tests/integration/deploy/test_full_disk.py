@@ -51,7 +51,7 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
     assert "4 s in" in told.stdout
     assert "observer_failed_TickRecorder" in told.stdout
     states = {finding.part: finding.state for finding in verify(left)}
-    assert states["static.json"] is states["run.json"] is states["log.txt"] is State.WHOLE
+    assert states["static.json"] is states["run.json"] is states["log.txt"] is State.INTACT
     assert State.DAMAGED not in states.values()
 
 

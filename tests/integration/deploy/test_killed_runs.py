@@ -41,7 +41,7 @@ def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
     assert folder.static == whole.static
     findings = {finding.part: finding for finding in verify(tmp_path)}
     for name in ("ticks", "packets", "events"):
-        assert findings[name].state in (State.PARTIAL, State.WHOLE), findings[name]
+        assert findings[name].state in (State.PARTIAL, State.INTACT), findings[name]
         parts = parts_of(tmp_path, name)
         assert parts == [part_file(tmp_path, name, number) for number in range(len(parts))] or folder.files(name)
         if folder.files(name) or name != "ticks":
@@ -89,14 +89,14 @@ def test_verify_tells_how_far_a_killed_run_came(killed, monkeypatch, capsys):
     assert (code, errors) == (1, "")
     assert f"up to tick {last}" in " ".join(out.split())
     last = out.strip().splitlines()[-1]
-    assert last.startswith("not whole: ")
+    assert last.startswith("not intact: ")
     assert "summary.json missing, ticks partial" in last
 
 
 def test_verify_is_content_with_a_whole_run_and_refuses_what_is_none(whole, tmp_path, monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "verify", whole.path)
     assert (code, errors) == (0, "")
-    assert out.strip().splitlines()[-1].startswith("whole: ")
+    assert out.strip().splitlines()[-1].startswith("intact: ")
     code, _, errors = called(monkeypatch, capsys, "verify", tmp_path)
     assert (code, errors.count("\n")) == (2, 1)
     assert errors.startswith(f"error: {tmp_path}: ")

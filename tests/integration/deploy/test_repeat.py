@@ -288,7 +288,7 @@ class Standing:
 
     def start(self) -> None: ...
 
-    def act(self, tick: int, readings: Readings, received: ReceivedPackets, outcomes: TxStatuses) -> Actions:
+    def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
 
     def counts(self) -> dict[str, int]:

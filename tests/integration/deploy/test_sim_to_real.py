@@ -68,19 +68,19 @@ def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
     assert "over 3 runs" in out.splitlines()[-1]
     order = next(line for line in out.splitlines() if line.startswith("order "))
     assert order.endswith("yes")  # it is one of them
-    delivery = next(line for line in out.splitlines() if line.startswith("delivery "))
-    assert " to " in delivery
+    pdr = next(line for line in out.splitlines() if line.startswith("total pdr "))
+    assert " to " in pdr
 
 
 def test_a_shorter_log_is_not_held_against_a_longer_runs_totals(folders, campaign, tmp_path, monkeypatch, capsys):
     logs = as_logs(watched("duration_s=8"), tmp_path / "logs")
     out = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", logs)[1]
-    assert not [line for line in out.splitlines() if line.startswith(("delivery ", "packets sent", "latency p50"))]
-    told = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, delivery, latency "))
+    assert not [line for line in out.splitlines() if line.startswith(("total pdr ", "packets sent", "latency p50"))]
+    told = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, total pdr, latency "))
     assert "20 s" in told
     out = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)[1]  # a run folder has counts of each tick
     assert [line for line in out.splitlines() if line.startswith("packets sent")]
-    assert "not compared: delivery, latency " in out or "not compared: latency " in out
+    assert "not compared: total pdr, latency " in out or "not compared: latency " in out
 
 
 def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
@@ -96,7 +96,7 @@ def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
     assert float(rows["order"]["log"]) == pytest.approx(float(rows["order"]["emulated_q50"]), abs=0.01)
     assert rows["collisions"]["what"] == "not in the log"
     assert rows["collisions"]["log"] == ""
-    assert rows["delivery"]["what"] == "radio"
+    assert rows["total pdr"]["what"] == "radio"
 
 
 def test_what_cannot_be_is_refused_in_one_line(folders, campaign, tmp_path, monkeypatch, capsys):

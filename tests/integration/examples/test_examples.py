@@ -18,9 +18,9 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 def test_the_sweep_has_a_row_for_each_loss_and_seed():
     runs = table(FLOCK, 2, 2.0)
     assert runs.select("loss", "seed").rows() == [(loss, seed) for loss in LOSSES for seed in (1, 2)]
-    delivered = runs.group_by("loss", maintain_order=True).agg(pl.col("pdr").mean())["pdr"]
+    delivered = runs.group_by("loss", maintain_order=True).agg(pl.col("link_pdr").mean())["link_pdr"]
     assert delivered.is_sorted(descending=True)
-    assert runs.filter(pl.col("loss") == 0.0)["pdr"].to_list() == [1.0, 1.0]
+    assert runs.filter(pl.col("loss") == 0.0)["link_pdr"].to_list() == [1.0, 1.0]
 
 
 GAS = EXAMPLES / "gas" / "gas-leak.toml"
@@ -59,7 +59,7 @@ def test_the_leak_can_be_repeated_from_its_run_folder_alone(tmp_path):
 def test_the_sweep_prints_its_table():
     command = [sys.executable, EXAMPLES / "loss_sweep.py", "--seeds", "1", "--duration", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[0].split("|")[1:-1] == [" loss ", " pdr      ", " order    ", " runs "]
+    assert done.stdout.splitlines()[0].split("|")[1:-1] == [" loss ", " link_pdr ", " order    ", " runs "]
 
 
 # jupyter_client warns of what will change in its own event loop, tornado of the same.

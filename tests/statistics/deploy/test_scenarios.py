@@ -57,7 +57,7 @@ def test_a_flock_finds_one_heading_over_a_perfect_radio_and_over_a_lossy_one(nam
     assert (result.metrics["order"].min or 0.0) < 0.3
     assert final(result, "order") > 0.9
     assert final(result, "largest_component") == 1.0
-    assert result.radio.pdr == pytest.approx(pdr, abs=0.005)
+    assert result.radio.link_pdr == pytest.approx(pdr, abs=0.005)
     assert result.radio.latency_air_s.p50 == pytest.approx(latency_s, abs=0.001)
 
 
@@ -71,9 +71,9 @@ def test_jammed_drowns_packets_keeps_robots_from_sending_and_is_over():
     assert whole.radio is not None
     assert clear.fates["jammed"] == 0
     assert pulses.fates["jammed"] > 2000
-    assert clear.pdr is not None
-    assert pulses.pdr is not None
-    assert pulses.pdr < clear.pdr - 0.05
+    assert clear.link_pdr is not None
+    assert pulses.link_pdr is not None
+    assert pulses.link_pdr < clear.link_pdr - 0.05
     assert whole.radio.fates["channel_busy"] > 10 * pulses.fates["channel_busy"]
     assert sum(whole.radio.fates.values()) == whole.radio.intended
     assert [(event.do, event.tick, event.ended) for event in whole.events] == [
@@ -179,5 +179,5 @@ def test_racks_of_the_warehouse_halve_who_is_in_range_and_part_the_flock():
     assert min(racks.radio.fates[name] for name in ("too_weak", "collided", "out_of_range")) > 1000
     assert racks.radio.in_range < 0.7 * none.radio.in_range
     assert racks.radio.fates["out_of_range"] > 2 * none.radio.fates["out_of_range"]
-    assert 0.5 < (racks.radio.pdr or 0.0) < 0.9
+    assert 0.5 < (racks.radio.link_pdr or 0.0) < 0.9
     assert final(none, "fragmentations") == 0 < final(racks, "fragmentations")

@@ -23,20 +23,20 @@ More of it.
 import polars as pl
 
 CAMPAIGNS = ("two-losses",)
-COLUMNS = ("radio.pdr",)
+COLUMNS = ("radio.link_pdr",)
 
 
 def draw(runs):
     from swarmwire.metrics.report.figures.column_axes import column_axes
 
     figure, axes = column_axes("received", "loss")
-    axes.plot(runs["two-losses"]["radio.loss"], runs["two-losses"]["radio.pdr"], ".")
+    axes.plot(runs["two-losses"]["radio.loss"], runs["two-losses"]["radio.link_pdr"], ".")
     return figure
 
 
 def told(runs):
-    received = runs["two-losses"].group_by("radio.loss", maintain_order=True).agg(pl.col("radio.pdr").mean())
-    table = received.select("radio.loss", "radio.pdr")
+    received = runs["two-losses"].group_by("radio.loss", maintain_order=True).agg(pl.col("radio.link_pdr").mean())
+    table = received.select("radio.loss", "radio.link_pdr")
     rows = "".join(f"| {loss:g} | {pdr:.2f} |\\n" for loss, pdr in table.iter_rows())
     return f"| loss | received |\\n| --- | --- |\\n{rows}"
 '''

@@ -34,7 +34,16 @@ def test_a_run_sweeps_digests_draws_and_tells(places):
     page = (places.pages / "two-received.md").read_text()
     assert page == f"# Two\n\n<!-- numbers -->\n{told}\n<!-- /numbers -->\n\nThe end.\n"
     kept = pl.read_parquet(places.data / "two-losses.parquet")
-    assert kept.columns == ["run", "point", "seed", "radio.loss", "ended", "sim_time_s", "radio.pdr", "timing_wall_s"]
+    assert kept.columns == [
+        "run",
+        "point",
+        "seed",
+        "radio.loss",
+        "ended",
+        "sim_time_s",
+        "radio.link_pdr",
+        "timing_wall_s",
+    ]
     assert len(kept) == 6
 
 
@@ -82,7 +91,7 @@ def test_digests_are_made_of_any_folder_and_drawn_without_one(places, tmp_path):
 
 def test_an_experiment_may_digest_by_itself(places):
     file = places.figures / "two_received.py"
-    own = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.pdr")'
+    own = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.link_pdr")'
     file.write_text(f"{file.read_text()}\n\n{own}\n")
     told, _ = ran(places)
     assert len(told.splitlines()) == 3
@@ -92,8 +101,12 @@ def test_an_experiment_may_digest_by_itself(places):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('COLUMNS = ("radio.pdr",)', 'COLUMNS = ("radio.pdf",)', "radio.pdf: .*did you mean radio.pdr"),
-        ('COLUMNS = ("radio.pdr",)', "", "COLUMNS: is missing"),
+        (
+            'COLUMNS = ("radio.link_pdr",)',
+            'COLUMNS = ("radio.link_pdf",)',
+            "radio.link_pdf: .*did you mean radio.link_pdr",
+        ),
+        ('COLUMNS = ("radio.link_pdr",)', "", "COLUMNS: is missing"),
     ],
 )
 def test_what_the_experiments_file_lacks_is_named(places, old, new, said):

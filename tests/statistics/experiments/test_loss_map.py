@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from docs.experiments.experiment import find_experiment
-from docs.experiments.figures.loss_map import BEHAVIOURS, CHECKS, outcomes, shares
+from docs.experiments.figures.loss_map import BEHAVIOURS, CHECKS, results, shares
 from docs.experiments.places import HERE
 from swarmwire.deploy.measuring import measuring
 from swarmwire.world.scenario.file import load_scenario
@@ -38,22 +38,22 @@ def corners(tmp_path_factory) -> Mapping[str, pl.DataFrame]:
 @pytest.mark.parametrize("radio", ["", "-bursts"])
 @pytest.mark.parametrize("behaviour", ["avoidance", "flocking"])
 def test_a_perfect_radio_is_enough_and_a_late_one_that_loses_most_is_not(corners, behaviour, radio):
-    _, _, share = shares(outcomes(corners[f"loss-map-{behaviour}{radio}"], behaviour))
+    _, _, share = shares(results(corners[f"loss-map-{behaviour}{radio}"], behaviour))
     assert share[0, 0] >= 0.75
     assert share[1, 1] <= 0.25
 
 
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
 def test_without_losses_both_radios_give_the_same_runs(corners, behaviour):
-    found = [outcomes(corners[f"loss-map-{behaviour}{radio}"], behaviour) for radio in ("", "-bursts")]
+    found = [results(corners[f"loss-map-{behaviour}{radio}"], behaviour) for radio in ("", "-bursts")]
     one, other = (of.filter(of["loss"] == 0.0) for of in found)
     assert one.equals(other)
 
 
 def test_both_radios_lose_as_much_in_the_mean(corners):
     for name in ("loss-map-flocking", "loss-map-flocking-bursts"):
-        late = outcomes(corners[name], "flocking").filter(loss=0.9, latency_s=0.0)
-        assert late["radio.pdr"].mean() == pytest.approx(0.1, abs=0.03), name
+        late = results(corners[name], "flocking").filter(loss=0.9, latency_s=0.0)
+        assert late["radio.link_pdr"].mean() == pytest.approx(0.1, abs=0.03), name
 
 
 def test_maps_are_drawn_and_cells_told(corners):

@@ -159,12 +159,12 @@ class EncodedJoiners:
             self._do(*line.split())
 
     def act(
-        self, tick: int, readings: Readings, received: ReceivedPackets, outcomes: TxStatuses = NO_TX_STATUSES
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         lines = [line.split() for line in self._script.get(tick, ())]
         for _, name in (line for line in lines if line[0] == "mute"):
             del self._runners[name]
-        self._deliver(self.roster.open_tick(tick, readings, received, outcomes))
+        self._deliver(self.roster.open_tick(tick, readings, received, tx_status))
         for line in lines:
             self._do(*line)
         assert not self.roster.waiting, self.roster.missing

@@ -15,8 +15,8 @@ cosmic-ray baseline "$config"
 cosmic-ray exec "$config" session.sqlite
 cr-report --surviving-only --show-diff session.sqlite >survivors.txt
 # cr-rate counts what a filter left out as killed, so count here.
-outcomes() { cr-report session.sqlite | grep -c "test outcome: $1" || true; }
-killed=$(outcomes TestOutcome.KILLED) survived=$(outcomes TestOutcome.SURVIVED)
+count() { cr-report session.sqlite | grep -c "test outcome: $1" || true; }
+killed=$(count TestOutcome.KILLED) survived=$(count TestOutcome.SURVIVED)
 tried=$((killed + survived))
 echo "$1: $killed of $tried mutants killed, $((100 * killed / tried)) %; survivors: $copy/survivors.txt"
 [ $((100 * killed)) -ge $((least_killed * tried)) ] || { echo "expected at least $least_killed %"; exit 1; }

@@ -21,7 +21,7 @@ from swarmwire.comms.wire.tick_frames import encode_actions, encode_packets, enc
 from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
 
 # Lengths of axes, each its own, so that a shape can be told in words.
-ARENAS, ROBOTS, TOLD_OF, RECEIVED, SENT, OUTCOMES, MEASURES, BYTES, WIDE = 11, 13, 17, 19, 23, 29, 31, 37, 41
+ARENAS, ROBOTS, TOLD_OF, RECEIVED, SENT, STATUSES, MEASURES, BYTES, WIDE = 11, 13, 17, 19, 23, 29, 31, 37, 41
 SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, TOLD = 43, 47, 53, 59, 61, 67, 71, 73, 79
 AXES = {
     ARENAS: "arenas",
@@ -30,7 +30,7 @@ AXES = {
     RECEIVED: "received",
     SENT: "sent",
     SENT + 1: "sent + 1",
-    OUTCOMES: "outcomes",
+    STATUSES: "statuses",
     MEASURES: "measures",
     BYTES: "bytes",
     WIDE: "numbers of the sense",
@@ -65,9 +65,9 @@ def text() -> str:
         "join, asked": _map(JoinRequest(1, None, {"*": "a"}, "a").encode(), JoinRequest(None, ("a",)).encode()),
         "join, answered": lines_of(paths_of({**_assignment().as_mapping(), "v": frames.VERSION, "memory": b""})),
         "offer, answered": _map(_offer(1.0).encode(), _offer(None).encode()),
-        "tick": _frame(encode_tick(1, _readings(), _received(), TxStatuses(*_ints(3, OUTCOMES)))),
+        "tick": _frame(encode_tick(1, _readings(), _received(), TxStatuses(*_ints(3, STATUSES)))),
         "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
-        "packets": _frame(encode_packets(1, 1, 1, _received(), TxStatuses(*_ints(3, OUTCOMES)))),
+        "packets": _frame(encode_packets(1, 1, 1, _received(), TxStatuses(*_ints(3, STATUSES)))),
         "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
         f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(ObservedRun, left)) for left in LEFT_OUT)),
         "message, on air": f"{Told(x_m=1.5, count=3, place=-2.25, turns=-1).encode().hex(' ')}\n",

@@ -1,4 +1,4 @@
-"""Both kinds of agent read the same of every sense, their own senses too, and set own actuators alike."""
+"""Both kinds of agent read the same of every sense, custom sensors too, and set custom actuators alike."""
 
 from dataclasses import astuple, replace
 from typing import ClassVar

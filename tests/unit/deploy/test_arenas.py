@@ -83,7 +83,7 @@ def test_the_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
 def test_robots_go_round_a_torus_and_are_received_across_its_seam(tmp_path: Path, around: Path):
     result = run(around, out=tmp_path / "run")
     assert result.radio is not None
-    assert (result.radio.pdr or 0.0) > 0.99
+    assert (result.radio.link_pdr or 0.0) > 0.99
     ticks = RunFolder(tmp_path / "run").robots()
     xy = ticks.select("x_m", "y_m").to_numpy().reshape(-1, 12, 2)
     assert np.all(np.abs(xy) <= [1.0 + 1e-6, 0.75 + 1e-6])

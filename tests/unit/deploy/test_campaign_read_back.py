@@ -4,10 +4,10 @@ import pytest
 
 from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder as Written
-from swarmwire.deploy.campaign.task import PieceResult
+from swarmwire.deploy.campaign.task import TaskResult
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 
 CAMPAIGN = Campaign(
     name="loss",
@@ -26,10 +26,10 @@ CAMPAIGN = Campaign(
     point_overrides=((), ()),
     duration_s=20,
     robots=3,
-    outcomes=(Outcome("order.final", "", "number", "order"), Outcome("found_s", "s", "time", "first find")),
+    responses=(Response("order.final", "", "number", "order"), Response("found_s", "s", "time", "first find")),
     series=True,
     record_seeds=(),
-    pack=None,
+    batch=None,
 )
 
 
@@ -40,12 +40,12 @@ def row(run, **of):
 
 @pytest.fixture
 def written(tmp_path):
-    """Two pieces of a campaign: a run that found nothing, one that failed, one that faulted; the last is missing."""
+    """Two tasks of a campaign: a run that found nothing, one that failed, one that faulted; the last is missing."""
     CAMPAIGN.write(tmp_path)
     folder = Written(tmp_path, CAMPAIGN)
     found = row(1, **{"order.final": 0.9, "found_s": 7.5})
-    folder.keep(PieceResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
-    folder.keep(PieceResult((row(2, ended="failed", error="the agent failed"),)))
+    folder.keep(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
+    folder.keep(TaskResult((row(2, ended="failed", error="the agent failed"),)))
     return folder
 
 
@@ -62,7 +62,7 @@ def test_an_unfinished_campaign_is_read_back(written):
 
 
 def test_a_finished_campaign_is_read_back(written):
-    written.keep(PieceResult((row(3, **{"order.final": None, "found_s": None}),)))
+    written.keep(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
     written.finish(files=1)
     read = CampaignFolder(written.path)
     assert read.finished
@@ -73,6 +73,6 @@ def test_a_finished_campaign_is_read_back(written):
 
 def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
     assert CampaignFolder(written.path).sample("order", 1).failed == 1
-    written.keep(PieceResult((row(2, **{"order.final": 0.7}),)))
+    written.keep(TaskResult((row(2, **{"order.final": 0.7}),)))
     again = CampaignFolder(written.path).sample("order", 1)
     assert (again.value.tolist(), again.failed) == ([0.7], 0)

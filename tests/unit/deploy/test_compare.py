@@ -20,10 +20,10 @@ def folders(tmp_path):
 
 def test_a_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folders):
     to = tmp_path / "x.csv"
-    code, out, errors = called(monkeypatch, capsys, "compare", *folders, "--outcome", "order", "--to", to)
+    code, out, errors = called(monkeypatch, capsys, "compare", *folders, "--response", "order", "--to", to)
     assert (code, errors) == (0, "")
     heading, *lines = out.splitlines()
-    assert heading.split() == ["outcome", "at", "A", "B", "B", "-", "A", "interval", "delta", "p", "pairs"]
+    assert heading.split() == ["response", "at", "A", "B", "B", "-", "A", "interval", "delta", "p", "pairs"]
     assert [line.split()[:2] for line in lines[:3]] == [
         ["order.final", f"radio.loss={loss}"] for loss in ("0", "0.2", "0.4")
     ]
@@ -41,7 +41,7 @@ def test_points_are_chosen_by_value(monkeypatch, capsys, folders):
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--outcome", "ordr"), ("--at", "radio.loss=3"), ("--at", "radio.loss"), ("--to", "x.txt")]
+    "arguments", [("--response", "ordr"), ("--at", "radio.loss=3"), ("--at", "radio.loss"), ("--to", "x.txt")]
 )
 def test_what_is_wrong_gets_one_line_and_exit_code_2(monkeypatch, capsys, folders, arguments):
     code, _, errors = called(monkeypatch, capsys, "compare", *folders, *arguments)
@@ -57,4 +57,4 @@ def test_a_terminal_gets_a_table_no_wider_than_it_is(folders):
     )
     lines = out.getvalue().splitlines()
     assert all(len(Text.from_ansi(line).plain) <= 100 for line in lines)
-    assert sum("order.final" in line for line in lines) == 1  # an outcome is named once
+    assert sum("order.final" in line for line in lines) == 1  # a response is named once

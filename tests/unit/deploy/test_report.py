@@ -25,10 +25,10 @@ def campaign(tmp_path):
 
 
 def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign):
-    code, out, errors = report(campaign, "--outcome", "order", "--outcome", "aggregation_time_s.")
-    assert (code, errors.startswith("error: --outcome: aggregation_time_s.: ")) == (2, True)
+    code, out, errors = report(campaign, "--response", "order", "--response", "aggregation_time_s.")
+    assert (code, errors.startswith("error: --response: aggregation_time_s.: ")) == (2, True)
     assert not (campaign / "report.html").exists()
-    code, out, _ = report(campaign, "--outcome", "order")
+    code, out, _ = report(campaign, "--response", "order")
     figures = sorted(path.name for path in (campaign / "figures").iterdir())
     assert code == 0
     assert out.splitlines() == [f"written: {campaign}/report.html", f"written: {campaign}/figures (2 figures)"]
@@ -37,7 +37,7 @@ def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign
 
 
 def test_a_page_of_another_name_has_figures_of_its_own(report, campaign, tmp_path):
-    code, out, _ = report(campaign, "--outcome", "order", "--to", tmp_path / "order.html")
+    code, out, _ = report(campaign, "--response", "order", "--to", tmp_path / "order.html")
     assert code == 0
     assert out.splitlines()[1] == f"written: {tmp_path}/order-figures (2 figures)"
     assert not (campaign / "report.html").exists()
@@ -50,8 +50,8 @@ def test_a_runs_report_lies_in_its_folder(report, tmp_path):
     code, out, _ = report(tmp_path / "run")
     assert code == 0
     assert out.splitlines()[0] == f"written: {tmp_path}/run/report.html"
-    code, _, errors = report(tmp_path / "run", "--outcome", "order")
-    assert (code, errors.startswith("error: --outcome: order: expected a campaign")) == (2, True)
+    code, _, errors = report(tmp_path / "run", "--response", "order")
+    assert (code, errors.startswith("error: --response: order: expected a campaign")) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_a_runs_report_lies_in_its_folder(report, tmp_path):
 def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "figures").write_text("in the way")
-    code, _, errors = report(campaign, "--outcome", "order", "--to", tmp_path / to)
+    code, _, errors = report(campaign, "--response", "order", "--to", tmp_path / to)
     assert code == 2
     assert says in errors
     assert errors.count("\n") == 1

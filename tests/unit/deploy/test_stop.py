@@ -5,7 +5,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.deploy.campaign.outcomes import outcomes_of
+from swarmwire.deploy.campaign.responses import responses_of
 from swarmwire.deploy.campaign.row import row_of
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
@@ -73,7 +73,7 @@ def test_each_arena_ends_when_its_own_metric_has_held_and_others_go_on(tmp_path,
     assert summary["stop"] == ["order at least 0.85 for 0.5 s"]
     assert [end["stop_time_s"] for end in summary["by_arena"]] == [arena.stop_time_s for arena in result.arenas]
     assert RunFolder(tmp_path / "run").summary == summary
-    assert {finding.state for finding in verify(tmp_path / "run")} <= {State.WHOLE, State.NOT_RECORDED}
+    assert {finding.state for finding in verify(tmp_path / "run")} <= {State.INTACT, State.NOT_RECORDED}
 
 
 def test_an_arena_comes_to_the_same_alone_as_beside_others(scenario):
@@ -89,9 +89,9 @@ def test_rows_of_a_campaign_say_when_and_by_what_each_run_stopped(scenario):
         expected = (arena.ended, arena.ticks, arena.sim_time_s, arena.stop_time_s, arena.stopped_by)
         assert tuple(row[name] for name in ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by")) == expected
         assert row["aggregation_time_s"] == arena.metrics["aggregation_time_s"].final
-    by_column = {outcome.column: outcome.kind for outcome in outcomes_of([load_scenario(scenario, [listed])])}
+    by_column = {response.column: response.kind for response in responses_of([load_scenario(scenario, [listed])])}
     assert by_column["stop_time_s"] == by_column["aggregation_time_s"] == "time"
-    assert "stop_time_s" not in {of.column for of in outcomes_of([load_scenario(scenario, ["stop=[]"])])}
+    assert "stop_time_s" not in {of.column for of in responses_of([load_scenario(scenario, ["stop=[]"])])}
 
 
 def test_a_run_whose_arenas_have_all_stopped_is_over_and_is_repeated_from_its_folder(tmp_path, scenario):

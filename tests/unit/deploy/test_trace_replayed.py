@@ -46,7 +46,7 @@ def test_a_run_is_repeated_from_its_folder_alone(tmp_path: Path):
         shutil.copy(file, there)
     result = run(there / REPLAYED.name, overrides=["duration_s=3"], out=tmp_path / "run")
     assert result.radio is not None
-    assert 0.7 < (result.radio.pdr or 0.0) < 0.99
+    assert 0.7 < (result.radio.link_pdr or 0.0) < 0.99
     shutil.rmtree(there)
     copy = tmp_path / "run" / "files" / "replayed-links.csv"
     assert copy.read_bytes() == REPLAYED.with_suffix(".csv").read_bytes()

@@ -215,7 +215,7 @@ def test_a_class_that_is_no_metric_is_refused(kind, hint):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("name", value) for value in ("two words", "order", "x_m", "delivery")),
+        *(("name", value) for value in ("two words", "order", "x_m", "link_pdr")),
         *(("unit", 3), ("kind", "sum"), ("bounds", (None, 1.0))),
     ],
 )

@@ -93,7 +93,7 @@ def test_a_registered_metric_is_measured_by_name(monkeypatch):
     assert [metric.name for metric in Metrics(["turned"]).metrics] == ["turned"]
 
 
-@pytest.mark.parametrize("taken", ["order", "delivery"])
+@pytest.mark.parametrize("taken", ["order", "link_pdr"])
 def test_a_name_that_is_taken_is_refused(taken):
     class Other(Turned):
         name = taken

@@ -110,6 +110,7 @@ LAWS = {
     "throughput": Laws(nobody=0.0, lone=0.0, radio=True, pause=nothing),
     "airtime": Laws(lone=0.0, radio=True, pause=None),
     "pdr": WINDOW,
+    "link_pdr": WINDOW,
     "latency_air": WINDOW,
     "latency_agent": WINDOW,
     "target_best": Laws(lone=1.0),

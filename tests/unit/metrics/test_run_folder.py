@@ -79,7 +79,7 @@ def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monke
     folder = RunFolder(tmp_path)
     assert folder.metrics(0).columns == [name for name in folder.metrics(1).columns if name != "value"]
     assert table_fault("ticks", folder.ticks().lazy(), of) is None
-    assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {State.WHOLE, State.PARTIAL}
+    assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {State.INTACT, State.PARTIAL}
     if since == TICKS:
         assert "value" not in folder.ticks().columns
         assert "value" not in folder.robots(0).columns

@@ -14,7 +14,7 @@ from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.whole_file import write_whole
 
 SCENARIO_FOLDER = "scenario"
@@ -40,10 +40,10 @@ class Campaign:
     point_overrides: tuple[tuple[str, ...], ...]  # of each point, for the scenario in the folder
     duration_s: float
     robots: int  # in an arena, at the point that has most
-    outcomes: tuple[Outcome, ...]
+    responses: tuple[Response, ...]
     series: bool  # whether each tick's metrics are kept
     record_seeds: tuple[int, ...]  # whose runs have run folders
-    pack: int | None  # arenas in a world at most; None: as many as make sense
+    batch: int | None  # arenas in a world at most; None: as many as make sense
 
     @property
     def runs(self) -> int:
@@ -61,7 +61,7 @@ class Campaign:
     def columns(self) -> Columns:
         """The columns of its rows."""
         varied = {path: [point[path] for point in self.points] for path in self.vary}
-        return Columns(varied, [outcome.column for outcome in self.outcomes])
+        return Columns(varied, [response.column for response in self.responses])
 
     def write(self, folder: Path) -> None:
         """Write `campaign.json`; OSError if the disk will not."""
@@ -91,12 +91,12 @@ def read_campaign(folder: Path) -> Campaign:
 
 def _check(campaign: Campaign, where: str) -> None:
     """BadInput for what only those who run a campaign need of it."""
-    overrides, pack = campaign.point_overrides, campaign.pack
+    overrides, batch = campaign.point_overrides, campaign.batch
     texts: Any = [text for of_point in overrides for text in of_point]
     good = {
         "point_overrides": len(overrides) == len(campaign.points) and all(isinstance(text, str) for text in texts),
         "robots": _is_count(campaign.robots),
-        "pack": pack is None or _is_count(pack),
+        "batch": batch is None or _is_count(batch),
         "record_seeds": set(campaign.record_seeds) <= set(campaign.seeds),
     }
     for key, is_good in good.items():
@@ -112,7 +112,7 @@ def _campaign(found: dict[str, Any]) -> Campaign:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "points", "overrides", "record_seeds")}
     objects: dict[str, Any] = {
         "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
-        "outcomes": tuple(Outcome(**known_fields(Outcome, outcome)) for outcome in found["outcomes"]),
+        "responses": tuple(Response(**known_fields(Response, response)) for response in found["responses"]),
         "point_overrides": tuple(tuple(texts) for texts in found["point_overrides"]),
     }
     return Campaign(**{**known_fields(Campaign, found), **tuples, **objects})

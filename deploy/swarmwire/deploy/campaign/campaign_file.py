@@ -22,7 +22,7 @@ TYPES: dict[str, tuple[type, ...]] = {
     "design_seed": (int,),
     "vary": (dict,),
     "overrides": (list,),
-    "pack": (int,),
+    "batch": (int,),
     "series": (bool,),
     "record_seeds": (int, str, list),
 }
@@ -69,7 +69,7 @@ def asked_in(path: Path, table: Mapping[str, Any]) -> Asked:
         design_seed=table.get("design_seed", 1),
         overrides=tuple(overrides),
         name=table.get("name"),
-        pack=table.get("pack"),
+        batch=table.get("batch"),
         series=table.get("series", True),
         record_seeds=seed_list(recorded, f"{where}: record_seeds") if recorded else (),
     )

@@ -1,7 +1,7 @@
-"""The folder of a campaign while it is written: finished pieces at once, one table of all runs at the end.
+"""The folder of a campaign while it is written: finished tasks at once, one table of all runs at the end.
 
     campaign.json, scenario/       from what it is made; written first
-    parts/part-N.parquet           rows of a finished piece, numbered as they came
+    parts/part-N.parquet           rows of a finished task, numbered as they came
     series/part-RUN.parquet        its tick series, written before its rows, named after the first run in it
     summary.parquet                all rows, by run; then the parts go (of runs that are tried again, parts come first)
     series/worker-N.parquet        all tick series, by run
@@ -22,7 +22,7 @@ from swarmwire.deploy.campaign.columns import COUNTS
 from swarmwire.deploy.campaign.series_files import join_series, series_part, sort_out_series
 from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.campaign.taken import taken
-from swarmwire.deploy.campaign.task import PieceResult, Row
+from swarmwire.deploy.campaign.task import Row, TaskResult
 from swarmwire.metrics.campaign.formats import FAILED, PARTS, SERIES, SUMMARY
 from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.record.names import SCENARIO
@@ -71,8 +71,8 @@ class CampaignFolder:
                     shutil.rmtree(aside) if aside.is_dir() else aside.unlink()
             sort_out_series(self.path / SERIES, self.ended())
 
-    def keep(self, result: PieceResult) -> None:
-        """Write the rows and the series of a finished piece."""
+    def keep(self, result: TaskResult) -> None:
+        """Write the rows and the series of a finished task."""
         points = self.campaign.points
         rows: list[Row] = [{**row, **points[row["point"]]} for row in result.rows]
         with storing(self.path):

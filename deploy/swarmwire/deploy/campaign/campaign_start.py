@@ -53,10 +53,10 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
         point_overrides=point_overrides,
         duration_s=scenario.duration_s,
         robots=plan.robots,
-        outcomes=plan.outcomes,
+        responses=plan.responses,
         series=asked.series,
         record_seeds=asked.record_seeds,
-        pack=asked.pack,
+        batch=asked.batch,
     )
 
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.deploy.campaign.outcomes import STOP_TIME
+from swarmwire.deploy.campaign.responses import STOP_TIME
 from swarmwire.deploy.campaign.task import Row
 from swarmwire.metrics.campaign.formats import FAILED
 
@@ -25,11 +25,11 @@ Values = Mapping[str, Sequence[Any]]  # by varied path: all the values that it t
 class Columns:
     """The columns of one campaign's rows."""
 
-    def __init__(self, varied: Values, outcomes: Sequence[str]) -> None:
-        """`outcomes` in order; a time of stopping among them brings its cause along."""
+    def __init__(self, varied: Values, responses: Sequence[str]) -> None:
+        """`responses` in order; a time of stopping among them brings its cause along."""
         self._varied = {path: _type_of(values) for path, values in varied.items()}
-        after = [name for name in outcomes if name != STOP_TIME]
-        stop = [STOP_TIME, STOPPED_BY] if STOP_TIME in outcomes else []
+        after = [name for name in responses if name != STOP_TIME]
+        stop = [STOP_TIME, STOPPED_BY] if STOP_TIME in responses else []
         self._known = [*KEYS, *varied, *ENDS, *stop, *after]
 
     def frame(self, rows: Sequence[Row]) -> "pl.DataFrame":
@@ -43,7 +43,7 @@ class Columns:
         return pl.DataFrame([{name: self._cell(name, row.get(name)) for name in names} for row in rows], schema)
 
     def joined(self, frames: Iterable["pl.DataFrame"]) -> "pl.DataFrame":
-        """The tables of several pieces as one, by run, of each run the last row; what was never counted was 0."""
+        """The tables of several tasks as one, by run, of each run the last row; what was never counted was 0."""
         import polars as pl
 
         whole = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")

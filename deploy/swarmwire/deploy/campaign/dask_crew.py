@@ -162,7 +162,7 @@ class DaskCrew:
             return ClusterFailed("the scheduler has gone away, or was restarted")
         except KilledWorker:
             return Finished(task, None, f"worker {address} died")
-        except Exception as error:  # noqa: BLE001 - run_piece raises nothing: it is the worker, or dask
+        except Exception as error:  # noqa: BLE001 - run_task raises nothing: it is the worker, or dask
             return ClusterFailed(f"worker {address}: {type(error).__name__}: {error}")
         finally:
             future.release()

@@ -4,12 +4,12 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 
 from swarmwire.deploy.campaign.executor import Executor, Finished
-from swarmwire.deploy.campaign.piece import lost_piece
-from swarmwire.deploy.campaign.task import PieceResult, Task
+from swarmwire.deploy.campaign.run_task import lost_task
+from swarmwire.deploy.campaign.task import Task, TaskResult
 
 TRIES = 2  # of a task whose worker dies, before it is halved
 WAIT_S = 0.1  # at most, until somebody's wish to stop is seen
-Keep = Callable[[Task, PieceResult], None]
+Keep = Callable[[Task, TaskResult], None]
 
 
 def execute(tasks: Iterable[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool] = lambda: False) -> bool:
@@ -40,5 +40,5 @@ def _after_loss(done: Finished, tries: int, keep: Keep) -> list[Task]:
         return [done.task]
     if len(done.task.runs) > 1:
         return list(done.task.halves())
-    keep(done.task, lost_piece(done.task, done.lost))
+    keep(done.task, lost_task(done.task, done.lost))
     return []

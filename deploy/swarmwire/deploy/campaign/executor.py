@@ -14,7 +14,7 @@ from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import CLUSTER
 from swarmwire.comms.plugins import entry_points_of
-from swarmwire.deploy.campaign.task import PieceResult, Task
+from swarmwire.deploy.campaign.task import Task, TaskResult
 
 GROUP = "swarmwire.executors"
 LOCAL = "local"
@@ -26,14 +26,14 @@ class Finished:
     """A task that is over."""
 
     task: Task
-    result: PieceResult | None  # None: the worker died, or its machine went away
+    result: TaskResult | None  # None: the worker died, or its machine went away
     lost: str = ""  # how, in words: "the worker died, signal 9"
 
 
 class Executor(Protocol):
     """Takes tasks, and yields each once, when it is over or lost; tries nothing twice by itself.
 
-    Each task is done by `piece.run_piece(task, worker)`, in a process that may be ended at any time.
+    Each task is done by `run_task.run_task(task, worker)`, in a process that may be ended at any time.
     """
 
     @property

@@ -9,13 +9,13 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.columns import FIXED
 from swarmwire.deploy.campaign.design import GRID, Point, points_of
-from swarmwire.deploy.campaign.outcomes import outcomes_of
+from swarmwire.deploy.campaign.responses import responses_of
 from swarmwire.deploy.campaign.toml_value import toml_value
 from swarmwire.deploy.campaign.vary import Range, Vary
 from swarmwire.deploy.campaign.whole_numbers import whole_numbers
 from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
@@ -35,7 +35,7 @@ class Asked:
     design_seed: int = 1
     overrides: tuple[str, ...] = ()
     name: str | None = None  # None: the scenario's
-    pack: int | None = None
+    batch: int | None = None
     series: bool = True
     record_seeds: tuple[int, ...] = ()
 
@@ -47,7 +47,7 @@ class Plan:
     asked: Asked
     scenario: Scenario  # with the overrides of all points
     points: tuple[Point, ...]
-    outcomes: tuple[Outcome, ...]
+    responses: tuple[Response, ...]
     code: tuple[str, ...]  # the specs of users' classes, of all points
     robots: int  # in an arena, at the point that has most
 
@@ -77,8 +77,8 @@ def planned(asked: Asked) -> Plan:
     strange = [seed for seed in asked.record_seeds if seed not in asked.seeds]
     if strange:
         raise BadInput("--record-seeds", "", f"expected seeds of the campaign, got {strange[0]}")
-    if asked.pack is not None and asked.pack < 1:
-        raise BadInput("--pack", "", f"expected at least 1, got {asked.pack}")
+    if asked.batch is not None and asked.batch < 1:
+        raise BadInput("--batch", "", f"expected at least 1, got {asked.batch}")
     mapping = mapping_of(scenario)
     scenarios, code = list[Scenario](), dict[str, None]()
     for point in points:
@@ -89,7 +89,7 @@ def planned(asked: Asked) -> Plan:
             _refuse_alone(scenario, error)
             raise _blamed(error, asked.varied, point) from None
     robots = max(len(at.robot_names()) for at in scenarios)
-    return Plan(asked, scenario, tuple(points), outcomes_of(scenarios), tuple(code), robots)
+    return Plan(asked, scenario, tuple(points), responses_of(scenarios), tuple(code), robots)
 
 
 def _scenario_of(asked: Asked) -> Scenario:

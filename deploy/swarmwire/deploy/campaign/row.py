@@ -9,7 +9,7 @@ from swarmwire.metrics.campaign.formats import FAILED
 
 STATISTICS = ("final", "mean", "min", "max")
 LATENCIES = ("latency_air_s", "latency_agent_s")
-TOTALS = ("sent", "intended", "in_range", "pdr")
+TOTALS = ("sent", "intended", "in_range", "pdr", "link_pdr")
 
 
 def row_of(arena: ArenaResult, times: Collection[str]) -> Row:

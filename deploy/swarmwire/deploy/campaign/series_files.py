@@ -1,4 +1,4 @@
-"""The tick series of a campaign on disk: a part per piece while it goes on, a few files once it is over."""
+"""The tick series of a campaign on disk: a part per task while it goes on, a few files once it is over."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -16,7 +16,7 @@ def series_part(folder: Path, run: int) -> Path:
 
 
 def sort_out_series(folder: Path, done: Collection[int]) -> None:
-    """Take away parts of pieces whose rows were never written (runs that are not in `done`), or that were joined."""
+    """Take away parts of tasks whose rows were never written (runs that are not in `done`), or that were joined."""
     parts, files = _parts(folder), list(folder.glob("worker-*.parquet"))
     if not parts:
         return
@@ -28,7 +28,7 @@ def sort_out_series(folder: Path, done: Collection[int]) -> None:
 
 
 def join_series(folder: Path, files: int) -> None:
-    """Make of all parts at most so many files, `worker-N.parquet`, each a stretch of runs; read piece by piece."""
+    """Make of all parts at most so many files, `worker-N.parquet`, each a stretch of runs; read part by part."""
     import polars as pl
 
     parts = _parts(folder)

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.deploy.arguments import SeedsGiven, seed_list
+from swarmwire.deploy.campaign.batches import tasks_of
 from swarmwire.deploy.campaign.campaign import SCENARIO_FOLDER, read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.campaign_start import begin, default_folder
 from swarmwire.deploy.campaign.design import GRID
 from swarmwire.deploy.campaign.execution import Keep, execute
 from swarmwire.deploy.campaign.executor import LOCAL, Executor, open_executor
-from swarmwire.deploy.campaign.pieces import tasks_of
 from swarmwire.deploy.campaign.plan import Asked, Plan, planned
 from swarmwire.deploy.campaign.resumption import check_code, check_files, check_same
-from swarmwire.deploy.campaign.task import PieceResult, Task
+from swarmwire.deploy.campaign.task import Task, TaskResult
 from swarmwire.deploy.campaign.vary import vary_from
 from swarmwire.deploy.campaign.watcher import NobodyWatches, Watcher
 from swarmwire.deploy.interrupt import Interrupt
@@ -30,7 +30,7 @@ class Means:
 
     on: str = LOCAL  # executor
     workers: int | None = None  # None: one for each core
-    pack: int | None = None  # arenas in a world; None: as the campaign says
+    batch: int | None = None  # arenas in a world; None: as the campaign says
     executor: Executor | None = None  # one that is open, and stays so, instead of `on` and `workers`
 
 
@@ -60,7 +60,7 @@ def sweep(
     overrides: Sequence[str] = (),
     out: Path | str | None = None,
     name: str | None = None,
-    pack: int | None = None,
+    batch: int | None = None,
     series: bool = True,
     record_seeds: SeedsGiven = (),
     on: str = LOCAL,
@@ -72,7 +72,7 @@ def sweep(
     `seeds` are how many (9: 1 to 9), a list, or a text as for `--seeds`. `vary` gives, by path, a list of values, a
     table with from, to, count (and scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random"
     and "latin" with so many `points` from ranges without count. `out` is a new or empty folder,
-    campaigns/<scenario>-<UTC> by default. `pack` arenas at most are run as one world. With `series` each tick's metrics
+    campaigns/<scenario>-<UTC> by default. At most `batch` arenas are one world. With `series` each tick's metrics
     are kept, too; runs of `record_seeds` get run folders. Ctrl-C ends it; `resume` goes on.
 
     Raises BadInput for anything wrong with these, before anything is run, and StorageFailed when the disk is full. What
@@ -88,7 +88,7 @@ def sweep(
         design_seed=design_seed,
         overrides=tuple(overrides),
         name=name,
-        pack=pack,
+        batch=batch,
         series=series,
         record_seeds=seed_list(record_seeds, "--record-seeds") if record_seeds else (),
     )
@@ -102,7 +102,7 @@ def resume(
     *,
     retry_failed: bool = False,
     anyway: bool = False,
-    pack: int | None = None,
+    batch: int | None = None,
     on: str = LOCAL,
     workers: int | None = None,
     watcher: Watcher | None = None,
@@ -112,7 +112,7 @@ def resume(
     Raises BadInput if the folder holds no campaign, its scenario's files have changed, or, unless `anyway`, the code,
     versions or CPU have; and what `sweep` raises.
     """
-    means = Means(on, workers, pack)
+    means = Means(on, workers, batch)
     return resume_sweep(Path(folder), means, retry_failed=retry_failed, anyway=anyway, watcher=watcher)
 
 
@@ -128,7 +128,7 @@ def begin_sweep(
     with _executor(means, path) as executor:
         folder = CampaignFolder(path, begin(plan, path, command))
         with folder.taken():
-            return _work(folder, {}, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+            return _work(folder, {}, executor, means.batch, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
 def resume_sweep(
@@ -152,7 +152,7 @@ def resume_sweep(
     with _executor(means, path) as executor, folder.taken():
         folder.clear()
         tried = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
-        return _work(folder, tried, executor, means.pack, watcher or NobodyWatches(), interrupt or Interrupt())
+        return _work(folder, tried, executor, means.batch, watcher or NobodyWatches(), interrupt or Interrupt())
 
 
 @contextmanager
@@ -168,16 +168,16 @@ def _work(
     folder: CampaignFolder,
     ended: dict[int, str],
     executor: Executor,
-    pack: int | None,
+    batch: int | None,
     watcher: Watcher,
     interrupt: Interrupt,
 ) -> Sweep:
     """Do all runs but those that have `ended`, and how, already; then make the table of all runs."""
     campaign = folder.campaign
     slots = executor.slots  # as they are now: workers may come and go
-    tasks = tasks_of(campaign, folder, ended, pack, slots)
+    tasks = tasks_of(campaign, folder, ended, batch, slots)
 
-    def keep(_: Task, result: PieceResult) -> None:
+    def keep(_: Task, result: TaskResult) -> None:
         folder.keep(result)
         ended.update({row["run"]: row["ended"] for row in result.rows})
         watcher.see(result)

@@ -29,7 +29,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class PieceResult:
+class TaskResult:
     """What came of a task: a row for each of its runs, in their order, also for those that failed."""
 
     rows: tuple[Row, ...]
@@ -47,11 +47,11 @@ def task_from(message: Mapping[str, Any]) -> Task:
     return Task(**{**message, **tuples})
 
 
-def result_message(result: PieceResult) -> dict[str, Any]:
+def result_message(result: TaskResult) -> dict[str, Any]:
     """A result as a plain mapping."""
     return {"rows": list(result.rows), "series": result.series}
 
 
-def result_from(message: Mapping[str, Any]) -> PieceResult:
+def result_from(message: Mapping[str, Any]) -> TaskResult:
     """The result of such a mapping."""
-    return PieceResult(tuple(message["rows"]), message["series"])
+    return TaskResult(tuple(message["rows"]), message["series"])

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from swarmwire.deploy.campaign.campaign import Campaign
-from swarmwire.deploy.campaign.task import PieceResult
+from swarmwire.deploy.campaign.task import TaskResult
 
 
 class Watcher(Protocol):
@@ -13,8 +13,8 @@ class Watcher(Protocol):
         """Work begins; so many runs have rows already, of which so many failed."""
         ...
 
-    def see(self, result: PieceResult) -> None:
-        """A piece is done and kept."""
+    def see(self, result: TaskResult) -> None:
+        """A task is done and kept."""
         ...
 
     def end(self) -> None:
@@ -28,7 +28,7 @@ class NobodyWatches:
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
         """Nothing."""
 
-    def see(self, result: PieceResult) -> None:
+    def see(self, result: TaskResult) -> None:
         """Nothing."""
 
     def end(self) -> None:

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import BinaryIO
 
 from swarmwire.deploy.campaign.messages import receive, send
-from swarmwire.deploy.campaign.piece import run_piece
+from swarmwire.deploy.campaign.run_task import run_task
 from swarmwire.deploy.campaign.task import Task, result_message, task_from
 
 
@@ -31,7 +31,7 @@ def main(arguments: list[str]) -> None:
             send(results, {"alive": name})
 
     while True:
-        send(results, result_message(run_piece(tasks.get(), name, alive)))
+        send(results, result_message(run_task(tasks.get(), name, alive)))
 
 
 def _listen(given: BinaryIO, tasks: SimpleQueue[Task]) -> None:

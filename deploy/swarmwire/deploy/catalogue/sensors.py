@@ -19,7 +19,7 @@ from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
 
 def sensors() -> list[Entry]:
     """Those of bodies, then those of packets."""
-    return [*_of_bodies(), *_of_packets(), _of_outcomes()]
+    return [*_of_bodies(), *_of_packets(), _of_tx_status()]
 
 
 def _of_bodies() -> Iterator[Entry]:
@@ -40,7 +40,7 @@ def _of_packets() -> Iterator[Entry]:
         yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] measures.{of.name}"))
 
 
-def _of_outcomes() -> Entry:
+def _of_tx_status() -> Entry:
     results = tuple((result.name, result.meaning) for result in TxResult)
     facts = (
         ("in an agent", f'needs = ("{TX_STATUS}", …)'),

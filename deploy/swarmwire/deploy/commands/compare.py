@@ -11,9 +11,9 @@ Campaign = Annotated[str, typer.Argument(help="A campaign's folder; FOLDER@radio
 def compare_command(
     a: Campaign,
     b: Campaign,
-    outcome: Annotated[
+    response: Annotated[
         list[str] | None,
-        typer.Option(help="A column of outcomes, or a metric for its last value. Repeatable.", metavar="NAME"),
+        typer.Option(help="A column of responses, or a metric for its last value. Repeatable.", metavar="NAME"),
     ] = None,
     at: Annotated[
         list[str] | None,
@@ -24,9 +24,9 @@ def compare_command(
     """Compare two campaigns: medians, their difference and how sure it is, at each design point that both have.
 
     Points that agree in every parameter that both vary are compared, and seeds that both ran one by one. Unless
-    outcomes are named they are all times, the last values of metrics, and the delivery ratio. For example:
+    responses are named they are all times, the last values of metrics, and the link PDR. For example:
 
-      swarmwire compare runs/plain runs/smoothed --outcome order
+      swarmwire compare runs/plain runs/smoothed --response order
 
       swarmwire compare runs/loss@radio.loss=0 runs/loss@radio.loss=0.4
     """
@@ -40,7 +40,7 @@ def compare_command(
     from swarmwire.metrics.campaign.selection import select
 
     first, second = at_points([select(a), select(b)], at or [])
-    found = compare(first, second, outcome or [])
+    found = compare(first, second, response or [])
     print_comparison(found, Console(highlight=False))
     if to is not None:
         write_comparison(found, to)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def report_command(
     folder: Annotated[Path, typer.Argument(help="The folder of a campaign or of a run.", metavar="DIR")],
-    outcome: Annotated[
+    response: Annotated[
         list[str] | None,
         typer.Option(
             help="Of a campaign: a column, or a metric for its last value. Repeatable. Default: eight at most.",
@@ -27,21 +27,21 @@ def report_command(
 ) -> None:
     """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
 
-    Also of what is not finished. Unless outcomes are named they are times, last values of metrics and the delivery
-    ratio, of those that differ between runs; tables that are folded hold the others. For example:
+    Also of what is not finished. Unless responses are named they are times, last values of metrics and the link PDR, of
+    those that differ between runs; tables that are folded hold the others. For example:
 
-      swarmwire report campaigns/loss --outcome aggregation_time_s --outcome order
+      swarmwire report campaigns/loss --response aggregation_time_s --response order
     """
     # Imported here: matplotlib and scipy take a second, which --help should not.
     from swarmwire.metrics.report.write_report import PAGE, write_report
 
-    written = write_report(_report(folder, outcome or []), to or folder / PAGE)
+    written = write_report(_report(folder, response or []), to or folder / PAGE)
     typer.echo(f"written: {written[0]}")
     if len(written) > 1:
         typer.echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
 
 
-def _report(folder: Path, outcomes: list[str]) -> "Report":
+def _report(folder: Path, responses: list[str]) -> "Report":
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
     from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
     from swarmwire.metrics.campaign.formats import ABOUT
@@ -50,9 +50,9 @@ def _report(folder: Path, outcomes: list[str]) -> "Report":
     from swarmwire.metrics.report.run_report import run_report
 
     if (folder / ABOUT).exists():
-        return campaign_report(CampaignFolder(folder), outcomes)
+        return campaign_report(CampaignFolder(folder), responses)
     if not (folder / STATIC).exists():
         raise BadInput(str(folder), "", f"expected the folder of a campaign ({ABOUT}) or of a run ({STATIC})")
-    if outcomes:
-        raise BadInput("--outcome", outcomes[0], "expected a campaign: a run has all its metrics in its report")
+    if responses:
+        raise BadInput("--response", responses[0], "expected a campaign: a run has all its metrics in its report")
     return run_report(folder)

@@ -58,7 +58,7 @@ def sweep_command(
         int | None,
         typer.Option(help="Worker processes, or threads of a cluster at most. Default: one for each core; all."),
     ] = None,
-    pack: Annotated[
+    batch: Annotated[
         int | None, typer.Option(help="Arenas in one world at most; 1: none together. Default: about 50.")
     ] = None,
     series: Annotated[bool, typer.Option(help="Keep the metrics of each tick.")] = True,
@@ -96,13 +96,13 @@ def sweep_command(
         "points": points,
         "design_seed": design_seed,
         "name": name,
-        "pack": pack,
+        "batch": batch,
         "record_seeds": None if record_seeds is None else seed_list(record_seeds, "--record-seeds"),
         "series": None if series else False,
     }
     plan = _plan(source, vary or [], seeds, overrides or [], {key: of for key, of in said.items() if of is not None})
     console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
-    work = Work(Means(on, workers, pack), sweep_progress(console), interrupt)
+    work = Work(Means(on, workers, batch), sweep_progress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is None:
             done = _begun(plan, source, out, work)

@@ -37,8 +37,8 @@ def tune_command(
     goal: Annotated[
         str | None,
         typer.Option(
-            help='"min OUTCOME.STAT" or "max OUTCOME.STAT" over the seeds; STAT: q25, q50 (default), q75, mean or, of '
-            "times, censored.",
+            help='"min RESPONSE.STAT" or "max RESPONSE.STAT" over the seeds; STAT: q25, q50 (default), q75, mean or, '
+            "of times, censored.",
             metavar="GOAL",
         ),
     ] = None,
@@ -77,7 +77,7 @@ def tune_command(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Search the parameters of a scenario with which an outcome over many seeds is best.
+    """Search the parameters of a scenario with which a response over many seeds is best.
 
     Each trial runs all seeds with the parameters that Optuna proposes. The best is then checked against the scenario's
     own parameters on seeds that no trial had. Ctrl-C, or a kill, loses the trials under way alone: --resume DIR goes

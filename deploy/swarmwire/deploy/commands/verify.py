@@ -10,7 +10,7 @@ from rich.text import Text
 
 from swarmwire.deploy.commands.exit_codes import FAILED
 
-STYLES = {"whole": "green", "not recorded": "dim", "partial": "yellow"}  # red for the others
+STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # red for the others
 
 
 def verify_command(
@@ -18,7 +18,7 @@ def verify_command(
 ) -> None:
     """Check a run folder: read all of it, compare it with its summary, and say what is missing.
 
-    Exit code 0: whole; 1: incomplete or damaged (what a killed run left can still be read); 2: no run folder.
+    Exit code 0: intact; 1: incomplete or damaged (what a killed run left can still be read); 2: no run folder.
     """
     from swarmwire.metrics.verify.verify import verify
 
@@ -33,6 +33,6 @@ def verify_command(
     console.print(table)
     bad = [finding for finding in findings if not finding.good]
     if bad:
-        console.print("not whole: " + ", ".join(f"{finding.part} {finding.state}" for finding in bad), soft_wrap=True)
+        console.print("not intact: " + ", ".join(f"{finding.part} {finding.state}" for finding in bad), soft_wrap=True)
         raise typer.Exit(FAILED)
-    console.print("whole: everything is there, readable, and as the summary says")
+    console.print("intact: everything is there, readable, and as the summary says")

@@ -1,23 +1,23 @@
-"""`swarmwire robots check`: whether a push would work, and what runs afterwards."""
+"""`swarmwire robots check`: whether a deployment would work, and what runs afterwards."""
 
 from collections.abc import Mapping, Sequence
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.fleet.deploy import SPARE_BYTES
 from swarmwire.deploy.fleet.driver_address import driver_endpoint
 from swarmwire.deploy.fleet.environment.target import Target
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_failed import HostFailed
 from swarmwire.deploy.fleet.host_session import HostSession
 from swarmwire.deploy.fleet.on_hosts import on_hosts
-from swarmwire.deploy.fleet.push import SPARE_BYTES
 from swarmwire.deploy.fleet.result import Result
 from swarmwire.deploy.fleet.watcher import SILENT, Watcher
 
 REACH_S = 3.0
 MAX_AHEAD_NS = 20_000_000  # of a clock: more would show in latencies between robots
 NS_PER_MS = 1_000_000
-FIRST_PUSH_BYTES = 150_000_000 + SPARE_BYTES  # what packages come to
+FIRST_DEPLOYMENT_BYTES = 150_000_000 + SPARE_BYTES  # what packages come to
 
 
 async def check(
@@ -32,8 +32,8 @@ async def check(
         said = session.facts
         target = Target.of(said)
         session.need_manager()
-        if said["free_bytes"] < FIRST_PUSH_BYTES:
-            free = f"{said['free_bytes'] / 1e6:.0f} MB are free, {FIRST_PUSH_BYTES / 1e6:.0f} MB are needed"
+        if said["free_bytes"] < FIRST_DEPLOYMENT_BYTES:
+            free = f"{said['free_bytes'] / 1e6:.0f} MB are free, {FIRST_DEPLOYMENT_BYTES / 1e6:.0f} MB are needed"
             raise HostFailed(f"the disk is full: {free}", "make room: df -h")
         notes = await _notes(session, robot)
         version = ".".join(map(str, said["python"]))

@@ -27,7 +27,7 @@ CURES = {
     "damaged": "do it again; if it stays so, the card may be worn out",
     "busy": "wait for it, then do it again",
     "systemd": "a robot needs systemd with a manager for its user: systemctl --user status",
-    "first": "push one",
+    "first": "deploy one",
 }
 NO_PYTHON = (126, 127)  # what shells say of a program that is not there, or none
 NO_MODULE = re.compile(r"No module named '(\w+)")
@@ -140,7 +140,7 @@ class HostSession:
 def _trial_failed(lines: list[str]) -> HostFailed:
     """The failure of a trial run, of which these are the last lines."""
     missing = NO_MODULE.search(lines[-1])
-    cures = [f'packages = ["{missing[1]}"] in fleet.toml pushes what the agent imports'] if missing else lines[:-1]
+    cures = [f'packages = ["{missing[1]}"] in fleet.toml deploys what the agent imports'] if missing else lines[:-1]
     return HostFailed(f"the trial run on the robot failed: {lines[-1]}", " | ".join(cures))
 
 

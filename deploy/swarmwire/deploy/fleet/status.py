@@ -48,7 +48,7 @@ def _told(robot: str, state: Mapping[str, Any]) -> RobotState:
     release = f"{running} (next: {current})" if running and running != current else current or ""
     return RobotState(
         robot=robot,
-        unit="never pushed" if current is None else active if active == sub else f"{active} ({sub})",
+        unit="never deployed" if current is None else active if active == sub else f"{active} ({sub})",
         release=release,
         since=state["ActiveEnterTimestamp"].partition(" ")[2] if active == "active" else "",  # less the weekday
         restarts=int(state.get("NRestarts") or 0),

@@ -26,7 +26,7 @@ async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT
     async def one(session: HostSession, robot: Robot) -> Result:
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         if state["current"] is None:
-            raise HostFailed("there is no release to start", "swarmwire robots push")
+            raise HostFailed("there is no release to start", "swarmwire robots deploy")
         if state["ActiveState"] == "active":
             return Result(robot.name, True, f"runs already: {state['running'] or state['current']}")
         watcher.step(robot.name, "start")
@@ -44,7 +44,7 @@ async def stop(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT)
     async def one(session: HostSession, robot: Robot) -> Result:
         before = (await session.ask("state", robots=[robot.name]))[robot.name]
         if before["LoadState"] == "not-found":
-            return Result(robot.name, True, "does not run: nothing was ever pushed")
+            return Result(robot.name, True, "does not run: nothing was ever deployed")
         watcher.step(robot.name, "stop")
         said = (await session.ask("run_units", verb="stop", robots=[robot.name]))[robot.name]
         if said:

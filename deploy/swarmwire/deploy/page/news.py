@@ -109,7 +109,7 @@ class NewsThread(threading.Thread):
 def _numbers(news: News) -> News:
     """What is drawn as a curve."""
     tick_ms = news.get("measures_ms")
-    return {"pdr": news.get("pdr"), "alive": news.get("alive"), "tick_ms": tick_ms, **news.get("metrics", {})}
+    return {"link_pdr": news.get("link_pdr"), "alive": news.get("alive"), "tick_ms": tick_ms, **news.get("metrics", {})}
 
 
 def _put(queue: asyncio.Queue[News | None], news: News | None) -> None:

@@ -25,7 +25,7 @@ class Seen:
         self._every = -(-static.robots // MAX_PLACES)
         self._static = static
         self._who: dict[str, str] = {}
-        self.numbers: dict[str, Any] = {"centre": None, "places": [], "pdr": None, "who": {}}
+        self.numbers: dict[str, Any] = {"centre": None, "places": [], "link_pdr": None, "who": {}}
 
     def see(self, glimpse: ObservedTick) -> None:
         """Take one more."""
@@ -39,7 +39,7 @@ class Seen:
                 [*place, bool(lives)]
                 for place, lives in zip(places[shown].round(2).tolist(), alive[shown], strict=True)
             ],
-            "pdr": self._pdr(glimpse),
+            "link_pdr": self._link_pdr(glimpse),
             "who": self._whom(truth.events),
         }
 
@@ -50,7 +50,7 @@ class Seen:
             self._who = dict([*self._who.items(), *begun.items()][-MAX_WHO:])
         return self._who
 
-    def _pdr(self, glimpse: ObservedTick) -> float | None:
+    def _link_pdr(self, glimpse: ObservedTick) -> float | None:
         """Received over in range in the last simulated second; None if none was in range."""
         truth = glimpse.truth
         if truth.tally is not None:

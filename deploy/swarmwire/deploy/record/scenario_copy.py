@@ -34,7 +34,8 @@ class CopiedFile:
 
     path: str  # within the run folder
     sha256: str
-    what: str  # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "own sense" | "own actuator" | "metric"
+    # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
+    what: str
 
 
 def copy_scenario(
@@ -77,7 +78,7 @@ def _copied_body(sheet: Path, copies: "Copies") -> str:
     """The path within the run folder of a body's sheet, which names the copies of its files."""
     body: dict[str, Any] = from_toml(sheet.read_text(encoding="utf-8-sig"))
     body.setdefault("name", sheet.stem)  # the copy's may be another
-    for what, tables in (("own sense", body.get("sensors", {})), ("own actuator", body.get("actuators", {}))):
+    for what, tables in (("custom sensor", body.get("sensors", {})), ("custom actuator", body.get("actuators", {}))):
         for table in tables.values():
             if "kind" in table:
                 table["kind"] = copies.class_of(table["kind"], sheet.parent, what).removeprefix(f"{FILES}/")

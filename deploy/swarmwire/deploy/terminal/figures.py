@@ -82,12 +82,12 @@ class Figures:
         return to_s(tick_start_ns(self.ticks, self.static.rate_hz))
 
     @property
-    def pdr(self) -> float:
+    def link_pdr(self) -> float:
         """Received over in range, of all packets so far; NaN if none was in range."""
         return _share(int(self.fates[Fate.RECEIVED]), self._in_range)
 
     @property
-    def pdr_of_second(self) -> float:
+    def link_pdr_of_second(self) -> float:
         """The same over the last simulated second."""
         return _share(sum(received for received, _ in self._second), sum(in_range for _, in_range in self._second))
 

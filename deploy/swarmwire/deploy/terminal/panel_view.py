@@ -38,7 +38,7 @@ def panel_view(figures: Figures, controls: Controls, health: RunnerHealth | None
     lines = [_state(figures, controls), _progress(figures, inner), _time(figures, controls), Text()]
     lines += [_level(figures, name, width) for name in figures.levels]
     if figures.static.range_m is not None:
-        lines += [_delivery(figures), Text(), *_fates(figures, inner)]
+        lines += [_link_pdr(figures), Text(), *_fates(figures, inner)]
     if health or controls.real_time:
         lines += [Text(), _health(health, controls)]
     lines += [Text(), *(_help() if controls.help_asked else _events(figures))]
@@ -103,9 +103,9 @@ def _level(figures: Figures, name: str, width: int) -> Text:
     return _row(name.replace("_", " "), "-" if math.isnan(value) else text).append("  ").append(curve, "cyan")
 
 
-def _delivery(figures: Figures) -> Text:
-    line = _row("delivery ratio", _percent(figures.pdr_of_second))
-    return line.append("  in the last second, ", "dim").append(_percent(figures.pdr)).append(" in all", "dim")
+def _link_pdr(figures: Figures) -> Text:
+    line = _row("link PDR", _percent(figures.link_pdr_of_second))
+    return line.append("  in the last second, ", "dim").append(_percent(figures.link_pdr)).append(" in all", "dim")
 
 
 def _fates(figures: Figures, width: int) -> list[Text]:

@@ -37,7 +37,7 @@ class ProgressLines:
             self._next_share += SHARE
             wall_s = to_s(self._clock.now_ns() - self._began_ns)
             speed = f"{figures.time_s / wall_s if wall_s > 0 else 0.0:.1f} x real time"
-            levels = [(name, figures.level(name)) for name in figures.levels] + [("delivery so far", figures.pdr)]
+            levels = [(name, figures.level(name)) for name in figures.levels] + [("link PDR so far", figures.link_pdr)]
             known = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))
             self._print(
                 f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"

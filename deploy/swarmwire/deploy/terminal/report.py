@@ -123,13 +123,18 @@ def _add_radio(table: Table, arena: ArenaResult) -> None:
         return
     # Who has an obstacle in between is not in range, or a rock in the way would look like a bad radio.
     where = "in range and sight" if radio.fates[BLOCKED] else "in range"
-    share = "" if radio.pdr is None else f"; {radio.pdr:.1%} of these received it"
-    reached = f"{radio.intended} intended receivers, {radio.in_range} {where}{share}"
-    table.add_row("radio", f"{radio.sent} packets, {reached}")
+    receivers = f"{radio.intended} intended receivers{_ratio('pdr', radio.pdr)}"
+    table.add_row(
+        "radio", f"{radio.sent} packets, {receivers}, {radio.in_range} {where}{_ratio('link_pdr', radio.link_pdr)}"
+    )
     table.add_row("fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count))
     table.add_row(
         "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
     )
+
+
+def _ratio(name: str, ratio: float | None) -> str:
+    return "" if ratio is None else f" ({name} {ratio:.1%})"
 
 
 def _in_words(metric: "Metric", value: Statistics) -> str:

@@ -5,7 +5,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from swarmwire.comms.clock import Clock, WallClock, to_s
 from swarmwire.deploy.campaign.campaign import Campaign
-from swarmwire.deploy.campaign.task import PieceResult
+from swarmwire.deploy.campaign.task import TaskResult
 from swarmwire.deploy.campaign.watcher import Watcher
 from swarmwire.metrics.campaign.formats import FAILED
 
@@ -32,8 +32,8 @@ class Figures:
         self.runs, self.done, self.failed = campaign.runs, done, failed
         self._began_ns = self._clock.now_ns()
 
-    def see(self, result: PieceResult) -> None:
-        """Count a piece."""
+    def see(self, result: TaskResult) -> None:
+        """Count a task."""
         self._new += len(result.rows)
         self.done += len(result.rows)
         self.failed += sum(row["ended"] == FAILED for row in result.rows)
@@ -71,7 +71,7 @@ class SweepBar:
         self._progress.start()
         self._bar = self._progress.add_task(campaign.name, total=campaign.runs, completed=done, told="starting")
 
-    def see(self, result: PieceResult) -> None:
+    def see(self, result: TaskResult) -> None:
         """Draw it on."""
         self._figures.see(result)
         if self._bar is not None:
@@ -97,7 +97,7 @@ class SweepLines:
         self._print(f"{campaign.name}: {points} points x {seeds} seeds = {campaign.runs} runs{here}")
         self._next = done + SHARE * campaign.runs
 
-    def see(self, result: PieceResult) -> None:
+    def see(self, result: TaskResult) -> None:
         """Say how far it is, ten times in all."""
         figures = self._figures
         figures.see(result)

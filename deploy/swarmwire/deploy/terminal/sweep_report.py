@@ -11,14 +11,14 @@ from rich.text import Text
 from swarmwire.deploy.campaign.sweeping import Sweep
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.formats import FAILED
-from swarmwire.metrics.campaign.outcome import FINAL, PDR, Outcome
 from swarmwire.metrics.campaign.point_values import value_text
+from swarmwire.metrics.campaign.response import FINAL, LINK_PDR, Response
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.texts import number_text, quantile_text
 
 MAX_POINTS = 20  # that are shown
-MAX_OUTCOMES = 4
+MAX_RESPONSES = 4
 
 
 def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
@@ -44,27 +44,27 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
 
 
 def _table(folder: CampaignFolder) -> Table:
-    about, outcomes = folder.about, _outcomes(folder)
+    about, responses = folder.about, _responses(folder)
     title = f"{about.name}: medians over {len(about.seeds)} seeds"
     table = Table(title=Text(title), title_justify="left", title_style="bold")
     for path in folder.parameters:
         table.add_column(Text(path), style="cyan")
     table.add_column("failed", justify="right")
-    for outcome in outcomes:
-        table.add_column(Text(outcome.column.removesuffix(FINAL)), justify="right", overflow="fold")
+    for response in responses:
+        table.add_column(Text(response.column.removesuffix(FINAL)), justify="right", overflow="fold")
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["point"].to_list()
     for number, point in enumerate(about.points[:MAX_POINTS]):
-        medians = [_median(folder.sample(outcome.column, number)) for outcome in outcomes]
+        medians = [_median(folder.sample(response.column, number)) for response in responses]
         table.add_row(*(Text(value_text(value)) for value in point.values()), str(failed.count(number)), *medians)
     return table
 
 
-def _outcomes(folder: CampaignFolder) -> Sequence[Outcome]:
-    """The first usual ones that have any value, and last the delivery ratio."""
+def _responses(folder: CampaignFolder) -> Sequence[Response]:
+    """The first usual ones that have any value, and last the link PDR."""
     runs = folder.runs
-    usual = [of for of in folder.outcomes if of.is_usual and of.column in runs.columns and runs[of.column].count()]
-    first, pdr = [of for of in usual if of.column != PDR], [of for of in usual if of.column == PDR]
-    return first[: MAX_OUTCOMES - len(pdr)] + pdr
+    usual = [of for of in folder.responses if of.is_usual and of.column in runs.columns and runs[of.column].count()]
+    first, last = [of for of in usual if of.column != LINK_PDR], [of for of in usual if of.column == LINK_PDR]
+    return first[: MAX_RESPONSES - len(last)] + last
 
 
 def _median(sample: Sample) -> str:

@@ -37,7 +37,7 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     for line in (
         f"written: {folder}",
         f"run the best: {program} run {folder / FILE}",
-        f"compare all outcomes: {program} compare {tuned.check.own_folder} {tuned.check.best_folder}",
+        f"compare all responses: {program} compare {tuned.check.own_folder} {tuned.check.best_folder}",
         f"try more: {program} tune --resume {folder} --trials {2 * tuned.tuning.trials}",
     ):
         console.print(line, markup=False, soft_wrap=True)

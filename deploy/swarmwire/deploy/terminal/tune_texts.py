@@ -16,8 +16,8 @@ from swarmwire.metrics.statistics.texts import UNKNOWN_TEXT, interval_text, numb
 
 def statistic_text(trial: Trial, goal: Goal) -> str:
     """Of a trial on its seeds: a number with its unit, or `> 60 s`."""
-    statistic = trial.outcome.statistic
-    if trial.outcome.value is None:
+    statistic = trial.result.statistic
+    if trial.result.value is None:
         return UNKNOWN_TEXT
     return with_unit(quantile_text(math.nan if statistic is None else statistic, goal.limit_s), goal)
 
@@ -34,7 +34,7 @@ def sample_text(sample: Sample, goal: Goal) -> str:
 
 def with_unit(text: str, goal: Goal) -> str:
     """A number of the goal's statistic with its unit; a share has none."""
-    return text if goal.stat == "censored" or not goal.outcome.unit else f"{text} {goal.outcome.unit}"
+    return text if goal.stat == "censored" or not goal.response.unit else f"{text} {goal.response.unit}"
 
 
 def _interval(sample: Sample, goal: Goal) -> Interval:

@@ -1,1 +1,1 @@
-"""Tunings: a search for the parameters of a scenario with which an outcome over many seeds is best."""
+"""Tunings: a search for the parameters of a scenario with which a response over many seeds is best."""

@@ -20,7 +20,7 @@ def best_of(trials: Sequence[Trial], goal: Goal) -> Trial | None:
     """The best of those that are complete, the first of equals; None if none is."""
     best: tuple[float, Trial] | None = None
     for trial in trials:
-        value = trial.outcome.value
+        value = trial.result.value
         if value is not None and (best is None or goal.better(value, best[0])):
             best = value, trial
     return None if best is None else best[1]

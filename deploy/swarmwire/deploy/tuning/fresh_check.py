@@ -1,6 +1,6 @@
 """The best parameters against the scenario's own, on seeds with which neither was chosen: two campaigns.
 
-check/own, check/trial-N    campaigns of one point each, with the same seeds
+check/baseline, check/trial-N    campaigns of one point each, with the same seeds
 """
 
 import shutil
@@ -24,7 +24,7 @@ from swarmwire.metrics.statistics.interval import Interval
 from swarmwire.metrics.statistics.sample import Sample, number_sample
 
 CHECK = "check"
-OWN = "own"
+BASELINE = "baseline"
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,12 @@ class CheckRun:
     def run(self, best: Trial, best_file: Path) -> FreshCheck | None:
         """Run both campaigns, or what is missing of them; None if interrupted."""
         sweeps: list[Sweep] = []
-        for name, file in ((OWN, scenario_file(self.folder)), (f"trial-{best.number}", best_file)):
+        for name, file in ((BASELINE, scenario_file(self.folder)), (f"trial-{best.number}", best_file)):
             sweeps.append(self._swept(name, file))
             if not sweeps[-1].is_over:
                 return None
         own, tried = (sweep.folder for sweep in sweeps)
-        column = self.tuning.goal.outcome.column
+        column = self.tuning.goal.response.column
         return FreshCheck(_sample(own, column), _sample(tried, column), own, tried)
 
     def _swept(self, name: str, file: Path) -> Sweep:
@@ -65,14 +65,14 @@ class CheckRun:
             return resume_sweep(path, means, anyway=True, watcher=self.watcher, interrupt=self.interrupt)
         if path.exists():
             shutil.rmtree(path)  # killed before it had begun
-        label = "as it is" if name == OWN else name.replace("-", " ")
+        label = "as it is" if name == BASELINE else name.replace("-", " ")
         asked = Asked(file, self.tuning.check_seeds, name=f"{self.tuning.scenario}, {label}")
         return begin_sweep(planned(asked), path, self.tuning.command, means, self.watcher, self.interrupt)
 
 
 def _sample(folder: Path, column: str) -> Sample:
     campaign = CampaignFolder(folder)
-    if column in (outcome.column for outcome in campaign.outcomes):
+    if column in (response.column for response in campaign.responses):
         return campaign.sample(column, 0)
     return number_sample(np.empty(0))  # a choice brought the metric along
 

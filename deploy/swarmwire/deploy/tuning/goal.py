@@ -1,4 +1,4 @@
-"""What a tuning aims at: an outcome's statistic over the seeds, as small or as large as can be.
+"""What a tuning aims at: a response's statistic over the seeds, as small or as large as can be.
 
 The value that Optuna is given is that statistic. A quantile of a time that was not reached has none: it is known to lie
 beyond the limit, the longest duration that a run can have. Its value is then limit * (1 + share of runs censored):
@@ -14,14 +14,14 @@ import numpy as np
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.task import Row
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.campaign.statistic import Stat, find_statistic
 from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
 
 Direction = Literal["min", "max"]
 SHARES: dict[Stat, float] = {"q25": 0.25, "q50": 0.5, "q75": 0.75}
-EXPECTED = 'expected "min OUTCOME.STAT" or "max OUTCOME.STAT", such as "min aggregation_time_s.q50"'
+EXPECTED = 'expected "min RESPONSE.STAT" or "max RESPONSE.STAT", such as "min aggregation_time_s.q50"'
 
 
 class Reached(NamedTuple):
@@ -35,17 +35,17 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Goal:
-    """An outcome's statistic, and which way it is to go."""
+    """A response's statistic, and which way it is to go."""
 
     direction: Direction
-    outcome: Outcome
+    response: Response
     stat: Stat
     limit_s: float  # the longest duration of a run at any point that is searched
 
     @property
     def text(self) -> str:
         """As people write it."""
-        return f"{self.direction} {self.outcome.column}.{self.stat}"
+        return f"{self.direction} {self.response.column}.{self.stat}"
 
     def reached(self, sample: Sample) -> Reached:
         """What the runs of a point came to."""
@@ -67,29 +67,29 @@ class Goal:
             if self.stat != "mean":
                 return curve.quantile(SHARES[self.stat])
             # Of min(time, limit): every trial's mean is then up to the same time.
-            return curve.restricted_mean(float(self.outcome.watched_s(np.array(self.limit_s))))
+            return curve.restricted_mean(float(self.response.watched_s(np.array(self.limit_s))))
         if self.stat == "mean":
             return float(sample.value.mean())
         return float(np.quantile(sample.value, SHARES[self.stat]))
 
 
-def goal_of(text: str, outcomes: Iterable[Outcome], limit_s: float) -> Goal:
-    """The goal that a text says; BadInput unless it is one of these outcomes, with a way to go."""
+def goal_of(text: str, responses: Iterable[Response], limit_s: float) -> Goal:
+    """The goal that a text says; BadInput unless it is one of these responses, with a way to go."""
     direction, _, name = text.strip().partition(" ")
     if direction not in ("min", "max") or not name.strip():
         raise BadInput("--goal", "", f"{EXPECTED}; got {text!r}")
-    outcome, stat = find_statistic(name.strip(), outcomes, "--goal")
-    return Goal("min" if direction == "min" else "max", outcome, stat, limit_s)
+    response, stat = find_statistic(name.strip(), responses, "--goal")
+    return Goal("min" if direction == "min" else "max", response, stat, limit_s)
 
 
-def sample_of(rows: Sequence[Row], outcome: Outcome) -> Sample:
-    """The values of an outcome in rows of a point, none of which failed, by seed."""
-    found = np.array([_number(row.get(outcome.column)) for row in rows])
+def sample_of(rows: Sequence[Row], response: Response) -> Sample:
+    """The values of a response in rows of a point, none of which failed, by seed."""
+    found = np.array([_number(row.get(response.column)) for row in rows])
     seed = np.array([row["seed"] for row in rows], np.int64)
     there = np.isfinite(found)
-    if outcome.kind == "time":
+    if response.kind == "time":
         end_s = np.array([row["sim_time_s"] for row in rows], np.float64)
-        return Sample(np.where(there, found, outcome.watched_s(end_s)), there, seed, "time")
+        return Sample(np.where(there, found, response.watched_s(end_s)), there, seed, "time")
     return Sample(found[there], there[there], seed[there], undefined=int(np.count_nonzero(~there)))
 
 

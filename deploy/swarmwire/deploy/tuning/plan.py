@@ -56,9 +56,9 @@ def planned_tuning(asked: TuningAsked) -> TuningPlan:
     searches = tuple(search_from(vary, is_whole) for vary in asked.searched)
     ends = tuple(_ends(asked, vary, search) for vary, search in zip(asked.searched, searches, strict=True))
     plans = (own, *ends)
-    outcomes = {of.column: of for plan in plans for of in plan.outcomes}
+    responses = {of.column: of for plan in plans for of in plan.responses}
     limit_s = max(plan.at(point).duration_s for plan in plans for point in plan.points)
-    goal = goal_of(asked.goal, outcomes.values(), limit_s)
+    goal = goal_of(asked.goal, responses.values(), limit_s)
     code = tuple(dict.fromkeys(spec for plan in plans for spec in plan.code))
     return TuningPlan(asked, own.scenario, searches, ends, goal, code)
 

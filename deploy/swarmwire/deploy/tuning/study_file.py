@@ -18,7 +18,7 @@ from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.tuning.quietly import quietly
 from swarmwire.deploy.tuning.search import Parameter
 from swarmwire.deploy.tuning.space import direction_of, space_of
-from swarmwire.deploy.tuning.trial import Outcome, State, Trial
+from swarmwire.deploy.tuning.trial import State, Trial, TrialResult
 from swarmwire.deploy.tuning.tuning import Tuning
 
 FILE = "study.journal"
@@ -67,17 +67,17 @@ class StudyFile:
         with storing(self._folder, "tune"):
             self.study.add_trial(frozen)
 
-    def finish(self, number: int, outcome: Outcome) -> Trial:
+    def finish(self, number: int, result: TrialResult) -> Trial:
         """Write what came of a trial that is under way, and give it back."""
         study = self._storage.get_study_id_from_name(NAME)
         trial = self._storage.get_trial_id_from_study_id_trial_number(study, number)
         with storing(self._folder, "tune"):
-            for name, value in outcome.attributes().items():
+            for name, value in result.attributes().items():
                 self._storage.set_trial_user_attr(trial, name, value)
-            if outcome.value is None:
+            if result.value is None:
                 self.study.tell(number, state=TrialState.FAIL)
             else:
-                self.study.tell(number, outcome.value)
+                self.study.tell(number, result.value)
         return self.trials()[number]
 
 
@@ -101,5 +101,5 @@ def _drop_half_a_line(path: Path) -> None:
 
 def _trial(frozen: FrozenTrial) -> Trial:
     state = STATES.get(frozen.state, "running")
-    outcome = Outcome() if state == "running" else Outcome(value=frozen.value, **frozen.user_attrs)
-    return Trial(frozen.number, cast("dict[str, Parameter]", frozen.params), state, outcome)
+    result = TrialResult() if state == "running" else TrialResult(value=frozen.value, **frozen.user_attrs)
+    return Trial(frozen.number, cast("dict[str, Parameter]", frozen.params), state, result)

@@ -12,7 +12,7 @@ WHEN = "in tick "  # so begins the line below a traceback that says when in the 
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialResult:
     """What a trial that is over came to."""
 
     value: float | None = None  # that Optuna was given; None: it failed
@@ -34,7 +34,7 @@ class Trial:
     number: int
     parameters: Mapping[str, Parameter]  # by path; of choices the text
     state: State
-    outcome: Outcome
+    result: TrialResult
 
     @property
     def is_over(self) -> bool:
@@ -44,7 +44,7 @@ class Trial:
     @property
     def why(self) -> str:
         """Its error in a line: what was raised, without where."""
-        lines = self.outcome.error.strip().splitlines()
+        lines = self.result.error.strip().splitlines()
         if len(lines) > 1 and lines[-1].startswith(WHEN):
             return f"{lines[-2]}, {lines[-1]}"
         return lines[-1] if lines else ""

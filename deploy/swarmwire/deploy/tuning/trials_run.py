@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from swarmwire.deploy.campaign.batches import batch_for, shares
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Executor
-from swarmwire.deploy.campaign.pieces import pack_for, shares
-from swarmwire.deploy.campaign.task import PieceResult, Row, Task
+from swarmwire.deploy.campaign.task import Row, Task, TaskResult
 from swarmwire.deploy.tuning.goal import Goal, sample_of
 from swarmwire.deploy.tuning.proposals import proposals
 from swarmwire.deploy.tuning.study_file import StudyFile
-from swarmwire.deploy.tuning.trial import Outcome, Trial
+from swarmwire.deploy.tuning.trial import Trial, TrialResult
 from swarmwire.deploy.tuning.trials_table import write_trials
 from swarmwire.deploy.tuning.tuning import Tuning, scenario_file
 from swarmwire.metrics.campaign.formats import FAILED
@@ -70,18 +70,18 @@ class TrialsRun:
         """Run these; each is kept as soon as all its seeds have been run. False if stopped before the end."""
         found: dict[int, list[Row]] = {trial.number: [] for trial in trials}
 
-        def keep(task: Task, result: PieceResult) -> None:
+        def keep(task: Task, result: TaskResult) -> None:
             rows = found[task.point]
             rows += result.rows
             if len(rows) == len(self.tuning.seeds):
                 rows.sort(key=lambda row: row["run"])
-                self.watcher.see(self.study.finish(task.point, outcome_of(rows, self.tuning.goal)))
+                self.watcher.see(self.study.finish(task.point, trial_result(rows, self.tuning.goal)))
 
         return execute(self._tasks(trials), self.executor, keep, self.stopped)
 
     def _tasks(self, trials: Sequence[Trial]) -> list[Task]:
         tuning = self.tuning
-        size = pack_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
+        size = batch_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
         return [
             Task(
                 scenario=str(scenario_file(self.folder)),
@@ -96,16 +96,16 @@ class TrialsRun:
         ]
 
 
-def outcome_of(rows: Sequence[Row], goal: Goal) -> Outcome:
+def trial_result(rows: Sequence[Row], goal: Goal) -> TrialResult:
     """What a trial came to, by the rows of all its seeds; where one failed, the trial did.
 
     Without that seed it would not be compared with others on the same seeds.
     """
     failed = [row for row in rows if row["ended"] == FAILED]
     if failed:
-        return Outcome(failed=len(failed), error=str(failed[0]["error"]))
-    reached = goal.reached(sample_of(rows, goal.outcome))
+        return TrialResult(failed=len(failed), error=str(failed[0]["error"]))
+    reached = goal.reached(sample_of(rows, goal.response))
     if math.isnan(reached.value):
-        return Outcome(undefined=reached.undefined, error=f"no run has a value of {goal.outcome.column}")
+        return TrialResult(undefined=reached.undefined, error=f"no run has a value of {goal.response.column}")
     statistic = None if math.isnan(reached.statistic) else reached.statistic
-    return Outcome(reached.value, statistic, reached.censored, reached.undefined)
+    return TrialResult(reached.value, statistic, reached.censored, reached.undefined)

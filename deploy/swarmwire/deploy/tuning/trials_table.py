@@ -26,9 +26,9 @@ def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
             "trial": trial.number,
             "state": trial.state,
             **{search.path: trial.parameters[search.path] for search in tuning.searches},
-            "value": trial.outcome.value,
-            **trial.outcome.attributes(),
-            "error": trial.outcome.error or None,
+            "value": trial.result.value,
+            **trial.result.attributes(),
+            "error": trial.result.error or None,
         }
         for trial in trials
     ]

@@ -13,7 +13,7 @@ from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.whole_file import write_whole
 
@@ -76,7 +76,7 @@ def read_tuning(folder: Path) -> Tuning:
 
 def _tuning(found: dict[str, Any]) -> Tuning:
     tuples: dict[str, Any] = {name: tuple(found[name]) for name in ("seeds", "check_seeds", "overrides")}
-    goal: dict[str, Any] = {**found["goal"], "outcome": Outcome(**known_fields(Outcome, found["goal"]["outcome"]))}
+    goal: dict[str, Any] = {**found["goal"], "response": Response(**known_fields(Response, found["goal"]["response"]))}
     objects: dict[str, Any] = {
         "files": tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
         "searches": tuple(_search(of) for of in found["searches"]),

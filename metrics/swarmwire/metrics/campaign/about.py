@@ -8,7 +8,7 @@ from typing import Any, cast
 from swarmwire.comms.config import check_format, did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.formats import CAMPAIGN_FORMAT
-from swarmwire.metrics.campaign.outcome import KINDS, Outcome
+from swarmwire.metrics.campaign.response import KINDS, Response
 
 DESIGNS = ("grid", "list", "random", "latin")
 Value = bool | int | float | str | list[Any] | None  # of a parameter
@@ -34,7 +34,7 @@ class About:
     points: tuple[Point, ...]
     overrides: tuple[str, ...]  # "path=value", of every run
     duration_s: float  # of a run that nothing stops
-    outcomes: tuple[Outcome, ...]
+    responses: tuple[Response, ...]
 
     @property
     def runs(self) -> int:
@@ -106,7 +106,7 @@ def _about(fields: _Fields) -> About:
         points=_points(fields),
         overrides=fields.texts("overrides"),
         duration_s=float(fields.get("duration_s", (int, float), "a number of s")),
-        outcomes=tuple(_outcome(of) for of in fields.objects("outcomes")),
+        responses=tuple(_response(of) for of in fields.objects("responses")),
     )
 
 
@@ -130,8 +130,8 @@ def _points(fields: _Fields) -> tuple[Point, ...]:
     return tuple({path: point.found[path] for path in paths} for point in points)
 
 
-def _outcome(of: _Fields) -> Outcome:
-    return Outcome(
+def _response(of: _Fields) -> Response:
+    return Response(
         column=of.text("column"),
         unit=of.text("unit"),
         kind=of.one_of("kind", KINDS),

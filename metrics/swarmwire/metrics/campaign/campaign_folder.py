@@ -13,8 +13,8 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
-from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.metrics.campaign.statistic import Statistic, find_outcome, find_statistic
+from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.campaign.statistic import Statistic, find_response, find_statistic
 from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 
@@ -52,15 +52,15 @@ class CampaignFolder:
         return self.about.points
 
     @property
-    def outcomes(self) -> tuple[Outcome, ...]:
+    def responses(self) -> tuple[Response, ...]:
         """What was measured of each run."""
-        return self.about.outcomes
+        return self.about.responses
 
     @cached_property
     def runs(self) -> "pl.DataFrame":
         """A row per run that has ended, sorted by run: `summary.parquet`, or what parts there are so far.
 
-        Columns: run, point, seed, one of each parameter, ended, error, ticks, sim_time_s, outcomes, timing_wall_s, …
+        Columns: run, point, seed, one of each parameter, ended, error, ticks, sim_time_s, responses, timing_wall_s, …
         Before the first run has ended there may be no columns but the first of these.
         """
         import polars as pl
@@ -74,7 +74,7 @@ class CampaignFolder:
                     raise
                 continue  # it finished just now, and its parts went
             for file, frame in zip(files, frames, strict=True):
-                _check_columns(file, frame, self.outcomes)
+                _check_columns(file, frame, self.responses)
             if not frames:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
             try:
@@ -95,35 +95,35 @@ class CampaignFolder:
         """Whether every run that was asked for has ended, well or not."""
         return not self.missing
 
-    def outcome(self, name: str) -> Outcome:
-        """The outcome of this column, or of a bare metric's last value; BadInput names those that there are."""
-        return find_outcome(name, self.outcomes, str(self.path))
+    def response(self, name: str) -> Response:
+        """The response of this column, or of a bare metric's last value; BadInput names those that there are."""
+        return find_response(name, self.responses, str(self.path))
 
     def statistic(self, name: str) -> Statistic:
         """The statistic that `COLUMN.STAT` names; BadInput if there is none."""
-        return find_statistic(name, self.outcomes, str(self.path))
+        return find_statistic(name, self.responses, str(self.path))
 
     def sample(self, column: str, point: int) -> Sample:
-        """The values of an outcome over the seeds of a design point, in the seeds' order as they were asked for.
+        """The values of a response over the seeds of a design point, in the seeds' order as they were asked for.
 
         A number that is null is undefined; a time that is null is right-censored at its run's end. BadInput for an
-        outcome or a point that there is not.
+        response or a point that there is not.
         """
-        outcome = self.outcome(column)
+        response = self.response(column)
         if not 0 <= point < len(self.points):
             raise BadInput(str(self.path), "point", f"expected 0 to {len(self.points) - 1}, got {point}")
-        if outcome.column not in self._samples:
-            self._samples[outcome.column] = self._of_all_points(outcome)
-        return self._samples[outcome.column][point]
+        if response.column not in self._samples:
+            self._samples[response.column] = self._of_all_points(response)
+        return self._samples[response.column][point]
 
-    def _of_all_points(self, outcome: Outcome) -> tuple[Sample, ...]:
-        """Read once: a report asks for every outcome at every point."""
+    def _of_all_points(self, response: Response) -> tuple[Sample, ...]:
+        """Read once: a report asks for every response at every point."""
         order = np.argsort(self._column("point"), kind="stable")
-        value, end_s = self._numbers(outcome.column)[order], self._numbers(SIM_TIME)[order]
+        value, end_s = self._numbers(response.column)[order], self._numbers(SIM_TIME)[order]
         seed, well = self._column("seed")[order].astype(np.int64), self._ended_well[order]
         edges = np.searchsorted(self._column("point")[order], np.arange(len(self.points) + 1)).tolist()
         return tuple(
-            _sample(outcome, value[here], end_s[here], seed[here], well[here])
+            _sample(response, value[here], end_s[here], seed[here], well[here])
             for here in (slice(start, end) for start, end in pairwise(edges))
         )
 
@@ -153,7 +153,7 @@ class CampaignFolder:
         return [whole, *found] if whole.exists() else found
 
 
-def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome]) -> None:
+def _check_columns(file: Path, frame: "pl.DataFrame", responses: Iterable[Response]) -> None:
     import polars as pl
 
     lacking = [name for name in NEEDED if name not in frame.columns]
@@ -162,7 +162,7 @@ def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome
     for name in NUMBERS:
         if not frame.schema[name].is_integer() or frame[name].null_count():
             raise BadInput(str(file), name, "expected a column of whole numbers")
-    for name in (SIM_TIME, *(outcome.column for outcome in outcomes)):
+    for name in (SIM_TIME, *(response.column for response in responses)):
         kind = frame.schema.get(name)
         if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
             raise BadInput(str(file), name, "expected a column of numbers")
@@ -170,13 +170,13 @@ def _check_columns(file: Path, frame: "pl.DataFrame", outcomes: Iterable[Outcome
         raise BadInput(str(file), "ended", "expected how each run ended")
 
 
-def _sample(outcome: Outcome, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
+def _sample(response: Response, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
     """Of all runs of a point, of which those that ended well have a part in it."""
     failed = int(np.count_nonzero(~well))
     value, end_s, seed = value[well], end_s[well], seed[well]
     observed = np.isfinite(value)
-    if outcome.kind == "time":
-        of = time_sample(np.where(observed, value, outcome.watched_s(end_s)), observed, seed)
+    if response.kind == "time":
+        of = time_sample(np.where(observed, value, response.watched_s(end_s)), observed, seed)
     else:
         of = number_sample(value, seed)
     return replace(of, failed=failed)

@@ -13,9 +13,9 @@ SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean"
 
 
 def write_comparison(comparison: Comparison, to: Path) -> None:
-    """Write a row per outcome and pair of points; BadInput unless the path is that of a .csv that can be written.
+    """Write a row per response and pair of points; BadInput unless the path is that of a .csv that can be written.
 
-    Columns: outcome, unit, kind; `a.PATH`, `b.PATH` of each parameter; `a_`, `b_` n, failed, undefined, censored, q25,
+    Columns: response, unit, kind; `a.PATH`, `b.PATH` of each parameter; `a_`, `b_` n, failed, undefined, censored, q25,
     q50, q75, mean, limit; pairs, median_difference with _low and _high, mean_difference with _low and _high, horizon,
     cliffs_delta, hedges_g, p, test. Empty: unknown; inf: open.
     """
@@ -29,7 +29,7 @@ def write_comparison(comparison: Comparison, to: Path) -> None:
 
 def _cells(row: Row) -> dict[str, str]:
     of = row.difference
-    cells = {"outcome": row.outcome.column, "unit": row.outcome.unit, "kind": row.outcome.kind}
+    cells = {"response": row.response.column, "unit": row.response.unit, "kind": row.response.kind}
     cells |= {f"a.{path}": value_text(value) for path, value in row.first_point.items()}
     cells |= {f"b.{path}": value_text(value) for path, value in row.second_point.items()}
     numbers = _summary("a", row.first) | _summary("b", row.second)

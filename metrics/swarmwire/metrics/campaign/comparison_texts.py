@@ -9,7 +9,7 @@ from swarmwire.metrics.campaign.selection import Selection
 from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text
 
 # Heads of a comparison's table.
-COLUMNS = ("outcome", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
+COLUMNS = ("response", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
 MEANINGS = {
     "Wilcoxon signed-rank": (
         "B - A of numbers in pairs: the median of the differences seed by seed, of pairs alone (A, B: of all runs); "
@@ -27,9 +27,9 @@ MEANINGS = {
 def cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
     """The texts of a row, one for each of COLUMNS."""
     of = row.difference
-    unit = f" [{row.outcome.unit}]" if row.outcome.unit else ""
+    unit = f" [{row.response.unit}]" if row.response.unit else ""
     return (
-        row.outcome.column + unit,
+        row.response.column + unit,
         _place(comparison, row),
         quartiles_text(row.first),
         quartiles_text(row.second),

@@ -11,7 +11,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.record.tick_columns import MOVABLE
-from swarmwire.metrics.registry import DELIVERY
+from swarmwire.metrics.registry import LINK_PDR
 
 if TYPE_CHECKING:
     import polars as pl
@@ -108,15 +108,15 @@ def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
 
 
 def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
-    """The columns that hold one number a tick, and `delivery`: receivers that received, of those in range."""
+    """The columns that hold one number a tick, and `link_pdr`: received / in range, over the last second."""
     import polars as pl
 
     names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
     found: dict[str, FloatArray] = {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
-    if DELIVERY not in found and {"received", "in_range"} <= set(frame.columns):
+    if LINK_PDR not in found and {"received", "in_range"} <= set(frame.columns):
         received, in_range = (
             frame[name].cast(pl.Float64).rolling_sum(rate_hz, min_samples=1).fill_null(np.nan).to_numpy()
             for name in ("received", "in_range")
         )
-        found[DELIVERY] = np.divide(received, in_range, out=np.full(len(received), np.nan), where=in_range > 0)
+        found[LINK_PDR] = np.divide(received, in_range, out=np.full(len(received), np.nan), where=in_range > 0)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of
-from swarmwire.metrics.registry import DELIVERY, METRICS
+from swarmwire.metrics.registry import METRICS
 
 Facts = Mapping[str, MetricFacts]
 UNKNOWN: Facts = {}
@@ -21,7 +21,7 @@ def told_of(name: str, facts: Facts) -> MetricFacts:
         return facts[name]
     if name in METRICS:
         return facts_of(METRICS[name])
-    return MetricFacts(name, "", "", "level", (0.0, 1.0) if name == DELIVERY else (None, None))
+    return MetricFacts(name, "", "", "level", (None, None))
 
 
 def is_count(name: str, facts: Facts = UNKNOWN) -> bool:

@@ -12,10 +12,10 @@ from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.layout import Layout
 from swarmwire.metrics.drawing.looks import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
 from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
-from swarmwire.metrics.registry import DELIVERY
+from swarmwire.metrics.registry import LINK_PDR
 
 MAX_PLOTS = 4
-PREFERRED = ("target_best", "target_mean", "order", "largest_component", DELIVERY, "min_gap", "collisions")
+PREFERRED = ("target_best", "target_mean", "order", "largest_component", LINK_PDR, "min_gap", "collisions")
 USUAL_PLOTS = 3
 _MAX_POINTS = 1500  # of a curve: more than a plot has pixels
 _HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16

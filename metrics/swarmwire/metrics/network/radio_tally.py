@@ -1,4 +1,4 @@
-"""The radio's account of a run: what became of every packet, the delivery ratio, and how late packets were."""
+"""The radio's account of a run: what became of every packet, the delivery ratios, and how late packets were."""
 
 from typing import Any
 
@@ -17,10 +17,10 @@ PERCENTS = (50.0, 90.0, 99.0)
 class RadioTally:
     """Observer that adds up the radio's tallies. Summary part: `radio`, per arena; nothing without a radio.
 
-    sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = received / in_range (null if none
-    was in range), and of the packets received the p50, p90 and p99 of two latencies in s, within 0.5 % (null if none
-    was received): latency_air_s from sending to hearing, latency_agent_s from sending to the first tick at which the
-    receiver acts.
+    sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = received / intended, link_pdr =
+    received / in_range (null without any such receiver), and of the packets received the p50, p90 and p99 of two
+    latencies in s, within 0.5 % (null if none was received): latency_air_s from sending to reception, latency_agent_s
+    from sending to the first tick at which the receiver acts.
     """
 
     def begin(self, static: Static) -> None:
@@ -62,13 +62,14 @@ class RadioTally:
 
     def _arena(self, arena: int) -> dict[str, Any]:
         fates = [int(count) for count in self._fates[arena]]
-        in_range = int(self._in_range[arena])
+        received, intended, in_range = fates[Fate.RECEIVED], int(self._intended[arena]), int(self._in_range[arena])
         return {
             "sent": int(self._sent[arena]),
-            "intended": int(self._intended[arena]),
+            "intended": intended,
             "in_range": in_range,
             "fates": dict(zip(FATE_NAMES, fates, strict=True)),
-            "pdr": fates[Fate.RECEIVED] / in_range if in_range else None,
+            "pdr": received / intended if intended else None,
+            "link_pdr": received / in_range if in_range else None,
             "latency_air_s": _percentiles_s(self._air, arena),
             "latency_agent_s": _percentiles_s(self._agent, arena),
         }

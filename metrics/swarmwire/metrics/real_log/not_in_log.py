@@ -31,6 +31,7 @@ WITHOUT_POSES = frozenset(
         "age_of_information",
         "throughput",
         "pdr",
+        "link_pdr",
         "latency_air",
         "latency_agent",
         "oscillation",

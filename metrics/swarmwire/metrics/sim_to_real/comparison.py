@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.pdr import PacketDeliveryRatio
+from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns
 from swarmwire.metrics.sim_to_real.radio_values import RadioValue, radio_values, why_no_radio
@@ -22,9 +22,7 @@ from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
 
 MIN_RUNS = 3  # that have a spread
 SPREAD = (0.05, 0.5, 0.95)
-ONLY_IN_RANGE = (
-    "who was within range is not in the log, and not all were; the radio's delivery counts all on both sides"
-)
+ONLY_IN_RANGE = "who was within range is not in the log, and not all were; pdr counts all on both sides"
 
 
 @dataclass(frozen=True)
@@ -153,7 +151,7 @@ def compare_sim_to_real(emulated: EmulatedRuns, log: MeasuredLog, metrics: Seque
 def _of_range(emulated: EmulatedRuns, metrics: Sequence[Metric]) -> dict[str, str]:
     """Metrics that count receivers in range alone, which in a log are all: not the same where some were out of it."""
     out_of_range = any(run.radio and run.radio["fates"].get("out_of_range") for run in emulated.runs)
-    counting = [metric.name for metric in metrics if isinstance(metric, PacketDeliveryRatio)]
+    counting = [metric.name for metric in metrics if isinstance(metric, LinkPacketDeliveryRatio)]
     return dict.fromkeys(counting, ONLY_IN_RANGE) if out_of_range else {}
 
 

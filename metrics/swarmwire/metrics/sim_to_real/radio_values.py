@@ -53,10 +53,10 @@ def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
 
 
 def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> Iterator[RadioValue]:
-    """Traffic, delivery and latencies over this time: to the agent, where robots know no others.
+    """Traffic, delivery ratio and latencies over this time: to the agent, where robots know no others.
 
-    Delivery is of all that packets were meant for, in range or not. Runs that are longer have what their counts of each
-    tick tell; none has anything if the log is longer.
+    The delivery ratio is of all intended receivers, in range or not. Runs that are longer have what their counts of
+    each tick tell; none has anything if the log is longer.
     """
     fits = duration_s >= WHOLE * log.duration_s
     wholes = [_within(run, emulated, duration_s) for run in emulated.runs if run.radio and fits]
@@ -91,7 +91,7 @@ def _sent(of: _Whole) -> float | None:
     return of.radio["sent"] / (of.duration_s * of.robots) if of.duration_s > 0.0 else None
 
 
-def _delivery(of: _Whole) -> float | None:
+def _pdr(of: _Whole) -> float | None:
     if "intended" not in of.radio:
         return None
     final = of.radio["intended"] - of.radio["fates"].get("in_flight", 0)
@@ -108,7 +108,7 @@ def _latencies(name: str, kind: str, text: str) -> tuple[_Number, ...]:
 
 _TRAFFIC: tuple[_Number, ...] = (
     ("packets sent", "1/s", "by each robot", _sent),
-    ("delivery", "", "received / meant for, in range or not", _delivery),
+    ("total pdr", "", "received / intended receivers, of all packets", _pdr),
 )
 _ON_AIR = _latencies("latency", "latency_air_s", "from sending to hearing")
 _TO_AGENT = _latencies("latency to agent", "latency_agent_s", "from sending to the agent's next step")

@@ -10,7 +10,7 @@ from swarmwire.metrics.statistics.sample import Sample
 
 
 class LogRank(NamedTuple):
-    """The test's outcome; NaN if nothing tells the two apart: nothing happened, or not to both."""
+    """The test's result; NaN if nothing tells the two apart: nothing happened, or not to both."""
 
     z: float  # standard normal if both are alike; positive: it happens sooner in the first
     p: float  # two-sided

@@ -1,1 +1,1 @@
-"""Whether a run folder is whole, and holds what its summary says."""
+"""Whether a run folder is intact, and holds what its summary says."""

@@ -7,7 +7,7 @@ from enum import StrEnum
 class State(StrEnum):
     """How a part of a run folder is."""
 
-    WHOLE = "whole"
+    INTACT = "intact"
     NOT_RECORDED = "not recorded"  # and nothing says that it should be there
     PARTIAL = "partial"  # readable, but not to the end of the run
     MISSING = "missing"
@@ -26,4 +26,4 @@ class Finding:
     @property
     def good(self) -> bool:
         """Whether nothing is wrong with it."""
-        return self.state in (State.WHOLE, State.NOT_RECORDED)
+        return self.state in (State.INTACT, State.NOT_RECORDED)

@@ -26,7 +26,7 @@ def check_run_json(folder: Path) -> Finding:
         return Finding(RUN_JSON, State.DAMAGED, f"{error.key}: {error.expected}")
     match found:
         case {"seeds": list(), "ticks": int(ticks)}:
-            return Finding(RUN_JSON, State.WHOLE, f"{ticks} ticks asked for")
+            return Finding(RUN_JSON, State.INTACT, f"{ticks} ticks asked for")
         case _:
             return Finding(RUN_JSON, State.DAMAGED, "expected what swarmwire writes at the start of a run")
 
@@ -47,7 +47,7 @@ def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
     last = hashlib.sha256("".join(summary["trajectory_sha256"]).encode()).digest()[:DIGEST_BYTES]
     if ticks and data[-DIGEST_BYTES:] != last:
         return Finding(DIGESTS, State.DIFFERS, "the last is not that of the summary's hashes")
-    return Finding(DIGESTS, State.WHOLE, f"{ticks} ticks")
+    return Finding(DIGESTS, State.INTACT, f"{ticks} ticks")
 
 
 def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Finding]:
@@ -63,4 +63,4 @@ def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Findin
         return [Finding(INPUTS, state, f"{path.stat().st_size} bytes, of which the summary says nothing")]
     if sha256 != recorded["sha256"]:
         return [Finding(INPUTS, State.DIFFERS, f"its sha256 is not {recorded['sha256'][:16]}…")]
-    return [Finding(INPUTS, State.WHOLE, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]
+    return [Finding(INPUTS, State.INTACT, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]

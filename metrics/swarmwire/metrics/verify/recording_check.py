@@ -16,7 +16,7 @@ def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
     """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
     megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
     if VIEW.missing():
-        return State.WHOLE, f"{megabytes}, not read: that needs {VIEW.requirement}"
+        return State.INTACT, f"{megabytes}, not read: that needs {VIEW.requirement}"
     try:
         last, closed = _read_all(path)
     except Exception as error:  # noqa: BLE001 - rerun promises no type; whatever it is, the file is unreadable
@@ -24,7 +24,7 @@ def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
     reach = "no tick in it" if last is None else f"up to tick {last}"
     if not closed:
         return State.PARTIAL, f"{megabytes}, readable {reach}; it was never closed"
-    return State.PARTIAL if last is None and has_ticks else State.WHOLE, f"{megabytes}, {reach}"
+    return State.PARTIAL if last is None and has_ticks else State.INTACT, f"{megabytes}, {reach}"
 
 
 def _read_all(path: Path) -> tuple[int | None, bool]:

@@ -1,4 +1,4 @@
-"""A table of a run folder as it lies on disk: whole, in parts, damaged, or not there."""
+"""A table of a run folder as it lies on disk: intact, in parts, damaged, or not there."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck
         fault = _fault(whole, columns)
         if fault is None:
             # A run killed between the two leaves both; whoever reads takes the whole.
-            return TableCheck(State.WHOLE, [whole], "its parts were not cleared away" if parts else "")
+            return TableCheck(State.INTACT, [whole], "its parts were not cleared away" if parts else "")
         return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():
         return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")

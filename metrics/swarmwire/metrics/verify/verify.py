@@ -1,4 +1,4 @@
-"""Check a run folder: what is whole, what a killed run left, what is missing, what does not agree."""
+"""Check a run folder: what is intact, what a killed run left, what is missing, what does not agree."""
 
 from collections.abc import Callable, Collection, Mapping
 from hashlib import file_digest
@@ -72,7 +72,7 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
         return None, Finding(SUMMARY, State.MISSING, "the run did not end by itself, or still goes on")
     arenas = f", {summary['arenas']} arenas" if summary["arenas"] > 1 else ""
     text = f"ended: {summary['ended']}; {summary['ticks']} ticks ({summary['sim_time_s']:g} s){arenas}"
-    return summary, Finding(SUMMARY, State.WHOLE, text)
+    return summary, Finding(SUMMARY, State.INTACT, text)
 
 
 def _static(folder: RunFolder) -> Finding:
@@ -82,7 +82,7 @@ def _static(folder: RunFolder) -> Finding:
         static = folder.static
     except BadInput as error:
         return Finding(STATIC, State.DAMAGED, error.expected)
-    return Finding(STATIC, State.WHOLE, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
+    return Finding(STATIC, State.INTACT, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
 
 
 def _table(folder: RunFolder, name: str, summary: dict[str, Any] | None) -> Finding:
@@ -151,7 +151,7 @@ def _log(folder: RunFolder) -> Finding:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         return Finding(LOG, State.DAMAGED, str(error))
-    return Finding(LOG, State.WHOLE if lines else State.DAMAGED, f"{len(lines)} lines")
+    return Finding(LOG, State.INTACT if lines else State.DAMAGED, f"{len(lines)} lines")
 
 
 def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
@@ -165,5 +165,5 @@ def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
         with path.open("rb") as file:
             same = file_digest(file, "sha256").hexdigest() == copy["sha256"]
         text = f"sha256 {copy['sha256'][:16]}…" if same else f"its sha256 is not {copy['sha256'][:16]}…"
-        findings.append(Finding(copy["path"], State.WHOLE if same else State.DIFFERS, text))
+        findings.append(Finding(copy["path"], State.INTACT if same else State.DIFFERS, text))
     return findings

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.palette import Color
-from swarmwire.metrics.registry import DELIVERY
+from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.colors import FATES, MARK
 from swarmwire.metrics.viewer.plotted import Plotted
 from swarmwire.metrics.viewer.rows import RerunRows
@@ -24,7 +24,7 @@ _PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's uni
 class RerunPlots:
     """Plots of one arena, each with the series that have had a value.
 
-    shares: the metrics within 0 and 1, and `delivery` (received / in range, over the last second), with a mark where an
+    shares: the metrics within 0 and 1, and `link_pdr` (received / in range, over the last second), with a mark where an
     event took effect; distances, times and rates: those in m, in s and in bit/s; numbers: the other metrics; packets:
     receivers per second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
     """
@@ -55,7 +55,8 @@ class RerunPlots:
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)
-            numbers["shares"][DELIVERY] = per_second[Fate.RECEIVED] / in_range if in_range > 0 else np.nan
+            link_pdr = per_second[Fate.RECEIVED] / in_range if in_range > 0 else np.nan
+            numbers["shares"].setdefault(LINK_PDR, link_pdr)
             numbers["packets"] = self._by_name(per_second)
         for plot, value in numbers.items():
             self._series[plot].add(rows, value)

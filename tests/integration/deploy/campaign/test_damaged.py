@@ -18,12 +18,12 @@ from tests.integration.deploy.campaign.test_resume import VARY, Killed, dying_at
 from tests.support.damaged import damaged
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
-ASKED_SINGLY = {"seeds": 2, "vary": VARY, "pack": 1}
+ASKED_SINGLY = {"seeds": 2, "vary": VARY, "batch": 1}
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
-    """A folder with a campaign that is `whole`, and with one of which two of four pieces are done, `half`."""
+    """A folder with a campaign that is `whole`, and with one of which two of four tasks are done, `half`."""
     folder = tmp_path_factory.mktemp("sound")
     scenario = scenario_in(folder)
     with pytest.MonkeyPatch.context() as patched:
@@ -155,10 +155,10 @@ def test_files_of_others_in_the_folder_are_left_alone(half, whole):
         ("point_overrides", [[1], [2]]),
         ("robots", 0),
         ("robots", "two"),
-        ("pack", "few"),
+        ("batch", "few"),
         ("record_seeds", [77]),
         ("versions", []),
-        ("outcomes", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
+        ("responses", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
     ],
 )
 def test_what_campaigns_never_say_is_refused_by_its_key(whole, key, value):

@@ -21,7 +21,7 @@ from tests.support.deploy.campaign.cluster import children, cluster
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.commands import called
 
-ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "pack": 2}
+ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
 
 
 @pytest.fixture(scope="module")
@@ -43,17 +43,17 @@ def two_threads(tmp_path_factory):
 
 
 class Watcher:
-    """Looks on, and does something when the first piece is done."""
+    """Looks on, and does something when the first task is done."""
 
     def __init__(self, act=lambda: None):
-        self.act, self.pieces = act, 0
+        self.act, self.tasks = act, 0
 
     def begin(self, campaign, done, failed):
         pass
 
     def see(self, result):
-        self.pieces += 1
-        if self.pieces == 1:
+        self.tasks += 1
+        if self.tasks == 1:
             self.act()
 
     def end(self):
@@ -80,7 +80,7 @@ def test_a_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, reference,
 
 def test_an_agent_that_kills_its_process_ends_no_worker(tmp_path, reference, two_threads):
     kill = ['robots.pair.params.how="kill"']
-    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, pack=1, overrides=kill)
+    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, batch=1, overrides=kill)
     assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died, signal 9"]
     assert two_threads.workers[0].is_running()
 
@@ -121,7 +121,7 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
             there.workers[0].kill()
 
         watcher = Watcher(kill_it)
-        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "pack": 1})
+        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "batch": 1})
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
         assert psutil.wait_procs(gone, timeout=30)[1] == []
@@ -138,7 +138,7 @@ def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, referenc
             there.workers[0].suspend()
 
         watcher = Watcher(freeze_it)
-        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "pack": 1})
+        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "batch": 1})
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
     same(tmp_path / "c", reference)
@@ -150,9 +150,9 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
     folder = tmp_path / "c"
     with cluster(tmp_path, 1) as there:
         monkeypatch.setattr(sweep_progress, "sweep_progress", lambda _: Watcher(there.scheduler.kill))
-        vary, pack = ("--vary", "radio.loss=0.0,0.5"), ("--pack", "1")
+        vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
         code, _, errors = called(
-            monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *pack, "--out", folder,
+            monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,
             "--on", there.on,
         )  # fmt: skip
     assert (code, caplog.text) == (1, "")

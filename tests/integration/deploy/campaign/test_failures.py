@@ -3,12 +3,12 @@
 from swarmwire.deploy import sweep
 from swarmwire.deploy.campaign.execution import execute
 from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.task import PieceResult, Task
+from swarmwire.deploy.campaign.task import Task, TaskResult
 from tests.support.deploy.campaign.small import rows_in, series_in
 
 
 def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):
-    done = sweep(stumbling, seeds=4, out=tmp_path / "c", pack=4)
+    done = sweep(stumbling, seeds=4, out=tmp_path / "c", batch=4)
     rows = rows_in(tmp_path / "c")
     failed = [row["seed"] for row in rows if row["ended"] == "failed"]
     assert done.is_over
@@ -20,7 +20,7 @@ def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling,
             assert "ValueError: stumbled" in row["error"]
             assert 'File "scenario/files/stumbling.py", line' in row["error"]
     assert set(series_in(tmp_path / "c")["run"]) == {seed - 1 for seed in range(1, 5) if seed not in failed}
-    sweep(stumbling, seeds=4, out=tmp_path / "unpacked", pack=1)
+    sweep(stumbling, seeds=4, out=tmp_path / "unpacked", batch=1)
     assert rows_in(tmp_path / "unpacked") == rows
 
 
@@ -53,9 +53,9 @@ def test_an_error_that_no_file_can_hold_is_told_as_far_as_it_can(tmp_path, scena
 def test_an_agent_that_calls_itself_for_ever_fails_alike_in_any_pack(tmp_path, scenario, here):
     agent = "from swarmwire.agent import Agent\nclass Deep(Agent):\n    def step(self, robot): self.step(robot)\n"
     (tmp_path / "deep.py").write_text(agent)
-    for pack in (1, 2):
+    for batch in (1, 2):
         overrides = ['robots.pair.agent="deep.py:Deep"']
-        sweep(scenario, seeds=2, out=tmp_path / f"packed{pack}", overrides=overrides, pack=pack)
+        sweep(scenario, seeds=2, out=tmp_path / f"packed{batch}", overrides=overrides, batch=batch)
     assert "RecursionError" in rows_in(tmp_path / "packed1")[0]["error"]
     assert rows_in(tmp_path / "packed1") == rows_in(tmp_path / "packed2")
 
@@ -77,13 +77,13 @@ class Losing:
         task = self.tasks.pop(0)
         if self.deadly & set(task.runs):
             return [Finished(task, None, "gone")]
-        return [Finished(task, PieceResult(tuple({"run": run, "ended": "duration"} for run in task.runs)))]
+        return [Finished(task, TaskResult(tuple({"run": run, "ended": "duration"} for run in task.runs)))]
 
     def close(self):
         pass
 
 
-def test_a_lost_piece_is_tried_again_then_halved_and_at_last_a_failed_row():
+def test_a_lost_task_is_tried_again_then_halved_and_at_last_a_failed_row():
     losing, rows = Losing(2), []
     tasks = [Task("x", (), 0, (0, 1, 2, 3), (1, 2, 3, 4)), Task("x", (), 1, (4,), (1,))]
     assert execute(tasks, losing, lambda _, result: rows.extend(result.rows))

@@ -12,7 +12,7 @@ from swarmwire.deploy.campaign.campaign import read_campaign
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": [0.0, 0.5]}
-ASKED = {"seeds": 2, "vary": VARY, "pack": 2}
+ASKED = {"seeds": 2, "vary": VARY, "batch": 2}
 
 
 class Killed(BaseException):
@@ -55,7 +55,7 @@ def same(folder, whole):
     assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in whole.iterdir())
 
 
-WRITES = 5  # two pieces of rows and series each, and the table
+WRITES = 5  # two tasks of rows and series each, and the table
 
 
 @pytest.mark.parametrize("count", range(WRITES))

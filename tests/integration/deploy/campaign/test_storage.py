@@ -32,7 +32,7 @@ def test_the_command_line_says_so_in_one_line(tmp_path, scenario, here, monkeypa
     with monkeypatch.context() as patched:
         dying_at(patched, 2, FULL)
         code, _, errors = called(
-            patched, capsys, "sweep", scenario, "--seeds", "2", "--pack", "1", "--out", tmp_path / "c"
+            patched, capsys, "sweep", scenario, "--seeds", "2", "--batch", "1", "--out", tmp_path / "c"
         )
     assert code == 1
     assert errors.startswith(f"error: {tmp_path / 'c'}: ")

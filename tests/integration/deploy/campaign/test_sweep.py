@@ -43,14 +43,14 @@ def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
     assert row["trajectory_sha256"] == alone.trajectory_sha256[0]
     assert (row["ended"], row["error"], row["ticks"], row["sim_time_s"]) == ("duration", None, 5, 0.5)
     assert row["order.mean"] == alone.metrics["order"].mean
-    assert (row["radio.sent"], row["radio.pdr"]) == (radio.sent, radio.pdr)
+    assert (row["radio.sent"], row["radio.pdr"], row["radio.link_pdr"]) == (radio.sent, radio.pdr, radio.link_pdr)
     assert row["radio.fates.lost"] == radio.fates["lost"]
     assert row["radio.latency_air_s.p90"] == radio.latency_air_s.p90
     assert row["target_best.final"] is None
 
 
 def test_rows_and_series_do_not_depend_on_packs(reference, tmp_path, here):
-    sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", pack=2)
+    sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", batch=2)
     assert rows_in(tmp_path / "c") == rows_in(reference / "c")
     assert series_in(tmp_path / "c").equals(series_in(reference / "c"), null_equal=True)
     assert here[0].closed
@@ -123,7 +123,7 @@ def test_where_workers_cannot_write_here_recorded_runs_are_done_on_this_machine_
     for name, executor in (("there", there), ("local", local)):
         monkeypatch.setattr(executor, "submit", noting(executor.submit, name, done_by))
     monkeypatch.setattr(sweeping, "open_executor", lambda on, *_: local if on == "local" else there)
-    sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], pack=1, on="there://")
+    sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], batch=1, on="there://")
     assert done_by == [("there", 1), ("there", 3), ("local", 2)]
     assert (there.closed, local.closed) == (True, True)
     assert [path.name for path in (tmp_path / "c" / "runs").iterdir()] == ["run-000001"]
@@ -149,8 +149,8 @@ def test_drawn_designs_say_between_which_values(tmp_path, scenario, here):
 
 def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp_path, scenario, here):
     ends = ['stop={metric="order", at_least=0.8, hold_s=0.1}', 'metrics=["aggregation_time_s"]', "duration_s=1.0"]
-    for name, pack in (("packed", 6), ("alone", 1)):
-        sweep(scenario, seeds=6, out=tmp_path / name, overrides=ends, pack=pack)
+    for name, batch in (("packed", 6), ("alone", 1)):
+        sweep(scenario, seeds=6, out=tmp_path / name, overrides=ends, batch=batch)
     rows = rows_in(tmp_path / "packed")
     assert rows == rows_in(tmp_path / "alone")
     assert series_in(tmp_path / "packed").equals(series_in(tmp_path / "alone"), null_equal=True)
@@ -160,7 +160,7 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
         assert (row["ended"] == "duration") == (row["ticks"] == 10)
     lengths = series_in(tmp_path / "packed").group_by("run").len().sort("run")["len"].to_list()
     assert lengths == [row["ticks"] for row in rows]
-    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").outcomes if of.kind == "time"}
+    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").responses if of.kind == "time"}
     assert times == {"stop_time_s": "time", "aggregation_time_s": "time"}
     assert list(rows[0])[3:10] == [
         "ended", "error", "ticks", "sim_time_s", "trajectory_sha256", "stop_time_s", "stopped_by"

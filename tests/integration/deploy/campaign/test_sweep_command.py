@@ -152,14 +152,14 @@ def test_a_run_is_repeated_by_its_number(tmp_path, scenario, typed):
 
 
 class Interrupting:
-    """Looks on, and presses Ctrl-C after the first piece."""
+    """Looks on, and presses Ctrl-C after the first task."""
 
     def begin(self, campaign, done, failed):
-        self.pieces = done
+        self.tasks = done
 
     def see(self, result):
-        self.pieces += 1
-        if self.pieces == 1:
+        self.tasks += 1
+        if self.tasks == 1:
             os.kill(os.getpid(), signal.SIGINT)
 
     def end(self):
@@ -169,7 +169,7 @@ class Interrupting:
 def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
     folder = tmp_path / "c"
     monkeypatch.setattr(sweep_progress, "sweep_progress", lambda _: Interrupting())
-    code, out, errors = typed("sweep", scenario, "--seeds", "5", "--pack", "1", "--out", folder)
+    code, out, errors = typed("sweep", scenario, "--seeds", "5", "--batch", "1", "--out", folder)
     assert (code, errors) == (130, "")
     assert "3 of 5 runs" in out
     assert out.endswith(f"swarmwire sweep --resume {folder}\n")

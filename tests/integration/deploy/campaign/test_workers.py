@@ -24,7 +24,7 @@ DEADLY = 2  # one of the seeds that stumble
 
 
 def test_two_workers_come_to_the_rows_and_series_of_this_process(tmp_path, stumbling, monkeypatch):
-    asked = {"seeds": 4, "vary": VARY, "pack": 1}
+    asked = {"seeds": 4, "vary": VARY, "batch": 1}
     assert sweep(stumbling, out=tmp_path / "there", workers=2, **asked).is_over
     monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
     assert sweep(stumbling, out=tmp_path / "here", **asked).failed
@@ -129,10 +129,10 @@ import sys
 from swarmwire.deploy import sweep
 class Watcher:
     def begin(self, campaign, done, failed): print("begins", flush=True)
-    def see(self, result): print("piece", flush=True)
+    def see(self, result): print("task", flush=True)
     def end(self): pass
 vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
-sweep(sys.argv[1], seeds=4, vary=vary, pack=1, workers=1, out=sys.argv[2], watcher=Watcher())
+sweep(sys.argv[1], seeds=4, vary=vary, batch=1, workers=1, out=sys.argv[2], watcher=Watcher())
 """
 
 
@@ -142,7 +142,7 @@ def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         lines = iter(process.stdout)
-        assert [next(lines).strip() for _ in range(3)] == ["begins", "piece", "piece"]
+        assert [next(lines).strip() for _ in range(3)] == ["begins", "task", "task"]
         workers = psutil.Process(process.pid).children(recursive=True)
         assert len(workers) == 1
         process.kill()
@@ -164,7 +164,7 @@ def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
         try:
             assert process.stdout is not None
             lines = iter(process.stdout)
-            assert [next(lines).strip() for _ in range(5)] == ["begins", *["piece"] * 4]
+            assert [next(lines).strip() for _ in range(5)] == ["begins", *["task"] * 4]
             [worker] = psutil.Process(process.pid).children(recursive=True)
             busy_s = worker.cpu_times().user + 0.2
             until(lambda: worker.cpu_times().user > busy_s)

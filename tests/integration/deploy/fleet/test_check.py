@@ -1,4 +1,4 @@
-"""What `robots check` tells before anything is pushed."""
+"""What `robots check` tells before anything is deployed."""
 
 import re
 

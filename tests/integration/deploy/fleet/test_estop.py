@@ -43,7 +43,7 @@ def impatient(monkeypatch):
 
 def test_robots_are_stopped_both_ways(fleet, robots):
     host = fleet.add("flock-0")
-    robots("push")
+    robots("deploy")
     robots("start")
     with on_network(["flock-0"]) as (port, asked):
         fleet.table["robots"]["flock-0"]["network_port"] = port
@@ -56,7 +56,7 @@ def test_robots_are_stopped_both_ways(fleet, robots):
 def test_ssh_alone_is_enough(fleet, robots, impatient):
     host = fleet.add("flock-0")
     fleet.add("flock-1", host)
-    robots("push")
+    robots("deploy")
     robots("start")
     assert robots("estop") == (
         0,
@@ -89,7 +89,7 @@ def test_what_one_way_lacks_does_not_hide_what_the_other_says(fleet, robots):
 def test_a_robot_that_neither_way_confirms_is_told_and_holds_up_no_other(fleet, robots, impatient):
     fleet.add("good")
     fleet.servers.close(fleet.add("lost"))
-    robots("push", "--robots", "good")
+    robots("deploy", "--robots", "good")
     code, lines = robots("estop")
     assert code == 1
     assert lines[0] == "good stopped, confirmed by SSH (over the network: no answer)"
@@ -110,7 +110,7 @@ def test_a_robot_that_says_otherwise_is_not_taken_as_stopped(fleet, robots):
 def test_without_the_operators_certificate_ssh_still_stops(fleet, robots, lab_certificates):
     fleet.add("flock-0")
     lab_certificates("flock-0")
-    robots("push")
+    robots("deploy")
     code, lines = robots("estop")
     assert code == 0
     assert lines[0].startswith("flock-0 stopped, confirmed by SSH (over the network: ")

@@ -14,7 +14,7 @@ LONG_S = 100.0  # for which a host is frozen, unless it is thawed
 
 @pytest.fixture
 def frozen(fleet, packages, monkeypatch):
-    """A host that freezes in the middle of a push, with what it waited for."""
+    """A host that freezes in the middle of a deployment, with what it waited for."""
     monkeypatch.setattr(connecting, "ALIVE_S", 0.1)
     thaw, waited = Event(), list[bool]()
     host = fleet.add("flock-0")
@@ -25,7 +25,7 @@ def frozen(fleet, packages, monkeypatch):
 
 
 def test_a_host_that_freezes_in_the_middle_is_told_long_before_anybody_would_give_up(robots, frozen):
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 1
     assert "connection was lost" in lines[0]
     assert frozen == []  # it has not gone on yet
@@ -34,7 +34,7 @@ def test_a_host_that_freezes_in_the_middle_is_told_long_before_anybody_would_giv
 def test_a_host_that_takes_requests_and_answers_none_is_told(fleet, robots, monkeypatch):
     monkeypatch.setattr(host_session, "TIMEOUT_S", 0.2)
     fleet.add("flock-0").set_python("exec cat > /dev/null")
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 1
     assert "within 0.2 s" in lines[0]
 

@@ -9,16 +9,16 @@ from tests.support.deploy.fleet.small_fleet import AGENT
 
 @pytest.fixture
 def host(fleet, robots):
-    """The host of flock-0, to which something was pushed."""
+    """The host of flock-0, to which something was deployed."""
     host = fleet.add("flock-0")
-    assert robots("push")[0] == 0
+    assert robots("deploy")[0] == 0
     return host
 
 
-def pushed(fleet, robots, host, number: int, *options: object) -> str:
+def deployed(fleet, robots, host, number: int, *options: object) -> str:
     """Another release: its name."""
     fleet.agent(f"{AGENT}# {number}\n")
-    assert robots("push", *options)[0] == 0
+    assert robots("deploy", *options)[0] == 0
     return host.current("flock-0")
 
 
@@ -54,33 +54,33 @@ def test_a_host_on_which_units_would_end_is_refused(robots, host):
     assert "sudo loginctl" in lines[0]
 
 
-def test_what_was_never_pushed_neither_starts_nor_needs_to_be_stopped(fleet, robots):
+def test_what_was_never_deployed_neither_starts_nor_needs_to_be_stopped(fleet, robots):
     fleet.add("flock-0")
     code, lines = robots("start")
-    assert (code, lines[0].startswith("flock-0 failed: "), "robots push" in lines[0]) == (1, True, True)
+    assert (code, lines[0].startswith("flock-0 failed: "), "robots deploy" in lines[0]) == (1, True, True)
     assert robots("stop")[0] == 0
-    assert runs(robots)["unit"] == "never pushed"
+    assert runs(robots)["unit"] == "never deployed"
 
 
-def test_a_push_leaves_what_runs_alone_until_it_is_asked_to_restart(fleet, robots, host):
+def test_a_deployment_leaves_what_runs_alone_until_it_is_asked_to_restart(fleet, robots, host):
     first = host.current("flock-0")
     robots("start")
-    second = pushed(fleet, robots, host, 2)
+    second = deployed(fleet, robots, host, 2)
     assert runs(robots)["release"] == f"{first} (next: {second})"
-    third = pushed(fleet, robots, host, 3, "--restart")
+    third = deployed(fleet, robots, host, 3, "--restart")
     assert runs(robots)["release"] == third
 
 
-def test_a_release_that_runs_is_kept_whatever_was_pushed_since(fleet, robots, host):
+def test_a_release_that_runs_is_kept_whatever_was_deployed_since(fleet, robots, host):
     first = host.current("flock-0")
     robots("start")
-    later = [pushed(fleet, robots, host, number) for number in range(4)]
+    later = [deployed(fleet, robots, host, number) for number in range(4)]
     assert host.releases("flock-0") == sorted([first, *later[1:]])
 
 
 def test_a_rollback_goes_back_step_by_step_and_is_refused_at_the_first(fleet, robots, host):
     first = host.current("flock-0")
-    second, third = pushed(fleet, robots, host, 2), pushed(fleet, robots, host, 3)
+    second, third = deployed(fleet, robots, host, 2), deployed(fleet, robots, host, 3)
     robots("start")
     assert runs(robots)["release"] == third
     assert robots("rollback") == (0, [f"flock-0 back to {second}, restarted"])
@@ -92,11 +92,11 @@ def test_a_rollback_goes_back_step_by_step_and_is_refused_at_the_first(fleet, ro
     assert host.current("flock-0") == first
 
 
-def test_what_was_gone_back_from_can_be_pushed_again(fleet, robots, host):
-    first, second = host.current("flock-0"), pushed(fleet, robots, host, 2)
+def test_what_was_gone_back_from_can_be_deployed_again(fleet, robots, host):
+    first, second = host.current("flock-0"), deployed(fleet, robots, host, 2)
     robots("rollback")
     assert host.current("flock-0") == first
-    assert robots("push") == (0, [f"flock-0 pushed {second}"])
+    assert robots("deploy") == (0, [f"flock-0 deployed {second}"])
     assert robots("rollback") == (0, [f"flock-0 back to {first}"])
 
 
@@ -124,7 +124,7 @@ def test_a_host_whose_systemd_tells_no_state_fails_alone_and_in_a_line(fleet, ro
 
 def test_a_machine_without_systemd_is_told_what_agents_need(fleet, robots, host):
     (host.bin / "systemctl").write_text("#!/bin/sh\necho offline; exit 1\n")
-    for verb in ("check", "push", "start"):
+    for verb in ("check", "deploy", "start"):
         code, lines = robots(verb)
         assert code == 1
         assert "does not run systemd" in lines[0]

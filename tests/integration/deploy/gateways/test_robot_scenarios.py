@@ -44,7 +44,7 @@ def test_a_flock_finds_one_heading(body) -> None:
     assert final(result, "order") > 0.9
     assert final(result, "largest_component") == 1.0
     assert result.radio is not None
-    assert result.radio.pdr == pytest.approx(0.9, abs=0.01)
+    assert result.radio.link_pdr == pytest.approx(0.9, abs=0.01)
 
 
 @pytest.mark.parametrize("body", BODIES)

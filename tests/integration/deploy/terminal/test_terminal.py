@@ -81,7 +81,7 @@ def test_without_a_terminal_there_are_plain_lines(tmp_path):
     lines = [line for line in ended.stdout.splitlines() if line.startswith("tick ")]
     assert [line.split(",")[0] for line in lines] == ["tick 5/20", "tick 10/20", "tick 15/20", "tick 20/20"]
     for line in lines:
-        assert re.search(r", order [\d.]+, largest_component [\d.]+, components \d+, delivery so far [\d.]+$", line)
+        assert re.search(r", order [\d.]+, largest_component [\d.]+, components \d+, link PDR so far [\d.]+$", line)
 
 
 def test_who_wants_quiet_gets_no_panel(tmp_path):

@@ -21,7 +21,7 @@ def test_the_best_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenar
         (tmp_path / file).unlink()
     result = run(tmp_path / "t" / "best.toml")
     assert (result.ticks, result.arenas[0].seed) == (3, 7)
-    assert result.metrics["bowl"].final == found.best.outcome.value
+    assert result.metrics["bowl"].final == found.best.result.value
     assert result.robots == found.best.parameters["robots.pair.count"]
 
 

@@ -29,12 +29,12 @@ def test_a_known_optimum_is_found(tmp_path, scenario, sampler, within):
 
 def test_the_best_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
-    own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("own", f"trial-{found.best.number}"))
+    own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{found.best.number}"))
     assert own.about.seeds == best.about.seeds == (4, 5, 6, 7, 8)
     assert own.sample("bowl", 0).value == pytest.approx([0.36] * 5)
-    assert set(best.sample("bowl", 0).value) == {found.best.outcome.value}
+    assert set(best.sample("bowl", 0).value) == {found.best.result.value}
     of, difference, interval = gained(found.check, found.tuning.goal)
-    assert (of, difference) == ("medians", pytest.approx(found.best.outcome.value - 0.36))
+    assert (of, difference) == ("medians", pytest.approx(found.best.result.value - 0.36))
     assert interval.low == interval.high == pytest.approx(difference)
 
 
@@ -78,7 +78,7 @@ def test_a_time_that_most_runs_do_not_reach_is_worse_than_any_that_they_do(tmp_p
     assert set(late["censored"]) == {1.0}
     early = rows.filter(pl.col("metrics.1.after_s") <= 0.4)
     assert all(value <= 0.5 for value in early["value"])
-    assert found.best.outcome.value == early["value"].min()
+    assert found.best.result.value == early["value"].min()
 
 
 def test_changed_files_and_other_code_are_refused(tmp_path, scenario):

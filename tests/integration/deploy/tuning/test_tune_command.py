@@ -37,14 +37,16 @@ def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_
         (
             str(folder),
             f"swarmwire run {folder}/best.toml",
-            f"swarmwire compare {folder}/check/own {folder}/check/trial-{best}",
+            f"swarmwire compare {folder}/check/baseline {folder}/check/trial-{best}",
             f"swarmwire tune --resume {folder} --trials 40",
         ),
         strict=True,
     ):
         assert line.endswith(f": {command}")
     assert json.loads((folder / "tuning.json").read_text())["command"].startswith(f"swarmwire tune {scenario}")
-    code, out, _ = typed("compare", folder / "check" / "own", folder / "check" / f"trial-{best}", "--outcome", "bowl")
+    code, out, _ = typed(
+        "compare", folder / "check" / "baseline", folder / "check" / f"trial-{best}", "--response", "bowl"
+    )
     assert code == 0
     assert typed("tune", "--resume", folder)[0] == 0
 

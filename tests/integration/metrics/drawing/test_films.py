@@ -83,7 +83,7 @@ def test_twenty_robots_for_a_minute_make_a_small_gif(tmp_path):
     place = rng.uniform(-2, 2, (robots, 2)) + np.cumsum(step, axis=0)
     pose = np.concatenate([place, heading[:, :, None]], axis=-1)
     alive, time_s = np.ones((ticks, robots), np.bool_), np.arange(ticks) / 10
-    metrics = {"order": rng.uniform(size=ticks), "delivery": rng.uniform(size=ticks)}
+    metrics = {"order": rng.uniform(size=ticks), "link_pdr": rng.uniform(size=ticks)}
     figure = FilmFigure(film(static=static, pose=pose, alive=alive, time_s=time_s, metrics=metrics), 480)
     samples = [figure.frame(i).copy() for i in range(0, ticks, 10)]
     write_gif(tmp_path / "a.gif", (figure.frame(i) for i in range(ticks)), samples, 10.0)

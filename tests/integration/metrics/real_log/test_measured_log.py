@@ -16,7 +16,17 @@ from swarmwire.metrics.registry import METRICS
 from tests.support.metrics.real_log.as_logs import as_logs
 from tests.support.metrics.real_log.emulated import flock
 
-NAMES = ("order", "order_velocity", "speed", "cohesion", "min_gap", "pdr", "throughput", "age_of_information")
+NAMES = (
+    "order",
+    "order_velocity",
+    "speed",
+    "cohesion",
+    "min_gap",
+    "pdr",
+    "link_pdr",
+    "throughput",
+    "age_of_information",
+)
 MEASURES = [METRICS[name]() for name in (*NAMES, "latency_air", "collisions", "components", "airtime")]
 PHASES_S = (0.03, 0.0, 0.09, 0.05, 0.01, 0.07)
 
@@ -117,7 +127,7 @@ def test_reasons_are_of_metrics_that_there_are():
 
 def test_without_a_tracker_the_radio_is_measured_and_nothing_else(tmp_path):
     of = measured(tmp_path, tracker=False)
-    assert set(of.series) == {"pdr", "throughput", "age_of_information", "latency_air"}
+    assert set(of.series) == {"pdr", "link_pdr", "throughput", "age_of_information", "latency_air"}
     assert "tracker" in of.left_out["order"]
     assert [("tracker" in note) for note in of.notes] == [True]
     assert of.radio["fates"]["received"] > 1000

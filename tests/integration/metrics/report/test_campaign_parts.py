@@ -11,7 +11,7 @@ from swarmwire.metrics.report.figures.distributions import Group, distributions
 from swarmwire.metrics.report.figures.heat_map import heat_map
 from swarmwire.metrics.report.figures.log_axis import fits_log
 from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
-from swarmwire.metrics.report.figures.response_curve import Jump, Response, response_curve
+from swarmwire.metrics.report.figures.response_curve import Jump, MedianLine, response_curve
 from swarmwire.metrics.report.figures.scaling_curve import scaling_curve
 from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
 from swarmwire.metrics.report.svg import as_svg
@@ -105,9 +105,9 @@ def test_distributions_are_drawn_whether_values_differ_or_are_there_at_all(group
 @pytest.mark.parametrize("x", [[0.0, 1.0, 2.0], [0.01, 1.0, 200.0]])
 def test_responses_are_drawn_with_and_without_a_limit_and_side_by_side(values, limit, x):
     values = np.array(values)
-    response = Response("a", np.array(x), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
-    assert as_svg(response_curve([response], "what", "x", limit), "a")
-    assert as_svg(response_curve([response, response], "what", "x", limit), "a")
+    line = MedianLine("a", np.array(x), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
+    assert as_svg(response_curve([line], "what", "x", limit), "a")
+    assert as_svg(response_curve([line, line], "what", "x", limit), "a")
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, -3.0])

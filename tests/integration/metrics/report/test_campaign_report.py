@@ -19,9 +19,9 @@ COUNTS = [5, 10, 20]
 FEW = (1, 2, 3, 4, 5, 6)
 
 
-def of(folder, outcomes=()):
+def of(folder, responses=()):
     """The report's sections by title, and its page."""
-    report = campaign_report(CampaignFolder(folder), outcomes)
+    report = campaign_report(CampaignFolder(folder), responses)
     return {section.title: section for section in report.sections}, Page(page(report))
 
 
@@ -47,9 +47,9 @@ def test_two_parameters_have_maps_and_robots_have_scaling(tmp_path):
     sections, shown = of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order", "aggregation_time_s"])
     maps = [part for part in sections["Transitions"].parts if hasattr(part, "svg")]
     assert [part.name for part in maps] == [
-        f"map-{outcome}-radio.loss-robots.flock.count" for outcome in ("order.final", "aggregation_time_s")
+        f"map-{response}-radio.loss-robots.flock.count" for response in ("order.final", "aggregation_time_s")
     ]
-    assert len(shown.table("outcome", "at")) == 2 * len(COUNTS)
+    assert len(shown.table("response", "at")) == 2 * len(COUNTS)
     assert [row[0] for row in shown.table("robots.flock.count", "mean time in s")] == ["5", "10", "20"]
     check_alone(shown)
 
@@ -57,7 +57,10 @@ def test_two_parameters_have_maps_and_robots_have_scaling(tmp_path):
 def test_names_beside_a_number_are_told_apart(tmp_path):
     vary = {"radio.loss": LOSS, "robots.flock.agent": ["flocking", "pso"]}
     sections, shown = of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order"])
-    assert [row[1] for row in shown.table("outcome", "at")] == ["robots.flock.agent flocking", "robots.flock.agent pso"]
+    assert [row[1] for row in shown.table("response", "at")] == [
+        "robots.flock.agent flocking",
+        "robots.flock.agent pso",
+    ]
     assert len([part for part in sections["Distributions"].parts if hasattr(part, "svg")]) == 2
 
 
@@ -183,7 +186,7 @@ def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
 def test_a_jump_is_found_where_it_is(tmp_path):
     step = {"order.final": lambda point, rng: float(point["radio.loss"] < 0.3) + 0.05 * rng.standard_normal()}
     _, shown = of(ordinary(tmp_path, numbers=step, times={}))
-    assert [row[1] for row in shown.table("outcome", "change point")] == ["0.3"]
+    assert [row[1] for row in shown.table("response", "change point")] == ["0.3"]
 
 
 @pytest.mark.parametrize(
@@ -196,7 +199,7 @@ def test_the_shape_of_what_is_left_is_named(tmp_path, shape, better):
         "wait.final": lambda point, rng: 1.0 + point["events.0.robots.share"] + 0.01 * rng.standard_normal(),
     }
     sections, shown = of(ordinary(tmp_path, vary=vary, numbers=numbers, times={}))
-    assert [row[2] for row in shown.table("outcome", "over", "shape") if row[-1] == "better"] == [better]
+    assert [row[2] for row in shown.table("response", "over", "shape") if row[-1] == "better"] == [better]
     assert "`wait.final`" in str(sections["Resilience"].parts[0])
 
 

@@ -40,7 +40,7 @@ NAMES = (
     "cohesion",
     "min_gap",
     "throughput",
-    "pdr",
+    "link_pdr",
     "collisions",
     "coverage_time_s",
 )
@@ -84,9 +84,9 @@ def test_a_run_is_near_itself(runs, tmp_path):
         assert rows[name].distance < within, name
         assert rows[name].emulated.median == pytest.approx(rows[name].log, abs=within), name
         assert rows[name].within is True, name
-    delivery = next(row for row in found.radio if row.of.name == "delivery")
-    assert delivery.of.log == pytest.approx(delivery.emulated.median, abs=0.01)
-    assert delivery.within is None
+    pdr = next(row for row in found.radio if row.of.name == "total pdr")
+    assert pdr.of.log == pytest.approx(pdr.emulated.median, abs=0.01)
+    assert pdr.within is None
     assert "campaign" in verdict(found)
 
 
@@ -112,7 +112,7 @@ def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
 def test_what_is_not_compared_has_its_reason(runs, tmp_path):
     found = compared(runs[1], watched(seed=11), tmp_path)
     assert "contacts" in found.not_in_log["collisions"]
-    assert "range" in found.not_in_log["pdr"]  # some were out of it
+    assert "range" in found.not_in_log["link_pdr"]  # some were out of it
     assert found.undefined == ()
     assert found.never == ("coverage_time_s",)
     lines = left_out(found)
@@ -147,8 +147,8 @@ def test_only_the_time_in_common_is_compared(runs, tmp_path):
     assert found.duration_s == pytest.approx(9.9, abs=0.11)
     assert all(len(values) <= 101 for row in found.rows for values in row.runs)
     assert found.radio == ()  # runs have their totals of 20 s alone
-    assert "20 s" in found.not_compared["delivery"]
-    assert any("packets sent, delivery, " in line for line in left_out(found))
+    assert "20 s" in found.not_compared["total pdr"]
+    assert any("packets sent, total pdr, " in line for line in left_out(found))
 
 
 def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhile(tmp_path):
@@ -160,9 +160,9 @@ def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhi
     longer = replace(run, duration_s=20.0, counts=quiet)
     found = compared(replace(kept, runs=(longer,)), of, tmp_path / "logs")
     rows = {row.of.name: row for row in found.radio}
-    assert list(rows) == ["packets sent", "delivery"]
+    assert list(rows) == ["packets sent", "total pdr"]
     assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.04)
-    assert rows["delivery"].of.log == pytest.approx(rows["delivery"].emulated.median, abs=0.02)
+    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
     assert found.not_compared.keys() == {"latency p50", "latency p90", "latency p99"}
 
 
@@ -182,10 +182,10 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
     found = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static, 10.0), MEASURES)
     rows = {row.of.name: row for row in found.radio}
     assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.03)
-    assert rows["delivery"].of.log == pytest.approx(rows["delivery"].emulated.median, abs=0.02)
+    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
     whole = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static), MEASURES)
     assert whole.radio == ()
-    assert all(length in whole.not_compared["delivery"] for length in ("19.9 s", "10 s"))
+    assert all(length in whole.not_compared["total pdr"] for length in ("19.9 s", "10 s"))
 
 
 def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, tmp_path):

@@ -81,15 +81,15 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
     findings = verify(tmp_path)
     assert all(finding.good for finding in findings)
     assert {finding.part: finding.state for finding in findings} == {
-        "summary.json": State.WHOLE,
-        "static.json": State.WHOLE,
-        "log.txt": State.WHOLE,
-        "run.json": State.WHOLE,
-        "trajectory.digests": State.WHOLE,
+        "summary.json": State.INTACT,
+        "static.json": State.INTACT,
+        "log.txt": State.INTACT,
+        "run.json": State.INTACT,
+        "trajectory.digests": State.INTACT,
         "run.rrd": State.NOT_RECORDED,
-        "ticks": State.WHOLE,
-        "packets": State.WHOLE,
-        "events": State.WHOLE,
+        "ticks": State.INTACT,
+        "packets": State.INTACT,
+        "events": State.INTACT,
         "radio_robots": State.NOT_RECORDED,
         "radio_distances": State.NOT_RECORDED,
         "radio_links": State.NOT_RECORDED,

@@ -108,12 +108,12 @@ def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tm
         for tick, value in drawn[name].items():
             last = [count[fate] for count in counts[max(0, tick - 9) : tick + 1]]
             assert value == pytest.approx(10 * sum(last) / len(last))
-    delivery = series(tmp_path / "run.rrd", "shares")["delivery"]
+    link_pdr = series(tmp_path / "run.rrd", "shares")["link_pdr"]
     received, in_range = (
         sum(sum(count[f] for f in fates) for count in counts[-10:])
         for fates in ([Fate.RECEIVED], [Fate.RECEIVED, Fate.LOST])
     )
-    assert delivery[39] == pytest.approx(received / in_range)
+    assert link_pdr[39] == pytest.approx(received / in_range)
 
 
 def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
@@ -237,7 +237,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
     recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
     with pytest.raises(ValueError, match="refused"):
         recording.end(None)
-    assert check_recording(tmp_path / "run.rrd")[0] is State.WHOLE
+    assert check_recording(tmp_path / "run.rrd")[0] is State.INTACT
     assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
 
 

@@ -8,7 +8,7 @@ import polars as pl
 from swarmwire.deploy.campaign.campaign import read_campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.piece import run_piece
+from swarmwire.deploy.campaign.run_task import run_task
 from swarmwire.deploy.campaign.task import Task, result_from, result_message, task_from, task_message
 
 FLOCKING = "swarmwire.agent.behaviours:Flocking"
@@ -80,7 +80,7 @@ class InThisProcess:
 
     def finished(self, timeout_s: float) -> list[Finished]:
         tasks, self.tasks = self.tasks[::-1], []
-        return [Finished(task, result_from(result_message(run_piece(task, "here")))) for task in tasks]
+        return [Finished(task, result_from(result_message(run_task(task, "here")))) for task in tasks]
 
     def close(self) -> None:
         self.closed = True

@@ -1,4 +1,4 @@
-"""A fleet of fake robots, and what is pushed to them: an agent of a few lines, and packages of a few files."""
+"""A fleet of fake robots, and what is deployed to them: an agent of a few lines, and packages of a few files."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field

@@ -8,7 +8,7 @@ import polars as pl
 
 from swarmwire.deploy.arguments import seed_list
 from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.task import PieceResult, Row, Task
+from swarmwire.deploy.campaign.task import Row, Task, TaskResult
 from swarmwire.deploy.campaign.watcher import NobodyWatches
 from swarmwire.deploy.interrupt import Interrupt
 from swarmwire.deploy.tuning.plan import TuningAsked, TuningPlan, planned_tuning
@@ -91,7 +91,7 @@ class Calculating(InThisProcess):
 
     def finished(self, timeout_s: float) -> list[Finished]:
         tasks, self.tasks = self.tasks[::-1], []
-        return [Finished(task, PieceResult(tuple(_rows(task)))) for task in tasks]
+        return [Finished(task, TaskResult(tuple(_rows(task)))) for task in tasks]
 
 
 def _rows(task: Task) -> Iterator[Row]:

@@ -31,7 +31,7 @@ NUMBERS: dict[str, Make] = {
     "order.mean": order,
     "order.min": order,
     "order.max": order,
-    "radio.pdr": lambda point, _: 1.0 - point.get("radio.loss", 0.0),
+    "radio.link_pdr": lambda point, _: 1.0 - point.get("radio.loss", 0.0),
     "counts.late_answers": lambda _, rng: float(rng.poisson(2.0)),
 }
 TIMES: dict[str, Make] = {"aggregation_time_s": aggregation_time_s}
@@ -95,7 +95,7 @@ def _about(
     limit_s: float,
 ) -> dict[str, Any]:
     """campaign.json."""
-    outcomes = [
+    responses = [
         {"column": column, "unit": unit, "kind": kind, "help": f"made-up {column}", "listed": False, "hold_s": 0.0}
         for columns, unit, kind in ((numbers, "", "number"), (times, "s", "time"))
         for column in columns
@@ -116,7 +116,7 @@ def _about(
         "points": [dict(point) for point in points],
         "overrides": [],
         "duration_s": limit_s,
-        "outcomes": outcomes,
+        "responses": responses,
     }
 
 

@@ -8,7 +8,7 @@ from tests.support.deploy.commands import LOSSY
 from tests.support.metrics.real_log.as_logs import Watched
 
 SMALL = ("duration_s=20", "robots.flock.count=6", "arena.size_m=[6.0, 6.0]", "arena.obstacles=[]")
-METRICS = 'metrics=["speed", "cohesion", "pdr", "latency_air"]'
+METRICS = 'metrics=["speed", "cohesion", "link_pdr", "latency_air"]'
 
 
 def watched(*overrides: str, seed: int = 1, out: Path | None = None) -> Watched:

@@ -101,9 +101,9 @@ class CampaignFolders(FolderTarget):
 
     def read(self, folder: Path, *, deep: bool) -> str | None:
         campaign = CampaignFolder(folder)
-        for outcome in campaign.outcomes:
+        for response in campaign.responses:
             for point in range(len(campaign.points)):
-                campaign.sample(outcome.column, point)
+                campaign.sample(response.column, point)
         return None if campaign.finished else "unfinished"
 
 

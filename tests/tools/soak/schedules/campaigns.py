@@ -30,7 +30,7 @@ def play_campaign(plan: Plan, folder: Path) -> list[str]:
     rng = np.random.default_rng([plan.seed, 14])
     with own_temporary(folder / "tmp") as env:
         scenario, campaign = scenario_in(folder), folder / "campaign"
-        asked = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--pack", "2",
+        asked = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch", "2",
                  "--out", str(campaign))  # fmt: skip
         told: list[str] = []
 
@@ -66,7 +66,7 @@ def play_campaign(plan: Plan, folder: Path) -> list[str]:
 
 def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
     """The campaign's tables have each run exactly once, as those of one that was left alone."""
-    sweep(scenario, out=whole, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], pack=2, workers=1)
+    sweep(scenario, out=whole, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], batch=2, workers=1)
     got, expected = rows_in(campaign), rows_in(whole)
     numbers = [row["run"] for row in got]
     if sorted(numbers) != list(range(SEEDS * len(LOSSES))):

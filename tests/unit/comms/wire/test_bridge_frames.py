@@ -38,12 +38,12 @@ RECEIVED = ReceivedPackets(
     payload=np.array([0, 0, 1]),
     payloads=Payloads.of([b"abc", b""]),
 )
-OUTCOMES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
+STATUSES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 
 def changed(**arrays: Any) -> bytes:
     """A valid frame except for these arrays; the prefix `received_` stands for `received/`."""
-    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, OUTCOMES))
+    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
     wrong = {name.replace("received_", "received/"): array for name, array in arrays.items()}
     return frames.encode(whole.kind, whole.tick, {**whole.arrays, **wrong})
 
@@ -55,7 +55,7 @@ def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
 
 
 def test_what_was_received_and_learned_comes_over_whole() -> None:
-    tick, received, tx_status = decode_bridged(encode_bridged(3, ROW, RECEIVED, OUTCOMES), TERMS)
+    tick, received, tx_status = decode_bridged(encode_bridged(3, ROW, RECEIVED, STATUSES), TERMS)
     assert tick == 3
     for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
         assert getattr(received, name).tolist() == getattr(RECEIVED, name).tolist()
@@ -105,7 +105,7 @@ def test_tables_that_contradict_one_another_are_refused(arrays: dict[str, Any], 
 
 
 def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
-    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, OUTCOMES))
+    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
     for kind, tick in (("packets", 3), ("tick", -1)):
         with pytest.raises(BadFrame, match="expected a tick"):
             decode_bridged(frames.encode(kind, tick, whole.arrays), TERMS)
@@ -113,14 +113,14 @@ def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
 
 def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     sizes = [
-        len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES))
+        len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), STATUSES))
         for n in (0, 2**17)
     ]
     most = MAX_RADIO_FRAME_BYTES - sizes[1] + 2**17
     assert sizes[0] < 2**10
     assert MAX_RADIO_FRAME_BYTES == 2**20
     fits, exceeds = (
-        encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), OUTCOMES)
+        encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), STATUSES)
         for n in (most, most + 1)
     )
     assert len(fits) == MAX_RADIO_FRAME_BYTES
@@ -132,7 +132,7 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
 @pytest.mark.parametrize("tick", [2**62 // 10**8 + 1, 2**63, 2**64 - 1])
 def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
     with pytest.raises(BadFrame):
-        decode_bridged(encode_bridged(tick, ROW, RECEIVED, OUTCOMES), TERMS)
+        decode_bridged(encode_bridged(tick, ROW, RECEIVED, STATUSES), TERMS)
 
 
 TOLD_TERMS = BridgeInfo(4, ("flock-0", "flock-1"), 10, 100, ("range_m",), ("radio.range", "radio.tx_status"))

@@ -10,7 +10,7 @@ from swarmwire.deploy.campaign import executor
 from swarmwire.deploy.campaign.executor import open_executor
 from swarmwire.deploy.campaign.local_executor import LocalExecutor, usable_cores
 from swarmwire.deploy.campaign.messages import receive, send
-from swarmwire.deploy.campaign.piece import run_piece
+from swarmwire.deploy.campaign.run_task import run_task
 from swarmwire.deploy.campaign.shipped import scenario_files, unpacked
 from swarmwire.deploy.campaign.task import Task
 
@@ -44,8 +44,8 @@ def test_a_scenario_that_was_shipped_gives_the_same_rows(tmp_path, stumbling):
     assert unpacked(files) == folder
     assert scenario_files(folder) == files
     assert unpacked({**files, "two.toml": files["two.toml"] + b"#"}) != folder
-    there = run_piece(Task(str(folder / "two.toml"), (), 0, (0, 1), (1, 2)))
-    here = run_piece(Task(str(stumbling), (), 0, (0, 1), (1, 2)))
+    there = run_task(Task(str(folder / "two.toml"), (), 0, (0, 1), (1, 2)))
+    here = run_task(Task(str(stumbling), (), 0, (0, 1), (1, 2)))
     measured = [
         {name: row[name] for name in row if not name.startswith("timing_")} for row in (*here.rows, *there.rows)
     ]

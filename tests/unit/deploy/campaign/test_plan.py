@@ -28,19 +28,19 @@ def test_a_range_over_what_the_scenario_counts_gives_whole_numbers(scenario):
     assert len(found.points) == 64
 
 
-def test_outcomes_are_told_with_unit_and_kind(scenario):
-    found = {of.column: of for of in plan(scenario).outcomes}
+def test_responses_are_told_with_unit_and_kind(scenario):
+    found = {of.column: of for of in plan(scenario).responses}
     assert found["min_gap.final"].unit == "m"
     assert {of.kind for of in found.values()} == {"number"}
     assert list(found)[:4] == ["order.final", "order.mean", "order.min", "order.max"]
-    assert "radio.pdr" in found
+    assert "radio.link_pdr" in found
 
 
 def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
     stop = 'stop={metric="order", at_least=0.5, hold_s=%s}'
-    (held,) = (of for of in plan(scenario, overrides=(stop % 2.0,)).outcomes if of.column == "stop_time_s")
+    (held,) = (of for of in plan(scenario, overrides=(stop % 2.0,)).responses if of.column == "stop_time_s")
     assert (held.help, held.hold_s) == ("when this began to hold: order at least 0.5 for 2 s", 2.0)
-    varied = plan(scenario, "stop.hold_s=1.0,3.0", overrides=(stop % 2.0,)).outcomes
+    varied = plan(scenario, "stop.hold_s=1.0,3.0", overrides=(stop % 2.0,)).responses
     (held,) = (of for of in varied if of.column == "stop_time_s")
     assert (held.help, held.hold_s) == ("when this began to hold: what is to stop the run", 3.0)
 
@@ -68,7 +68,7 @@ def test_a_point_that_cannot_be_run_is_refused_in_a_line_that_names_what_varies(
 def test_other_arguments_are_checked_too(scenario):
     for asked, told in (
         ({"record_seeds": (3,)}, "--record-seeds: .*3"),
-        ({"pack": 0}, "--pack: expected at least 1"),
+        ({"batch": 0}, "--batch: expected at least 1"),
         ({"overrides": ("radio.los=1",)}, "--set radio.los=1: "),
     ):
         with pytest.raises(BadInput, match=f"^{told}"):

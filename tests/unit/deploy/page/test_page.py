@@ -34,7 +34,7 @@ def control():
 
 @pytest.fixture
 def news(control):
-    thread = NewsThread(control, lambda: {"pdr": 0.25}, WallClock())
+    thread = NewsThread(control, lambda: {"link_pdr": 0.25}, WallClock())
     yield thread
     thread.close()
 
@@ -178,7 +178,7 @@ def test_the_status_is_what_the_run_told_last_and_what_was_seen(client, control,
     control.tick = 3
     news.look()
     told = until(lambda: client.get("/secret/status").json(), lambda told: told["tick"] == 3)
-    assert told["pdr"] == 0.25
+    assert told["link_pdr"] == 0.25
     assert told["metrics"] == {"order": 0.5, "rejoin_median": None}
 
 
@@ -188,7 +188,7 @@ def test_values_are_kept_for_pages_that_are_opened_later_one_a_tick(control, new
         for _ in range(2):  # the second tells of no other tick
             news._tell(control.status())
     assert len(news.history) == KEPT
-    assert news.history[-1] == {"pdr": 0.25, "alive": 3, "tick_ms": 1.5, "order": 0.5, "rejoin_median": None}
+    assert news.history[-1] == {"link_pdr": 0.25, "alive": 3, "tick_ms": 1.5, "order": 0.5, "rejoin_median": None}
 
 
 def events(answer):

@@ -45,13 +45,13 @@ def test_of_a_large_swarm_some_are_shown():
 def test_delivery_is_that_of_the_last_simulated_second():
     seen = Seen(OF)
     seen.see(glimpse(0, tally=tally({Fate.RECEIVED: 1, Fate.LOST: 1})))
-    assert seen.numbers["pdr"] == 0.5
+    assert seen.numbers["link_pdr"] == 0.5
     seen.see(glimpse(5, tally=tally({Fate.RECEIVED: 2})))
-    assert seen.numbers["pdr"] == 0.75
+    assert seen.numbers["link_pdr"] == 0.75
     seen.see(glimpse(10, tally=tally({Fate.LOST: 2})))
-    assert seen.numbers["pdr"] == 0.5
+    assert seen.numbers["link_pdr"] == 0.5
     seen.see(glimpse(30, tally=None))
-    assert seen.numbers["pdr"] is None
+    assert seen.numbers["link_pdr"] is None
 
 
 @pytest.mark.parametrize(("robots", "told"), [((), "nobody"), ((1, 3), "flock-1, flock-3"), (range(4), "all")])

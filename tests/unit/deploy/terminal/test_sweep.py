@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.deploy.campaign.sweeping import Sweep
-from swarmwire.deploy.campaign.task import PieceResult
+from swarmwire.deploy.campaign.task import TaskResult
 from swarmwire.deploy.terminal.sweep_progress import SweepBar, SweepLines, sweep_progress
 from swarmwire.deploy.terminal.sweep_report import print_sweep
 from tests.support.clocks import StillClock
@@ -19,15 +19,15 @@ class Campaign:
     name, points, seeds, runs = "a [bold] flock", [{}, {}], list(range(50)), 100
 
 
-def piece(runs, failed=0):
-    return PieceResult(tuple({"run": run, "ended": "failed" if run < failed else "duration"} for run in range(runs)))
+def task(runs, failed=0):
+    return TaskResult(tuple({"run": run, "ended": "failed" if run < failed else "duration"} for run in range(runs)))
 
 
-def printed(watcher_of, pieces, terminal, done=0):
+def printed(watcher_of, tasks, terminal, done=0):
     clock, text = StillClock(), io.StringIO()
     watcher = watcher_of(clock, Console(file=text, force_terminal=terminal, width=110))
     watcher.begin(Campaign(), done, 0)
-    for one in pieces:
+    for one in tasks:
         clock.time_ns += NS_PER_S
         watcher.see(one)
     watcher.end()
@@ -35,7 +35,7 @@ def printed(watcher_of, pieces, terminal, done=0):
 
 
 def test_plain_lines_tell_how_far_how_fast_and_how_long():
-    lines = printed(SweepLines, [piece(25), piece(25, failed=2), piece(50)], terminal=False).splitlines()
+    lines = printed(SweepLines, [task(25), task(25, failed=2), task(50)], terminal=False).splitlines()
     assert lines == [
         "a [bold] flock: 2 points x 50 seeds = 100 runs",
         "25/100 runs, 25.0 runs/s, 3 s left",
@@ -45,14 +45,14 @@ def test_plain_lines_tell_how_far_how_fast_and_how_long():
 
 
 def test_many_pieces_are_a_few_lines_and_what_was_there_is_no_speed():
-    lines = printed(SweepLines, [piece(1)] * 60, terminal=False, done=40).splitlines()
+    lines = printed(SweepLines, [task(1)] * 60, terminal=False, done=40).splitlines()
     assert lines[0].endswith("; 40 of them are there")
     assert len(lines) == 7
     assert lines[-1] == "100/100 runs, 1.0 runs/s, 0 s left"
 
 
 def test_a_bar_shows_the_same():
-    text = printed(SweepBar, [piece(25, failed=1)], terminal=True)
+    text = printed(SweepBar, [task(25, failed=1)], terminal=True)
     assert "a [bold] flock" in text
     assert "25/100" in text
     assert "1 failed" in text
@@ -67,7 +67,7 @@ TIME = {"unit": "s", "kind": "time", "help": "", "listed": False, "hold_s": 0.0}
 ABOUT = {
     "format": 1, "name": "times", "scenario": "times", "command": "", "began_utc": "", "versions": {}, "cpu": "",
     "modules": {}, "files": [], "design": "grid", "seeds": [1, 2, 3, 4], "vary": {}, "points": [{}], "overrides": [],
-    "duration_s": 50.0, "outcomes": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
+    "duration_s": 50.0, "responses": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
 }  # fmt: skip
 
 

@@ -7,17 +7,17 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.tuning.goal import goal_of, sample_of
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 
-ORDER = Outcome("order.final", "", "number", "")
-TIME = Outcome("aggregation_time_s", "s", "time", "")
+ORDER = Response("order.final", "", "number", "")
+TIME = Response("aggregation_time_s", "s", "time", "")
 LIMIT_S = 60.0
 
 
 def reached(goal, values, end_s=LIMIT_S):
     found = goal_of(goal, (ORDER, TIME), LIMIT_S)
-    rows = [{"seed": seed, "sim_time_s": end_s, found.outcome.column: value} for seed, value in enumerate(values)]
-    return found.reached(sample_of(rows, found.outcome))
+    rows = [{"seed": seed, "sim_time_s": end_s, found.response.column: value} for seed, value in enumerate(values)]
+    return found.reached(sample_of(rows, found.response))
 
 
 @pytest.mark.parametrize(
@@ -68,9 +68,9 @@ def test_which_way_is_better():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("order", "OUTCOME.STAT"),
-        ("least order", "OUTCOME.STAT"),
-        ("min", "OUTCOME.STAT"),
+        ("order", "RESPONSE.STAT"),
+        ("least order", "RESPONSE.STAT"),
+        ("min", "RESPONSE.STAT"),
         ("min ordr.final", "order.final"),
         ("min order.final.censored", "a time"),
     ],

@@ -106,7 +106,7 @@ def test_statistics_go_by_column_and_stat(tmp_path, name, means):
 @pytest.mark.parametrize("stat", get_args(Stat))
 def test_a_time_has_every_statistic(tmp_path, stat):
     found = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
-    assert (found.outcome.kind, found.stat) == ("time", stat)
+    assert (found.response.kind, found.stat) == ("time", stat)
 
 
 @pytest.mark.parametrize(
@@ -137,8 +137,8 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"design": "gird"}, "design"),
         ({"duration_s": "1"}, "duration_s"),
         ({"duration_s": True}, "duration_s"),
-        ({"outcomes": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "outcomes[0].kind"),
-        ({"outcomes": [{"column": "x"}]}, "outcomes[0].unit"),
+        ({"responses": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "responses[0].kind"),
+        ({"responses": [{"column": "x"}]}, "responses[0].unit"),
         ({"files": [3]}, "files[0]"),
         ({"files": [{"what": "a"}]}, "files[0].path"),
         ({"overrides": [3]}, "overrides"),
@@ -176,9 +176,9 @@ def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
 
 def test_a_time_that_must_hold_is_watched_for_so_much_less_than_the_run(tmp_path):
     folder = write_campaign(tmp_path / "a")
-    outcomes = json.loads((folder / "campaign.json").read_text())["outcomes"]
-    held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in outcomes]
+    responses = json.loads((folder / "campaign.json").read_text())["responses"]
+    held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in responses]
     before = CampaignFolder(folder).sample("aggregation_time_s", 2)
-    after = CampaignFolder(rewritten(folder, outcomes=held)).sample("aggregation_time_s", 2)
+    after = CampaignFolder(rewritten(folder, responses=held)).sample("aggregation_time_s", 2)
     assert not before.observed.all()
     np.testing.assert_array_equal(after.value, before.value - np.where(before.observed, 0.0, 5.0))

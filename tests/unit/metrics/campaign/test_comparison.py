@@ -28,8 +28,8 @@ def better(tmp_path):
     return write_campaign(tmp_path / "better", {"radio.loss": [0.1 + 0.3, 0.2, 0.6]}, numbers=numbers, draws=1)
 
 
-def compared(first, second, *outcomes, where=()):
-    return compare(*at([select(str(first)), select(str(second))], where), outcomes)
+def compared(first, second, *responses, where=()):
+    return compare(*at([select(str(first)), select(str(second))], where), responses)
 
 
 def test_points_that_both_have_meet_whatever_their_order(plain, better):
@@ -47,9 +47,9 @@ def test_points_that_both_have_meet_whatever_their_order(plain, better):
 
 
 def test_times_and_last_values_are_compared_unless_others_are_named(plain, better):
-    columns = [row.outcome.column for row in compared(plain, better, where=["radio.loss=0.2"]).rows]
-    assert columns == ["order.final", "radio.pdr", "aggregation_time_s"]
-    assert [row.outcome.column for row in compared(plain, better, "counts.late_answers").rows] == [
+    columns = [row.response.column for row in compared(plain, better, where=["radio.loss=0.2"]).rows]
+    assert columns == ["order.final", "radio.link_pdr", "aggregation_time_s"]
+    assert [row.response.column for row in compared(plain, better, "counts.late_answers").rows] == [
         "counts.late_answers"
     ] * 2
 
@@ -59,7 +59,7 @@ def test_what_neither_has_a_value_of_is_left_out_unless_named(tmp_path, plain):
         write_campaign(tmp_path / name, numbers=NUMBERS | {"gap_m.final": lambda *_: None}, seeds=(1, 2))
         for name in "ab"
     ]
-    assert "gap_m.final" not in {row.outcome.column for row in compared(*folders).rows}
+    assert "gap_m.final" not in {row.response.column for row in compared(*folders).rows}
     (row, *_) = compared(*folders, "gap_m").rows
     assert (row.first.n, row.first.undefined) == (0, 2)
     none = write_campaign(tmp_path / "none", missing=range(30))
@@ -116,7 +116,7 @@ def test_the_table_for_programs_has_the_numbers_of_the_rows(tmp_path, plain, bet
     write_comparison(found, tmp_path / "x.csv")
     rows = list(csv.DictReader((tmp_path / "x.csv").read_text().splitlines()))
     assert len(rows) == len(found.rows)
-    assert rows[0]["outcome"] == "order.final"
+    assert rows[0]["response"] == "order.final"
     assert float(rows[0]["median_difference"]) == found.rows[0].difference.median
     assert rows[0]["a.radio.loss"] == rows[0]["b.radio.loss"] == "0.2"
     last = rows[-1]
@@ -141,7 +141,7 @@ def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
     [
         ("plain", "other", [], "", "vary"),
         ("plain", "far", [], "", "points"),
-        ("plain", "strange", [], "", "outcomes"),
+        ("plain", "strange", [], "", "responses"),
         ("plain", "nothing", [], "", "none"),
         ("plain@radio.los=0", "plain", [], "radio.los", "radio.loss?"),
         ("plain@radio.loss=0.3", "plain", [], "radio.loss", "0, 0.2, 0.4"),
@@ -161,7 +161,7 @@ def test_what_cannot_be_compared_is_refused_with_its_key(tmp_path, plain, first,
     assert hint in str(refused.value)
 
 
-def test_outcomes_of_another_kind_are_not_the_same(tmp_path, plain):
+def test_responses_of_another_kind_are_not_the_same(tmp_path, plain):
     other = write_campaign(tmp_path / "other", numbers=NUMBERS | TIMES, times={})
     with pytest.raises(BadInput, match="aggregation_time_s"):
         compared(plain, other, "aggregation_time_s")

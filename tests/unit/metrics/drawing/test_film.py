@@ -65,26 +65,26 @@ def test_the_tick_of_a_time_is_the_last_that_had_begun():
     assert [of.index_at(time_s) for time_s in (0.0, 0.05, 0.1, 0.3, 2.99, 99.0)] == [0, 0, 1, 3, 29, 30]
 
 
-def delivery(frame):
+def link_pdr(frame):
     run = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: frame)
-    return film_of(run, 0, "run").metrics["delivery"]
+    return film_of(run, 0, "run").metrics["link_pdr"]
 
 
-def test_delivery_is_what_was_received_of_what_was_in_range_within_the_last_second():
+def test_link_pdr_is_what_was_received_of_what_was_in_range_within_the_last_second():
     ticks = 31
     received, in_range = np.full(ticks, 3), np.full(ticks, 4)
     received[:15], in_range[0] = 0, 0
     counts = {"received": pl.Series(received), "in_range": pl.Series(in_range)}
     frame = ticks_frame(film(ticks)).with_columns(**counts)
-    found = delivery(frame)
+    found = link_pdr(frame)
     assert np.isnan(found[0])
     np.testing.assert_allclose(found[[14, 15, 19, 24, 30]], [0.0, 0.075, 0.375, 0.75, 0.75])
 
 
-def test_without_a_radio_there_is_no_delivery():
+def test_without_a_radio_there_is_no_link_pdr():
     none = pl.Series([None] * 31, dtype=pl.Int64)
     frame = ticks_frame(film()).with_columns(received=none, in_range=none)
-    assert np.isnan(delivery(frame)).all()
+    assert np.isnan(link_pdr(frame)).all()
 
 
 TIME_S = np.arange(1201) / 10  # two minutes at 10 Hz

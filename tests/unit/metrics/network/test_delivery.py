@@ -46,10 +46,17 @@ def test_fates_add_up_to_the_intended_receivers_with_what_was_in_flight():
     assert first["sent"] == 2
 
 
-def test_the_delivery_ratio_is_received_over_in_range_and_null_if_none_was():
+def test_link_pdr_is_received_over_in_range_and_null_if_none_was():
     ticks = [{"tally": tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 3})}]
     first, second = tallied(static(arenas=2), *ticks)
-    assert first["pdr"] == 0.75
+    assert first["link_pdr"] == 0.75
+    assert second["link_pdr"] is None
+
+
+def test_pdr_is_received_over_intended_and_null_if_nothing_was_intended():
+    tallies = tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9, Fate.IN_FLIGHT: 2}, {})
+    first, second = tallied(static(arenas=2), {"tally": tallies})
+    assert first["pdr"] == 3 / 15
     assert second["pdr"] is None
 
 

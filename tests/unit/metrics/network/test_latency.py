@@ -12,7 +12,7 @@ from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
-from swarmwire.metrics.network.pdr import PacketDeliveryRatio
+from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio, PacketDeliveryRatio
 from swarmwire.metrics.network.windowed import Window
 from tests.support.comms.radio.runs import make_medium, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
@@ -20,12 +20,12 @@ from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
 
 MS = 1_000_000
+KINDS = PacketDeliveryRatio, LinkPacketDeliveryRatio, LatencyOnAir, LatencyToAgent
 
 
 def told(of, seen, window_s):
-    """The three metrics in each tick, (3, ticks, arenas)."""
-    metrics = (kind(window_s=window_s) for kind in (PacketDeliveryRatio, LatencyOnAir, LatencyToAgent))
-    return in_each_tick(of, seen, *metrics).transpose(1, 0, 2)
+    """The metrics of KINDS in each tick, (4, ticks, arenas)."""
+    return in_each_tick(of, seen, *(kind(window_s=window_s) for kind in KINDS)).transpose(1, 0, 2)
 
 
 @given(st.lists(st.integers(-9, 9), max_size=30), st.integers(1, 8))
@@ -43,7 +43,7 @@ def test_a_window_is_rounded_up_to_whole_ticks():
         assert [int(window.add([[1]])[0, 0]) for _ in range(9)][-1] == size
 
 
-def test_the_ratio_is_of_receivers_in_range_and_of_the_window_alone():
+def test_the_ratios_are_of_intended_receivers_and_of_those_in_range_of_the_window_alone():
     of = static(arenas=2)
     counts = [
         tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
@@ -51,19 +51,20 @@ def test_the_ratio_is_of_receivers_in_range_and_of_the_window_alone():
         tally({}, {Fate.LOST: 4}),
         tally({}, {}),
     ]
-    [pdr, _, _] = told(of, [truth(of, tick, tally=one) for tick, one in enumerate(counts)], window_s=0.2)
+    [pdr, link_pdr, _, _] = told(of, [truth(of, tick, tally=one) for tick, one in enumerate(counts)], window_s=0.2)
     nan = np.nan
-    np.testing.assert_allclose(pdr, [[0.75, nan], [0.5, nan], [0.25, 0.0], [nan, 0.0]])
+    np.testing.assert_allclose(pdr, [[3 / 13, 0.0], [4 / 17, 0.0], [0.25, 0.0], [nan, 0.0]])
+    np.testing.assert_allclose(link_pdr, [[0.75, nan], [0.5, nan], [0.25, 0.0], [nan, 0.0]])
 
 
 def test_latencies_end_at_hearing_and_at_the_tick_in_which_the_receiver_acts():
     of = static()
     third = replace(of, groups=(replace(of.groups[0], act_every_ticks=3),))
     seen = [truth(of, 1, finished=finished([40 * MS, 0], [65 * MS, 95 * MS])), truth(of, 2, finished=finished([], []))]
-    [_, air, agent] = told(third, seen, window_s=0.2)
+    [_, _, air, agent] = told(third, seen, window_s=0.2)
     assert air.ravel().tolist() == [pytest.approx(0.06)] * 2
     assert agent.ravel().tolist() == [pytest.approx(0.28)] * 2
-    [_, air, agent] = told(of, seen, window_s=0.1)
+    [_, _, air, agent] = told(of, seen, window_s=0.1)
     assert air.ravel().tolist() == [pytest.approx(0.06), pytest.approx(np.nan, nan_ok=True)]
     assert agent.ravel().tolist() == [pytest.approx(0.08), pytest.approx(np.nan, nan_ok=True)]
 
@@ -79,6 +80,7 @@ def test_they_are_sums_over_the_packets_of_the_window(run, size, every):
             window = seen[max(0, tick + 1 - size) : tick + 1]
             received = sum(int(one.tally.fates[arena, Fate.RECEIVED]) for one in window)
             in_range = sum(int(one.tally.in_range[arena]) for one in window)
+            ended = sum(int(one.tally.fates[arena].sum()) for one in window)
             air, agent = [], []
             for one in window:
                 acts_ns = next(tick for tick in range(one.tick, one.tick + every) if tick % every == 0) * 100 * MS
@@ -87,6 +89,7 @@ def test_they_are_sums_over_the_packets_of_the_window(run, size, every):
                         air.append((final - sent) / 1e9)
                         agent.append((acts_ns - sent) / 1e9)
             expected = [
+                received / ended if ended else np.nan,
                 received / in_range if in_range else np.nan,
                 np.mean(air) if air else np.nan,
                 np.mean(agent) if agent else np.nan,
@@ -107,7 +110,8 @@ def test_of_independent_losses_the_ratio_is_what_is_not_lost_and_the_latency_tha
         news = air.step(tick * 100 * MS, np.zeros((80, 3)))
         seen.append(truth(of, tick, tally=news.tally, finished=news.finished))
         air.send(tick * 100 * MS, tick, packets(np.arange(80), np.full(80, BROADCAST), np.full(80, 10)))
-    pdr, air_s, agent_s = told(of, seen, window_s=1.0)[:, -1]
+    pdr, link_pdr, air_s, agent_s = told(of, seen, window_s=1.0)[:, -1]
+    np.testing.assert_array_equal(pdr, link_pdr)  # everybody is in range
     assert pdr.mean() == pytest.approx(1 - LOSSES, abs=0.02)
     assert air_s.mean() == pytest.approx(0.15 + 0.5 * 0.1, abs=0.0015)
     assert (agent_s >= air_s).all()

@@ -21,7 +21,9 @@ from tests.support.agent.on_robot.scripted import UTC_NS, DatedFakeClock, Script
 from tests.support.metrics.real_log.as_logs import as_logs
 from tests.support.metrics.real_log.emulated import flock
 
-MEASURES = [METRICS[name]() for name in ("order", "speed", "cohesion", "min_gap", "throughput", "pdr", "latency_air")]
+MEASURES = [
+    METRICS[name]() for name in ("order", "speed", "cohesion", "min_gap", "throughput", "link_pdr", "latency_air")
+]
 
 
 @pytest.fixture

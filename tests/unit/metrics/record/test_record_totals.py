@@ -41,7 +41,7 @@ def states(folder):
 
 
 def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder):
-    assert states(folder) == dict.fromkeys(TOTALS, State.WHOLE)
+    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
     for arena, radio in enumerate(folder.summary["radio"]):
         robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
         assert robots["robot"].to_list() == list(OF.robot_names)
@@ -68,7 +68,7 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
 def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(pl.col(columns) * 2).write_parquet(file)
-    assert states(folder) == {**dict.fromkeys(TOTALS, State.WHOLE), table: State.DIFFERS}
+    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: State.DIFFERS}
     file.unlink()
     assert states(folder)[table] == State.MISSING
 
@@ -89,14 +89,14 @@ def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, co
 def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(change).write_parquet(file)
-    assert states(folder) == {**dict.fromkeys(TOTALS, State.WHOLE), table: state}
+    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: state}
     (found,) = (finding for finding in verify(folder.path) if finding.part == table)
     assert re.match(text, found.text)
 
 
 def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
     (folder.path / "static.json").unlink()
-    assert states(folder) == dict.fromkeys(TOTALS, State.WHOLE)
+    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
     file = folder.path / "radio_links.parquet"
     pl.read_parquet(file).with_columns(pl.col("packets").cast(pl.Float64)).write_parquet(file)
     assert states(folder)["radio_links"] == State.DAMAGED

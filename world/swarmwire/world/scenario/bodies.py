@@ -32,12 +32,12 @@ def sheet_path(body: str, where: str) -> Path | None:
 
 
 def custom_code(static: Static) -> tuple[str, ...]:
-    """The classes of the bodies' own senses and actuators: "package.module:Class" or "/path/file.py:Class"."""
+    """The classes of the bodies' custom sensors and actuators: "package.module:Class" or "/path/file.py:Class"."""
     return custom_code_of(group.body for group in static.groups)
 
 
 def custom_code_of(bodies: Iterable[Body]) -> tuple[str, ...]:
-    """The classes of these bodies' own senses and actuators, in the same form."""
+    """The classes of these bodies' custom sensors and actuators, in the same form."""
     specs = [spec for body in bodies for spec in (*body.sensors.values(), *body.actuators.values())]
     return tuple(dict.fromkeys(spec.kind for spec in specs if isinstance(spec, CustomSensorSpec | CustomActuatorSpec)))
 
@@ -72,7 +72,7 @@ def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
 
 
 def read_body(path: Path, where: str, key: str) -> Body:
-    """The body of a sheet of the user's own, its own senses and actuators fitted.
+    """The body of a sheet of the user's own, its custom sensors and actuators fitted.
 
     BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
     """

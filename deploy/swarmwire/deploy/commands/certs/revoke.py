@@ -14,7 +14,7 @@ def revoke_command(
 ) -> None:
     """Revoke a name for good: under this CA it never gets a certificate again.
 
-    Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are pushed and started anew;
+    Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are deployed and restarted;
     a run with gateways reads it beside its --ca. For example, a robot that was stolen:
 
       swarmwire certs revoke lab-ca flock-3

@@ -27,13 +27,14 @@ def check_command(
         bool, typer.Option("--offline", help="Check only what can be known here: settings, agents, what they need.")
     ] = False,
 ) -> None:
-    """Check whether a push would work: settings, agents and what they need; each host, its Python, disk and clock.
+    """Check whether a deployment would work: settings, agents and their needs; each host, its Python, disk and clock.
 
     Nothing is changed on robots. Hosts are known by their keys: with --trust keys of new ones are kept; compare
     what is shown with `ssh-keygen -lf /etc/ssh/ssh_host_ed25519_key.pub` on the robot. A key that has changed is
     refused either way.
 
-    Exit code 0: all is well; 1: not with every robot; 2: the fleet's file is wrong. For example, before the first push:
+    Exit code 0: all is well; 1: not with every robot; 2: the fleet's file is wrong. For example, before the
+    first deployment:
 
       swarmwire robots check fleet.toml --trust
     """

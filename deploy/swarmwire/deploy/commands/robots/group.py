@@ -3,9 +3,9 @@
 import typer
 
 from swarmwire.deploy.commands.robots.check import check_command
+from swarmwire.deploy.commands.robots.deploy import deploy_command
 from swarmwire.deploy.commands.robots.estop import estop_command
 from swarmwire.deploy.commands.robots.logs import logs_command
-from swarmwire.deploy.commands.robots.push import push_command
 from swarmwire.deploy.commands.robots.rollback import rollback_command
 from swarmwire.deploy.commands.robots.start import start_command
 from swarmwire.deploy.commands.robots.status import status_command
@@ -21,7 +21,7 @@ def _robots() -> None: ...
 
 
 robots_app.command("check")(check_command)
-robots_app.command("push")(push_command)
+robots_app.command("deploy")(deploy_command)
 robots_app.command("start")(start_command)
 robots_app.command("stop")(stop_command)
 robots_app.command("status")(status_command)

@@ -9,7 +9,7 @@ PART = ".part"  # of what is not whole yet
 
 
 def root() -> Path:
-    """The folder of all that is pushed."""
+    """The folder of all that is deployed."""
     return Path.home() / "swarmwire"
 
 

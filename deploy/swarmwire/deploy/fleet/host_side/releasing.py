@@ -26,7 +26,7 @@ LINES = 5  # of what a failed trial printed
 
 
 def clear_parts(robots: list[str]) -> None:
-    """Remove what pushes that were cut off left behind."""
+    """Remove what interrupted deployments left behind."""
     for folder in (environment("x").parent, *map(releases, robots)):
         for path in folder.glob(f"*{PART}"):
             shutil.rmtree(path, ignore_errors=True)

@@ -1,6 +1,6 @@
 """Requests on standard input, an answer to each on standard output: a line of JSON each, archives right behind theirs.
 
-It ends with the connection. What changes the host needs the lock, which one push has at a time.
+It ends with the connection. What changes the host needs the lock, which one deployment has at a time.
 """
 
 import fcntl
@@ -46,13 +46,13 @@ def _answer(answers: BinaryIO, answer: dict[str, Any]) -> None:
 
 @contextmanager
 def _locked() -> Generator[None]:
-    """The lock, until the requests end; Refusal if another push has it."""
+    """The lock, until the requests end; Refusal if another deployment has it."""
     root().mkdir(mode=0o700, exist_ok=True)
     with (root() / "lock").open("w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise Refusal("busy", "another push to this host is under way") from None
+            raise Refusal("busy", "another deployment to this host is under way") from None
         yield
 
 

@@ -2,13 +2,13 @@
 import { sparkline } from "./sparkline.js";
 
 const KEPT = 240;
-const FIRST = ["pdr", "components", "order", "largest_component", "alive", "tick_ms"];
+const FIRST = ["link_pdr", "components", "order", "largest_component", "alive", "tick_ms"];
 const OWN = [
-  { name: "pdr", unit: "%", bounds: [0, 1] },
+  { name: "link_pdr", unit: "%", bounds: [0, 1] },
   { name: "alive", unit: "", bounds: [0, null] },
   { name: "tick_ms", unit: "ms", bounds: [0, null] },
 ];
-const NAMES = { pdr: "PDR, last second", tick_ms: "cost of a tick", alive: "robots alive" };
+const NAMES = { link_pdr: "link PDR, last second", tick_ms: "cost of a tick", alive: "robots alive" };
 const by = (id) => document.getElementById(id);
 
 export function numbers() {
@@ -43,7 +43,7 @@ export function numbers() {
       lastTick = null;
     },
     see(status) {
-      const values = { ...status.metrics, pdr: status.pdr, alive: status.alive, tick_ms: status.measures_ms };
+      const values = { ...status.metrics, link_pdr: status.link_pdr, alive: status.alive, tick_ms: status.measures_ms };
       if (status.tick !== lastTick && lastTick !== null) take(values);
       lastTick = status.tick;
       for (const { box, value, line, series } of tiles.values()) {

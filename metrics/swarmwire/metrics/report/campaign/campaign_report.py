@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.report.campaign.chosen_outcomes import choose_outcomes
+from swarmwire.metrics.report.campaign.chosen_responses import choose_responses
 from swarmwire.metrics.report.campaign.distribution_section import distribution_section
 from swarmwire.metrics.report.campaign.methods_section import methods_section
 from swarmwire.metrics.report.campaign.resilience_section import resilience_section
@@ -17,14 +17,14 @@ from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.report.section import Report, Section
 
 
-def campaign_report(folder: CampaignFolder, outcomes: Sequence[str] = ()) -> Report:
-    """What came of a campaign, also of one that is not finished; about these outcomes, or those that say most.
+def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Report:
+    """What came of a campaign, also of one that is not finished; about these responses, or those that say most.
 
-    BadInput for an outcome that there is not, or a file that is damaged.
+    BadInput for a response that there is not, or a file that is damaged.
     """
     samples = Samples(folder)
-    chosen = choose_outcomes(samples, outcomes)
-    times = tuple(outcome for outcome in chosen.shown if outcome.kind == "time")
+    chosen = choose_responses(samples, responses)
+    times = tuple(response for response in chosen.shown if response.kind == "time")
     found: list[Section | None] = []
     if len(folder.runs):
         found = [

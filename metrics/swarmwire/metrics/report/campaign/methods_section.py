@@ -41,6 +41,6 @@ _OF_SECTIONS = {
 
 
 def methods_section(sections: Collection[str], *, times: bool) -> Section:
-    """The section, about what the report has: the titles of its sections, and whether any outcome is a time."""
+    """The section, about what the report has: the titles of its sections, and whether any response is a time."""
     there = {*sections, *(["times"] if times else [])}
     return Section("Methods", (*_ALWAYS, *(text for title, text in _OF_SECTIONS.items() if title in there)))

@@ -1,4 +1,4 @@
-"""Numbers as people read them: all of one outcome with as many decimals as their spread deserves."""
+"""Numbers as people read them: all of one response with as many decimals as their spread deserves."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ _PLAIN_UP_TO = 1e7
 
 @dataclass(frozen=True)
 class Rounding:
-    """How the values of one outcome are written."""
+    """How the values of one response are written."""
 
     decimals: int | None  # None: with an exponent
 

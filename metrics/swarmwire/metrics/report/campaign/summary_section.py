@@ -1,15 +1,15 @@
-"""The section of tables: what each outcome came to at each design point."""
+"""The section of tables: what each response came to at each design point."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarmwire.metrics.campaign.outcome import Outcome
-from swarmwire.metrics.report.campaign.chosen_outcomes import ChosenOutcomes
+from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.report.campaign.chosen_responses import ChosenResponses
 from swarmwire.metrics.report.campaign.levels import levels_of
 from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
-from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence, short_value
+from swarmwire.metrics.report.campaign.words import listed, response_title, sentence, short_value
 from swarmwire.metrics.report.section import Section, Table
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.statistics.texts import number_text
@@ -26,7 +26,7 @@ class _Group:
     points: tuple[int, ...]
 
 
-def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
+def summary_section(samples: Samples, chosen: ChosenResponses) -> Section:
     """The section."""
     columns, groups = _groups(samples)
     parts: list[str | Table] = []
@@ -35,15 +35,15 @@ def summary_section(samples: Samples, chosen: ChosenOutcomes) -> Section:
             f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
             "parameter, over all values of the others. `summary.parquet` has every run."
         )
-    for place, outcome in enumerate(chosen.shown):
+    for place, response in enumerate(chosen.shown):
         folded = place > 0 and len(groups) > _MAX_OPEN_ROWS
-        parts.append(_table(samples, outcome, columns, groups, folded=folded))
-    for what, outcomes in (
+        parts.append(_table(samples, response, columns, groups, folded=folded))
+    for what, responses in (
         ("The same in all runs that have a value", chosen.constant),
         ("Never there in any run", chosen.never),
     ):
-        if outcomes:
-            parts.append(f"{what}, and so left out: {listed([f'`{outcome.column}`' for outcome in outcomes])}.")
+        if responses:
+            parts.append(f"{what}, and so left out: {listed([f'`{response.column}`' for response in responses])}.")
     if chosen.others:
         parts.append(_other_table(samples, chosen.others, columns, groups))
     return Section("Summary", tuple(parts))
@@ -66,48 +66,48 @@ def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
 
 
 def _table(
-    samples: Samples, outcome: Outcome, columns: tuple[str, ...], groups: list[_Group], *, folded: bool
+    samples: Samples, response: Response, columns: tuple[str, ...], groups: list[_Group], *, folded: bool
 ) -> Table:
-    summaries = [samples.summary(outcome, group.points) for group in groups]
+    summaries = [samples.summary(response, group.points) for group in groups]
     rounding = _rounding(summaries)
     some_undefined = any(found.undefined for found in summaries)
     header = [*columns, "n", "median", "quartiles", "95 % interval of the median"]
-    header += ["not reached"] if outcome.kind == "time" else []
+    header += ["not reached"] if response.kind == "time" else []
     header += ["undefined"] if some_undefined else []
     rows = [
         (
             *group.cells,
             str(found.n),
-            *_figures(found, outcome, rounding),
-            *([_share(found)] if outcome.kind == "time" else []),
+            *_figures(found, response, rounding),
+            *([_share(found)] if response.kind == "time" else []),
             *([str(found.undefined)] if some_undefined else []),
         )
         for group, found in zip(groups, summaries, strict=True)
     ]
-    what = f"{sentence(outcome_title(outcome))} (`{outcome.column}`): {outcome.help.rstrip('.')}."
+    what = f"{sentence(response_title(response))} (`{response.column}`): {response.help.rstrip('.')}."
     return Table(tuple(header), tuple(rows), what, folded=folded)
 
 
 def _other_table(
-    samples: Samples, outcomes: tuple[Outcome, ...], columns: tuple[str, ...], groups: list[_Group]
+    samples: Samples, responses: tuple[Response, ...], columns: tuple[str, ...], groups: list[_Group]
 ) -> Table:
     rows: list[tuple[str, ...]] = []
-    for outcome in outcomes:
-        summaries = [samples.summary(outcome, group.points) for group in groups]
+    for response in responses:
+        summaries = [samples.summary(response, group.points) for group in groups]
         rounding = _rounding(summaries)
         rows += [
-            (outcome.column, *group.cells, str(found.n), *_figures(found, outcome, rounding)[:2], _share(found))
+            (response.column, *group.cells, str(found.n), *_figures(found, response, rounding)[:2], _share(found))
             for group, found in zip(groups, summaries, strict=True)
         ]
-    header = ("outcome", *columns, "n", "median", "quartiles", "not reached")
-    return Table(header, tuple(rows), f"The other outcomes ({len(outcomes)})", folded=True)
+    header = ("response", *columns, "n", "median", "quartiles", "not reached")
+    return Table(header, tuple(rows), f"The other responses ({len(responses)})", folded=True)
 
 
-def _figures(found: Summary, outcome: Outcome, rounding: Rounding) -> tuple[str, str, str]:
+def _figures(found: Summary, response: Response, rounding: Rounding) -> tuple[str, str, str]:
     """Median, quartiles and the median's interval."""
     # With digits of its own: rounded as the quartiles are, 2.6 s may read > 3 s, which nobody knows.
-    beyond = f"> {number_text(found.limit)}{' ' + outcome.unit if outcome.unit else ''}"
-    censored = outcome.kind == "time" and found.n > 0
+    beyond = f"> {number_text(found.limit)}{' ' + response.unit if response.unit else ''}"
+    censored = response.kind == "time" and found.n > 0
 
     def text(value: float) -> str:
         return beyond if censored and not math.isfinite(value) else rounding.text(value)

@@ -1,4 +1,4 @@
-"""The section of transitions: how outcomes answer to numbers that are varied, and where they change most."""
+"""The section of transitions: how responses answer to numbers that are varied, and where they change most."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -6,15 +6,15 @@ from itertools import combinations
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.campaign.outcome import Outcome
+from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.report.campaign.figure_name import figure_name
 from swarmwire.metrics.report.campaign.levels import Levels, levels_of
 from swarmwire.metrics.report.campaign.rounding import rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.slices import Slice, slices_beside
-from swarmwire.metrics.report.campaign.words import listed, outcome_title, sentence
+from swarmwire.metrics.report.campaign.words import listed, response_title, sentence
 from swarmwire.metrics.report.figures.heat_map import heat_map
-from swarmwire.metrics.report.figures.response_curve import Jump, Response, response_curve
+from swarmwire.metrics.report.figures.response_curve import Jump, MedianLine, response_curve
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.change_point import ChangePoint, change_point
@@ -24,21 +24,21 @@ _MAX_OPEN_ROWS = 20
 _Row = tuple[str, ...]
 
 
-def transition_section(samples: Samples, outcomes: tuple[Outcome, ...]) -> Section | None:
+def transition_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
     """The section; None unless a number is varied and something was measured."""
     folder = samples.folder
     levels = [levels_of(path, folder.points) for path in folder.parameters]
     numbers = [each for each in levels if each.number is not None and len(each) > 1][:MAX_PARAMETERS]
-    if not numbers or not outcomes:
+    if not numbers or not responses:
         return None
     figures: list[Figure] = []
     rows: list[_Row] = []
-    for outcome in outcomes:
+    for response in responses:
         if len(numbers) == 1:
-            figures.append(_response(samples, outcome, numbers[0], rows))
+            figures.append(_curve(samples, response, numbers[0], rows))
         for x, y in combinations(numbers, 2):
             beside = slices_beside(folder, (x.path, y.path), names_apart=len(numbers) == 2)
-            figures += _maps(samples, outcome, x, y, beside, rows)
+            figures += _maps(samples, response, x, y, beside, rows)
     return Section("Transitions", (_how_to_read(len(numbers)), *figures, _table(rows)))
 
 
@@ -60,18 +60,18 @@ def _how_to_read(numbers: int) -> str:
     )
 
 
-def _response(samples: Samples, outcome: Outcome, x: Levels, rows: list[_Row]) -> Figure:
+def _curve(samples: Samples, response: Response, x: Levels, rows: list[_Row]) -> Figure:
     slices = slices_beside(samples.folder, (x.path,))
-    responses: list[Response] = []
+    lines: list[MedianLine] = []
     for each in slices:
         cells = [each.cell((x, level)) for level in range(len(x))]
-        change = _change(samples, outcome, x, cells)
-        rows.append(_words(outcome, x, each.label, change))
-        responses.append(_medians(samples, outcome, x, cells, each.short, change))
-    name = figure_name("response", outcome.column, x.path)
-    figure = response_curve(responses, outcome_title(outcome), x.path, samples.limit(outcome))
+        change = _change(samples, response, x, cells)
+        rows.append(_words(response, x, each.label, change))
+        lines.append(_medians(samples, response, x, cells, each.short, change))
+    name = figure_name("response", response.column, x.path)
+    figure = response_curve(lines, response_title(response), x.path, samples.limit(response))
     return Figure(
-        name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}`{_by(samples, x, slices)}."
+        name, as_svg(figure, name), f"{sentence(response_title(response))} over `{x.path}`{_by(samples, x, slices)}."
     )
 
 
@@ -82,23 +82,23 @@ def _by(samples: Samples, x: Levels, slices: list[Slice]) -> str:
 
 
 def _maps(
-    samples: Samples, outcome: Outcome, x: Levels, y: Levels, beside: list[Slice], rows: list[_Row]
+    samples: Samples, response: Response, x: Levels, y: Levels, beside: list[Slice], rows: list[_Row]
 ) -> list[Figure]:
     figures: list[Figure] = []
     for number, each in enumerate(beside):
         cells = [[each.cell((y, row), (x, column)) for column in range(len(x))] for row in range(len(y))]
-        medians = np.array([[samples.quartiles(outcome, cell)[1] for cell in row] for row in cells])
-        changes = [_change(samples, outcome, x, row) for row in cells]
+        medians = np.array([[samples.quartiles(response, cell)[1] for cell in row] for row in cells])
+        changes = [_change(samples, response, x, row) for row in cells]
         rows += [
-            _words(outcome, x, ", ".join(filter(None, (f"{y.path} {label}", each.label))), change)
+            _words(response, x, ", ".join(filter(None, (f"{y.path} {label}", each.label))), change)
             for label, change in zip(y.labels, changes, strict=True)
         ]
-        figures.append(_map(outcome, x, y, medians, changes, each, number))
+        figures.append(_map(response, x, y, medians, changes, each, number))
     return figures
 
 
 def _map(
-    outcome: Outcome,
+    response: Response,
     x: Levels,
     y: Levels,
     medians: FloatArray,
@@ -106,16 +106,18 @@ def _map(
     of: Slice,
     number: int,
 ) -> Figure:
-    name = figure_name("map", outcome.column, x.path, y.path, *([str(number)] if number else []))
+    name = figure_name("map", response.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
-    figure = heat_map(medians, x.short, y.short, f"median {outcome_title(outcome)}", x.path, y.path, jumps)
+    figure = heat_map(medians, x.short, y.short, f"median {response_title(response)}", x.path, y.path, jumps)
     at = f", at {of.label}" if of.label else ""
-    return Figure(name, as_svg(figure, name), f"{sentence(outcome_title(outcome))} over `{x.path}` and `{y.path}`{at}.")
+    return Figure(
+        name, as_svg(figure, name), f"{sentence(response_title(response))} over `{x.path}` and `{y.path}`{at}."
+    )
 
 
-def _change(samples: Samples, outcome: Outcome, x: Levels, cells: Sequence[tuple[int, ...]]) -> ChangePoint | None:
+def _change(samples: Samples, response: Response, x: Levels, cells: Sequence[tuple[int, ...]]) -> ChangePoint | None:
     assert x.number is not None
-    return change_point(x.number, samples.table(outcome, cells))
+    return change_point(x.number, samples.table(response, cells))
 
 
 def _jump(change: ChangePoint, x: Levels, shown_at: FloatArray) -> Jump:
@@ -128,25 +130,30 @@ def _jump(change: ChangePoint, x: Levels, shown_at: FloatArray) -> Jump:
 
 
 def _medians(
-    samples: Samples, outcome: Outcome, x: Levels, cells: list[tuple[int, ...]], label: str, change: ChangePoint | None
-) -> Response:
+    samples: Samples,
+    response: Response,
+    x: Levels,
+    cells: list[tuple[int, ...]],
+    label: str,
+    change: ChangePoint | None,
+) -> MedianLine:
     assert x.number is not None
-    found = [samples.summary(outcome, cell) for cell in cells]
-    quartiles = np.array([samples.quartiles(outcome, cell) for cell in cells])
+    found = [samples.summary(response, cell) for cell in cells]
+    quartiles = np.array([samples.quartiles(response, cell) for cell in cells])
     low: FloatArray = np.array([each.q50_interval.low for each in found])
     high: FloatArray = np.array([each.q50_interval.high for each in found])
-    if outcome.kind == "time":
+    if response.kind == "time":
         low = np.where(np.isnan(low) & np.isposinf(high), np.inf, low)
     jump = None if change is None else _jump(change, x, x.number)
-    return Response(label, x.number, quartiles[:, 1], low, high, quartiles[:, 0], quartiles[:, 2], jump)
+    return MedianLine(label, x.number, quartiles[:, 1], low, high, quartiles[:, 0], quartiles[:, 2], jump)
 
 
-def _words(outcome: Outcome, x: Levels, where: str, change: ChangePoint | None) -> _Row:
+def _words(response: Response, x: Levels, where: str, change: ChangePoint | None) -> _Row:
     if change is None:
-        return (outcome.column, x.path, where, "none", "", "", "", "")
+        return (response.column, x.path, where, "none", "", "", "", "")
     rounded = rounding_of((change.below, change.above)).text
     return (
-        outcome.column,
+        response.column,
         x.path,
         where,
         f"{change.place:.4g}",
@@ -160,7 +167,7 @@ def _words(outcome: Outcome, x: Levels, where: str, change: ChangePoint | None) 
 def _table(rows: list[_Row]) -> Table:
     """The change points in words; what is the same in all rows stands in the caption or nowhere."""
     columns = (
-        "outcome",
+        "response",
         "along",
         "at",
         "change point",

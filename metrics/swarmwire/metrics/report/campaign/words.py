@@ -1,8 +1,8 @@
-"""How outcomes, parameters and values are called in tables and figures."""
+"""How responses, parameters and values are called in tables and figures."""
 
 from swarmwire.metrics.campaign.about import Value
-from swarmwire.metrics.campaign.outcome import Outcome
 from swarmwire.metrics.campaign.point_values import value_text
+from swarmwire.metrics.campaign.response import Response
 
 _ENDINGS = {
     "final": " at the end",
@@ -11,7 +11,8 @@ _ENDINGS = {
     "max": ", greatest in the run",
 }
 _KNOWN = {
-    "radio.pdr": "delivery ratio (PDR)",
+    "radio.pdr": "delivery ratio (PDR), of intended receivers",
+    "radio.link_pdr": "delivery ratio of links (link PDR)",
     "stop_time_s": "time until it stopped in s",
     "radio.sent": "packets sent",
     "radio.intended": "receivers meant",
@@ -19,16 +20,16 @@ _KNOWN = {
 }
 
 
-def outcome_title(outcome: Outcome) -> str:
-    """What an outcome is, in words, with its unit: "aggregation time in s"."""
-    if outcome.column in _KNOWN:
-        return _KNOWN[outcome.column]
-    name, _, ending = outcome.column.rpartition(".")
+def response_title(response: Response) -> str:
+    """What a response is, in words, with its unit: "aggregation time in s"."""
+    if response.column in _KNOWN:
+        return _KNOWN[response.column]
+    name, _, ending = response.column.rpartition(".")
     if ending not in _ENDINGS or not name:
-        name, ending = outcome.column, ""
-    name = name.removesuffix(f"_{outcome.unit}") if outcome.unit else name
+        name, ending = response.column, ""
+    name = name.removesuffix(f"_{response.unit}") if response.unit else name
     words = name.replace("_", " ")
-    unit = f" in {outcome.unit}" if outcome.unit else ""
+    unit = f" in {response.unit}" if response.unit else ""
     return f"{words}{unit}{_ENDINGS[ending]}" if ending else f"{words}{unit}"
 
 

@@ -1,4 +1,4 @@
-"""What is left of an outcome when a share is lost, and the two shapes that were fitted to it."""
+"""What is left of a response when a share is lost, and the two shapes that were fitted to it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

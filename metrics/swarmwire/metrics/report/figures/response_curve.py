@@ -1,4 +1,4 @@
-"""How the median of an outcome answers to a parameter: with its interval, the quartiles, and where it jumps."""
+"""How the median of a response answers to a parameter: with its interval, the quartiles, and where it jumps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from swarmwire.metrics.report.figures.column_axes import LETTERS_PT, column_axes
 from swarmwire.metrics.report.figures.log_axis import fits_log, set_log
 from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
 
-_APART = 0.012  # of the axis, between the points of several responses
+_APART = 0.012  # of the axis, between the points of several lines
 
 
 @dataclass(frozen=True)
 class Jump:
-    """Where the outcome changes most, and the interval in which that place lies."""
+    """Where the response changes most, and the interval in which that place lies."""
 
     at: float
     low: float
@@ -25,7 +25,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class Response:
+class MedianLine:
     """Medians over the values of a parameter; arrays (k,), inf where it lies beyond the limit, NaN where none is."""
 
     label: str
@@ -38,31 +38,31 @@ class Response:
     jump: Jump | None = None
 
 
-def response_curve(responses: Sequence[Response], title: str, x_label: str, limit: float | None = None) -> Any:
-    """The figure; of one response with its quartiles, of several with a legend.
+def response_curve(lines: Sequence[MedianLine], title: str, x_label: str, limit: float | None = None) -> Any:
+    """The figure; of one line with its quartiles, of several with a legend.
 
     `limit`: up to where a censored value was followed, None where nothing is censored.
     """
     figure, axes = column_axes(title, x_label)
-    alone, log = len(responses) == 1, fits_log(responses[0].x)
+    alone, log = len(lines) == 1, fits_log(lines[0].x)
     if limit is not None:
         axes.axhline(limit, color=SOFT, lw=0.7, ls="--", zorder=1)
-    colors = [CURVE] if alone else ordered_colors(len(responses))
-    for place, (response, color) in enumerate(zip(responses, colors, strict=True)):
-        x = _aside(response.x, place - 0.5 * (len(responses) - 1), log=log)
-        if response.jump is not None and alone:
-            _draw_jump(axes, response.jump)
-        elif response.jump is not None:
-            axes.axvline(response.jump.at, color=color, lw=0.9, ls=(place, (3, len(responses))), zorder=1)
+    colors = [CURVE] if alone else ordered_colors(len(lines))
+    for place, (line, color) in enumerate(zip(lines, colors, strict=True)):
+        x = _aside(line.x, place - 0.5 * (len(lines) - 1), log=log)
+        if line.jump is not None and alone:
+            _draw_jump(axes, line.jump)
+        elif line.jump is not None:
+            axes.axvline(line.jump.at, color=color, lw=0.9, ls=(place, (3, len(lines))), zorder=1)
         if alone:
-            low, high = _within(response.q25, limit), _within(response.q75, limit)
+            low, high = _within(line.q25, limit), _within(line.q75, limit)
             axes.fill_between(x, low, high, color=color, alpha=0.18, lw=0)
-        low, high = _within(response.low, limit), _within(response.high, limit)
+        low, high = _within(line.low, limit), _within(line.high, limit)
         axes.vlines(x, low, high, color=color, lw=1.0, zorder=3)
-        _draw_medians(axes, x, response, limit, color)
+        _draw_medians(axes, x, line, limit, color)
     if log:
         set_log(axes.xaxis)
-    reached = [quartile for response in responses for quartile in (response.q25, response.q75)]
+    reached = [quartile for line in lines for quartile in (line.q25, line.q75)]
     if fits_log(np.concatenate(reached + ([] if limit is None else [np.array([limit])]))):
         set_log(axes.yaxis)
     if not alone:
@@ -82,12 +82,12 @@ def _within(edge: FloatArray, limit: float | None) -> FloatArray:
     return np.where(np.isposinf(edge), np.nan if limit is None else limit, edge)
 
 
-def _draw_medians(axes: Any, x: FloatArray, response: Response, limit: float | None, color: Any) -> None:
-    known = np.isfinite(response.median)
+def _draw_medians(axes: Any, x: FloatArray, line: MedianLine, limit: float | None, color: Any) -> None:
+    known = np.isfinite(line.median)
     # NaN where the median is censored: the line breaks there.
-    medians = np.where(known, response.median, np.nan)
-    axes.plot(x, medians, "o-", color=color, lw=1.3, ms=3, zorder=4, label=response.label)
-    beyond = np.isposinf(response.median)
+    medians = np.where(known, line.median, np.nan)
+    axes.plot(x, medians, "o-", color=color, lw=1.3, ms=3, zorder=4, label=line.label)
+    beyond = np.isposinf(line.median)
     if limit is not None and beyond.any():
         mark: Look = {"ms": 4, "mfc": "white", "mec": INK, "mew": 0.8, "zorder": 5, "clip_on": False, "ls": ""}
         axes.plot(x[beyond], np.full(int(beyond.sum()), limit), "^", **mark)

@@ -13,13 +13,13 @@ from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
 _BINS = 25
 
 
-def link_histogram(pdr: FloatArray) -> Any:
+def link_histogram(link_pdr: FloatArray) -> Any:
     """The figure of how many links have which ratio, of ratios (k,)."""
     figure = blank_figure(COLUMN_IN, 2.0)
     axes = plain_axes(figure, (0.13, 0.21, 0.84, 0.65), "links by the share of their packets that was received")
-    counts, edges = np.histogram(pdr, np.linspace(0.0, 1.0, _BINS + 1))
+    counts, edges = np.histogram(link_pdr, np.linspace(0.0, 1.0, _BINS + 1))
     axes.stairs(counts, edges, fill=True, color=CURVE, alpha=0.75)
-    axes.axvline(float(np.median(pdr)), color=INK, lw=0.8, ls=(0, (4, 2)))
+    axes.axvline(float(np.median(link_pdr)), color=INK, lw=0.8, ls=(0, (4, 2)))
     axes.set_xlim(0.0, 1.0)
     axes.locator_params(axis="y", nbins=4, integer=True)
     axes.yaxis.set_major_formatter(short)

@@ -18,7 +18,7 @@ _LEFT_IN, _RIGHT_IN, _TOP_IN, _BAR_IN = 0.62, 0.1, 0.26, 0.07
 _FOOT_IN, _NAME_IN = 0.5, 0.055  # below names, and of each of their letters
 
 
-def link_matrix(static: Static, pdr: FloatArray) -> Any:
+def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
     """The figure of ratios (n, n), a row for each sender; NaN: never in range, or the robot itself."""
     names, upright = _names(static)
     side_in = COLUMN_IN - _LEFT_IN - _RIGHT_IN
@@ -26,14 +26,14 @@ def link_matrix(static: Static, pdr: FloatArray) -> Any:
     height_in = _TOP_IN + side_in + foot_in
     figure = blank_figure(COLUMN_IN, height_in)
     axes = figure.add_axes((_LEFT_IN / COLUMN_IN, foot_in / height_in, side_in / COLUMN_IN, side_in / height_in))
-    shown = axes.imshow(np.ma.masked_invalid(pdr), cmap="cividis", vmin=0.0, vmax=1.0, interpolation="none")
+    shown = axes.imshow(np.ma.masked_invalid(link_pdr), cmap="cividis", vmin=0.0, vmax=1.0, interpolation="none")
     axes.set_facecolor(FLOOR)
     axes.spines[:].set_visible(False)
     axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     axes.set_yticks(list(names), list(names.values()))
     axes.set_xticks(list(names), list(names.values()), rotation=90 if upright else 0)
     if static.robots <= MAX_NAMED:
-        _write(axes, pdr)
+        _write(axes, link_pdr)
     for group in static.groups[1:]:
         for line in (axes.axhline, axes.axvline):
             line(group.start - 0.5, color=PAPER, lw=1.2)
@@ -59,9 +59,9 @@ def _names(static: Static) -> tuple[dict[float, str], bool]:
     return names, sum(len(name) + 1 for name in names.values()) > _LETTERS_ACROSS
 
 
-def _write(axes: Any, pdr: FloatArray) -> None:
+def _write(axes: Any, link_pdr: FloatArray) -> None:
     """Percents, in the squares."""
-    for sender, receiver in np.argwhere(np.isfinite(pdr)).tolist():
-        ratio = pdr[sender, receiver]
+    for sender, receiver in np.argwhere(np.isfinite(link_pdr)).tolist():
+        ratio = link_pdr[sender, receiver]
         color = PAPER if ratio < _PALE else INK
         axes.text(receiver, sender, f"{100 * ratio:.0f}", ha="center", va="center", fontsize=5.5, color=color)

@@ -29,13 +29,13 @@ def links(run: RunData) -> Figure | str:
     received, in_range = of_links(found, run.static.robots)
     if not in_range.any():
         return "Delivery by link: nobody was in range of anybody."
-    pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
+    link_pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MAX_SQUARES:
         caption = (
             "Delivery ratio of each link: received, of the packets on air while the receiver was in range and sight."
         )
-        return Figure(NAME, as_svg(link_matrix(run.static, pdr), NAME), caption)
-    told = pdr[in_range >= MIN_PACKETS]
+        return Figure(NAME, as_svg(link_matrix(run.static, link_pdr), NAME), caption)
+    told = link_pdr[in_range >= MIN_PACKETS]
     if not len(told):
         return f"Delivery by link: no link had {MIN_PACKETS} packets in range."
     caption = (

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.metric_axes import is_count, told_of
 from swarmwire.metrics.record.metric_facts import MetricFacts
-from swarmwire.metrics.registry import DELIVERY
+from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.section import Section, Table
@@ -49,7 +49,7 @@ def of_metrics(run: RunData) -> dict[str, dict[str, float | None]]:
     return {
         name: _statistics(value, is_count(name, run.film.facts))
         for name, value in run.film.metrics.items()
-        if name != DELIVERY
+        if name != LINK_PDR or name in run.film.facts
     }
 
 
@@ -86,7 +86,7 @@ def _arenas(run: RunData) -> list[str | Table]:
     ]
 
 
-_ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "delivery", "trajectory")
+_ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "link PDR", "trajectory")
 
 
 def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
@@ -97,7 +97,7 @@ def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
 
     def row(arena: int) -> tuple[str, ...]:
         radio = run.of_arena("radio", arena)
-        told = (f"{radio['sent']:,}", share(radio["pdr"])) if radio else ("–", "–")
+        told = (f"{radio['sent']:,}", share(radio["link_pdr"])) if radio else ("–", "–")
         end = ends[arena]
         ended = (end["ended"], number(end["sim_time_s"]), number(end["stop_time_s"]))
         return (str(run.static.seeds[arena]), *ended, *told, f"{hashes[arena][:16]}…")

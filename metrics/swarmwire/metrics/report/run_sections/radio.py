@@ -35,8 +35,11 @@ def _again(run: RunData) -> str:
 
 
 def _account(radio: dict[str, Any], arenas: int) -> str:
-    sent, intended, in_range, pdr = (radio.get(key) for key in ("sent", "intended", "in_range", "pdr"))
-    received = f"; {share(pdr)} of these received it" if isinstance(pdr, float) else ""
+    sent, intended, in_range = radio["sent"], radio["intended"], radio["in_range"]
     where = "In the first arena " if arenas > 1 else ""
-    reached = f"meant for {intended:,} receivers, of which {in_range:,} were in range{received}"
-    return f"{where}{sent:,} packets were sent, {reached}."
+    reached = f"meant for {intended:,} receivers{_ratio('pdr', radio['pdr'])}, of which {in_range:,} were in range"
+    return f"{where}{sent:,} packets were sent, {reached}{_ratio('link_pdr', radio['link_pdr'])}."
+
+
+def _ratio(name: str, ratio: float | None) -> str:
+    return "" if ratio is None else f" ({name} {share(ratio)})"

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metric_axes import Facts, titled, told_of
-from swarmwire.metrics.registry import DELIVERY, METRICS
+from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.lanes import Lane, Span
 from swarmwire.metrics.report.run_data import ARENA, RunData
@@ -16,7 +16,7 @@ from swarmwire.metrics.report.run_sections.where import where
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 
-MAIN = ("order", "components", DELIVERY)  # in the panels of the timeline, as far as they have a value
+MAIN = ("order", "components", LINK_PDR)  # in the panels of the timeline, as far as they have a value
 SECOND = (  # small, where they have a value that changes
     "target_best",
     "target_mean",
@@ -30,7 +30,7 @@ SECOND = (  # small, where they have a value that changes
 _WHOLE = ("components",)
 _MAX_LANES = 8
 _MAX_EVENTS = 200
-_TITLES = {DELIVERY: "delivery: received / in range, last second"}
+_TITLES = {LINK_PDR: "link_pdr: received / in range"}
 
 
 def what_happened(run: RunData) -> Section:

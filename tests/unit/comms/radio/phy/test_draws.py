@@ -179,7 +179,7 @@ def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
 
 
 def asking(senders: list[int]) -> Callable[[int], SentPackets]:
-    """A packet in each tick from each of these to robot 1 of its arena, whose outcome it asks for, by the tick."""
+    """A packet in each tick from each of these to robot 1 of its arena, with its transmit status, by the tick."""
     sent = packets(senders, 1)
     return lambda tick: SentPackets(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
 

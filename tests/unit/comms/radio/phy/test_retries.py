@@ -39,7 +39,7 @@ def departures(out: Run) -> list[tuple[int, int]]:
 
 
 def results(out: Run) -> list[tuple[int, int]]:
-    """Id and result of each outcome."""
+    """Id and result of each transmit status."""
     return [(int(i), int(r)) for one in out.news for i, r in zip(one.tx_status.id, one.tx_status.result, strict=True)]
 
 

@@ -35,7 +35,7 @@ for_s = 0.5
 
 @pytest.fixture(scope="module")
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("outcomes") / "insisting.toml"
+    path = tmp_path_factory.mktemp("tx_status") / "insisting.toml"
     path.write_text(SCENARIO)
     return path
 

@@ -1,4 +1,4 @@
-"""TxStatuses of a campaign: columns of its table that say what came of each run."""
+"""Responses of a campaign: columns of its table that hold what was measured of each run."""
 
 from dataclasses import dataclass
 from typing import get_args
@@ -10,11 +10,11 @@ from swarmwire.metrics.statistics.sample import Kind
 
 KINDS: tuple[str, ...] = get_args(Kind)
 FINAL = ".final"  # how columns end that hold the last value of a metric, which its bare name means
-PDR = "radio.pdr"  # the column of the delivery ratio
+LINK_PDR = "radio.link_pdr"  # the column of the delivery ratio of links
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Response:
     """One column. A `number` is what it is; a `time` may lack, since the run ended before it: right-censored."""
 
     column: str  # in summary.parquet, e.g. order.final
@@ -30,5 +30,5 @@ class Outcome:
 
     @property
     def is_usual(self) -> bool:
-        """Whether it is told of where none is named: a time, the last value of a metric, or the delivery ratio."""
-        return self.kind == "time" or self.column.endswith(FINAL) or self.column == PDR
+        """Whether it is told of where none is named: a time, the last value of a metric, or the link PDR."""
+        return self.kind == "time" or self.column.endswith(FINAL) or self.column == LINK_PDR

@@ -1,4 +1,4 @@
-"""How long a push to twenty hosts takes: the first one, with all packages, and one of another release."""
+"""How long a deployment to twenty hosts takes: the first one, with all packages, and one of another release."""
 
 import asyncio
 import getpass
@@ -18,12 +18,12 @@ import asyncssh
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.deploy.commands.robots.contents import contents_of
+from swarmwire.deploy.fleet.deploy import deploy
 from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
 from swarmwire.deploy.fleet.environment.target import Target
 from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.host_side.facts import facts
-from swarmwire.deploy.fleet.push import push
 from tests.support.deploy.fleet.fake_host import new_key, write_key
 from tests.support.deploy.fleet.small_fleet import AGENT
 from tests.support.deploy.fleet.sshd import SSHD
@@ -41,16 +41,16 @@ driver = {{ name = "epuck2", address = "192.168.1.41" }}
 
 
 @dataclass
-class Pushes:
-    """Seconds of each push, by what it was."""
+class Deployments:
+    """Seconds of each deployment, by what it was."""
 
     first: list[float]
     release: list[float]
     again: list[float]
 
 
-def push_fleet(name: str, repeats: int, *, hosts: int) -> None:
-    """A line for each kind of server and push, with the packages of a robot for this machine's platform."""
+def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
+    """A line for each kind of server and deployment, with the packages of a robot for this machine's platform."""
     with tempfile.TemporaryDirectory() as cache:
         environments = LockedEnvironments(Path(cache))
         began_ns = WallClock().now_ns()
@@ -64,7 +64,7 @@ def push_fleet(name: str, repeats: int, *, hosts: int) -> None:
         }  # fmt: skip
         print_line(f"{name}-packages", made_s, "s", {**config, "index": "pip's cache as it was"})
         for kind in KINDS:
-            found = Pushes([], [], [])
+            found = Deployments([], [], [])
             for _ in range(repeats):
                 _measure(kind, hosts, environments, found)
             suffix = "" if kind == KINDS[-1] else f"-{kind}"
@@ -84,7 +84,7 @@ def facts_here() -> dict[str, object]:
             os.environ["HOME"] = before
 
 
-def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Pushes) -> None:
+def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Deployments) -> None:
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         write_key(new_key(), folder / "id")
@@ -97,13 +97,13 @@ def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Pus
             (folder / "fleet.toml").write_text(FLEET.format(user=getpass.getuser()) + robots)
             for source, times in ((AGENT, found.first), (f"{AGENT}\n", found.release), (f"{AGENT}\n", found.again)):
                 (folder / "still.py").write_text(source)
-                times.append(_pushed(read_fleet(folder / "fleet.toml"), environments))
+                times.append(_deployed(read_fleet(folder / "fleet.toml"), environments))
 
 
-def _pushed(fleet: Fleet, environments: LockedEnvironments) -> float:
+def _deployed(fleet: Fleet, environments: LockedEnvironments) -> float:
     began_ns = WallClock().now_ns()
     contents = contents_of(fleet, fleet.robots)
-    results = asyncio.run(push(fleet, fleet.robots, contents.entries, environments))
+    results = asyncio.run(deploy(fleet, fleet.robots, contents.entries, environments))
     took_s = to_s(WallClock().now_ns() - began_ns)
     bad = [
         *map(str, contents.faults.values()),

@@ -17,7 +17,7 @@ from swarmwire.world.backends.registry import Loss, RunnerEvent
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
 
-def outcome(
+def assemble_result(
     static: Static,
     parts: Mapping[str, Any],
     *,

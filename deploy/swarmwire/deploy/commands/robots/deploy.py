@@ -1,4 +1,4 @@
-"""`swarmwire robots push`."""
+"""`swarmwire robots deploy`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from swarmwire.deploy.commands.robots.acting import act, tell
 from swarmwire.deploy.commands.robots.options import FleetFile, OfGroups, OfRobots, chosen
 
 
-def push_command(
+def deploy_command(
     file: FleetFile,
     robots: OfRobots = None,
     groups: OfGroups = None,
@@ -28,16 +28,16 @@ def push_command(
 
     Exit code 0: all robots have it; 1: not every robot; 2: refused before anything was sent. For example:
 
-      swarmwire robots push fleet.toml --group red --restart
+      swarmwire robots deploy fleet.toml --group red --restart
     """
     fleet, mine = chosen(file, robots, groups)
     from swarmwire.deploy.commands.robots.contents import contents_of
+    from swarmwire.deploy.fleet.deploy import deploy
     from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
-    from swarmwire.deploy.fleet.push import push
 
     contents = contents_of(fleet, mine)
     for error in contents.faults.values():
         raise error
     index = ("--no-index", "--find-links", str(wheels.resolve())) if wheels else ()
     environments = LockedEnvironments(index=index)
-    tell(act(lambda watcher: push(fleet, mine, contents.entries, environments, watcher, restart=restart)))
+    tell(act(lambda watcher: deploy(fleet, mine, contents.entries, environments, watcher, restart=restart)))

@@ -22,7 +22,7 @@ NEAR, FAR = at((0, 0), (1, 0)), at((0, 0), (5000, 0))
 
 
 class Asking:
-    """Numbers packets as agents do: each robot its own, and asks for the outcomes of those to one robot."""
+    """Numbers packets as agents do: each robot its own, and asks for the transmit status of those to one robot."""
 
     def __init__(self, rows: int) -> None:
         self._sent = np.zeros(rows, np.int64)

@@ -1,4 +1,4 @@
-"""`swarmwire robots push`: packages and a release to each robot, tried out there before it becomes the current one."""
+"""`swarmwire robots deploy`: packages and a release to each robot, tried out there before it becomes the current."""
 
 import asyncio
 import tempfile
@@ -23,7 +23,7 @@ ROOM = 1.5  # free bytes that are asked for, over those that are to come
 SPARE_BYTES = 20_000_000  # that stay free for logs
 
 
-async def push(
+async def deploy(
     fleet: Fleet,
     robots: Sequence[Robot],
     contents: dict[str, list[Entry]],
@@ -34,13 +34,13 @@ async def push(
 ) -> list[Result]:
     """What became of each robot; `contents` are the releases' entries by robot."""
     with tempfile.TemporaryDirectory() as folder:
-        pushing = _Pushing(contents, environments, Path(folder), watcher, restart)
-        return await on_hosts(robots, fleet.known_hosts, pushing.one, pushing.before, pushing.after, watcher)
+        deployment = _Deployment(contents, environments, Path(folder), watcher, restart)
+        return await on_hosts(robots, fleet.known_hosts, deployment.one, deployment.before, deployment.after, watcher)
 
 
 @dataclass
-class _Pushing:
-    """One push: what goes where."""
+class _Deployment:
+    """One deployment: what goes where."""
 
     contents: dict[str, list[Entry]]
     environments: Environments
@@ -50,7 +50,7 @@ class _Pushing:
     making: asyncio.Lock = field(default_factory=asyncio.Lock)  # packages of a platform are made once
 
     async def before(self, session: HostSession, robots: list[Robot]) -> None:
-        """Lock the host, and clear away what pushes that were cut off left there."""
+        """Lock the host, and clear away what interrupted deployments left there."""
         session.need_manager()
         await session.ask("lock")
         await session.ask("clear_parts", robots=[robot.name for robot in robots])
@@ -85,7 +85,7 @@ class _Pushing:
         await session.ask("switch", robot=robot.name, release=release.name)
         packages = f" and {sum(archive.size for archive in missing) / 1e6:.1f} MB of packages" if missing else ""
         return Result(
-            robot.name, True, f"pushed {release.name}{packages}" + await self._started(session, robot, release)
+            robot.name, True, f"deployed {release.name}{packages}" + await self._started(session, robot, release)
         )
 
     async def after(self, session: HostSession, robots: list[Robot]) -> None:
@@ -120,7 +120,9 @@ class _Pushing:
         self.watcher.step(robot.name, "restart")
         said = (await session.ask("run_units", verb="restart", robots=[robot.name]))[robot.name]
         if said:
-            raise HostFailed(f"pushed {release.name}, which does not start: {said}", "swarmwire robots logs, rollback")
+            raise HostFailed(
+                f"deployed {release.name}, which does not start: {said}", "swarmwire robots logs, rollback"
+            )
         return ", restarted"
 
 

@@ -1,11 +1,11 @@
-"""Pushes to real SSH servers: what robots have afterwards, and what they have if something fails in the middle."""
+"""Deployments to real SSH servers: what robots have afterwards, and what they have if something fails in the middle."""
 
 import re
 import stat
 
 import pytest
 
-from swarmwire.deploy.fleet import push as push_module
+from swarmwire.deploy.fleet import deploy as deploy_module
 from tests.support.deploy.fleet.fake_host import new_key, write_key
 from tests.support.deploy.fleet.small_fleet import AGENT
 
@@ -18,12 +18,12 @@ def other(number: int) -> str:
     return f"{AGENT}# {number}\n"
 
 
-def test_a_push_leaves_a_release_with_its_packages_that_is_current(fleet, robots):
+def test_a_deployment_leaves_a_release_with_its_packages_that_is_current(fleet, robots):
     host = fleet.add("flock-0")
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 0, lines
     release = host.current("flock-0")
-    assert lines == [f"flock-0 pushed {release} and 0.1 MB of packages"]
+    assert lines == [f"flock-0 deployed {release} and 0.1 MB of packages"]
     folder = host.root / "flock-0" / "current"
     assert {path.name for path in folder.iterdir()} == {
         "robot.toml", "still.py", "packages-0", "packages-1", "swarmwire-flock-0.service",
@@ -33,44 +33,44 @@ def test_a_push_leaves_a_release_with_its_packages_that_is_current(fleet, robots
     assert host.parts() == []
 
 
-def test_what_is_pushed_again_is_up_to_date_and_changes_nothing(fleet, robots):
+def test_what_is_deployed_again_is_up_to_date_and_changes_nothing(fleet, robots):
     host = fleet.add("flock-0")
-    robots("push")
+    robots("deploy")
     before = host.files()
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert (code, lines) == (0, [f"flock-0 up to date: {host.current('flock-0')}"])
     assert host.files() == before
 
 
 def test_packages_that_a_host_has_are_not_sent_again(fleet, robots, packages):
     host = fleet.add("flock-0")
-    robots("push")
+    robots("deploy")
     fleet.agent(other(1))
-    _, lines = robots("push")
-    assert lines == [f"flock-0 pushed {host.current('flock-0')}"]
+    _, lines = robots("deploy")
+    assert lines == [f"flock-0 deployed {host.current('flock-0')}"]
     packages.version = "2"
-    _, lines = robots("push")
-    assert lines == [f"flock-0 pushed {host.current('flock-0')} and 0.1 MB of packages"]
+    _, lines = robots("deploy")
+    assert lines == [f"flock-0 deployed {host.current('flock-0')} and 0.1 MB of packages"]
 
 
 def test_the_last_three_releases_and_their_packages_are_kept(fleet, robots, packages):
     host = fleet.add("flock-0")
-    pushed = []
+    deployed = []
     for number in range(5):
         packages.version = str(number)
         fleet.agent(other(number))
-        robots("push")
-        pushed.append(host.current("flock-0"))
-    assert host.releases("flock-0") == sorted(pushed[2:])
+        robots("deploy")
+        deployed.append(host.current("flock-0"))
+    assert host.releases("flock-0") == sorted(deployed[2:])
     assert len(host.environments()) == 1 + 3  # the agent's program, and three versions of others
 
 
 def test_robots_on_one_host_share_its_packages_and_nothing_else(fleet, robots, packages):
     host = fleet.add("flock-0")
     fleet.add("flock-1", host, driver={"address": "127.0.0.1:2"})
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 0, lines
-    assert [line.split()[:2] for line in lines] == [["flock-0", "pushed"], ["flock-1", "pushed"]]
+    assert [line.split()[:2] for line in lines] == [["flock-0", "deployed"], ["flock-1", "deployed"]]
     assert "packages" not in lines[1]
     assert host.current("flock-0") != host.current("flock-1")
     assert len(host.environments()) == 2
@@ -80,12 +80,12 @@ def test_robots_on_one_host_share_its_packages_and_nothing_else(fleet, robots, p
 def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
     fleet.table["groups"] = {"red": {"rate_hz": 20}, "blue": {}}
     hosts = {name: fleet.add(name, groups=groups) for name, groups in (("a", ["red"]), ("b", ["blue"]), ("c", []))}
-    assert [line.split()[0] for line in robots("push", "--group", "red")[1]] == ["a"]
-    assert [line.split()[0] for line in robots("push", "--robots", "c", "--group", "blue")[1]] == ["b", "c"]
+    assert [line.split()[0] for line in robots("deploy", "--group", "red")[1]] == ["a"]
+    assert [line.split()[0] for line in robots("deploy", "--robots", "c", "--group", "blue")[1]] == ["b", "c"]
     settings = {name: (host.root / name / "current" / "robot.toml").read_text() for name, host in hosts.items()}
     assert "rate_hz = 20" in settings["a"]
     assert "rate_hz" not in settings["b"]
-    code, lines = robots("push", "--group", "rad")
+    code, lines = robots("deploy", "--group", "rad")
     assert (code, len(lines)) == (2, 1)
     assert lines[0].startswith("error: --group: ")
     assert "red, blue" in lines[0]
@@ -94,7 +94,7 @@ def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
 def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
     host = fleet.add("flock-0")
     lab_certificates("flock-0", "operator")
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 0, lines
     folder = host.root / "flock-0" / "current"
     assert stat.S_IMODE((folder / "flock-0.key").stat().st_mode) == 0o600
@@ -104,20 +104,20 @@ def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
 
 def test_what_is_wrong_with_settings_is_told_before_anything_is_sent(fleet, robots):
     host = fleet.add("flock-0", params={"speed": 3})
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 2
     assert lines[0].startswith(f"error: {fleet.file}: robots.flock-0.params.speed: ")
     assert host.commands == []
 
 
 def fails(robots, name: str) -> str:
-    """Push to all; the line of the one robot for which it fails, while it works for the others."""
-    code, lines = robots("push")
+    """Deploy to all; the line of the one robot for which it fails, while it works for the others."""
+    code, lines = robots("deploy")
     assert code == 1, lines
     assert lines[-1] == f"1 of {len(lines) - 1} failed"
     bad = [line for line in lines[:-1] if " failed: " in line]
     assert [line.split()[0] for line in bad] == [name], lines
-    assert all(" pushed " in line or " up to date" in line for line in lines[:-1] if line not in bad), lines
+    assert all(" deployed " in line or " up to date" in line for line in lines[:-1] if line not in bad), lines
     return bad[0]
 
 
@@ -130,14 +130,14 @@ def test_on_a_full_disk_nothing_is_left_of_it(fleet, robots):
     assert full.current("full") is None
     assert (full.environments(), full.releases("full"), full.parts()) == (full.environments()[:1], [], [])
     full.set_python(python)
-    assert robots("push")[0] == 0
+    assert robots("deploy")[0] == 0
     assert (good.current("good"), full.current("full")) != (None, None)
 
 
 def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, monkeypatch):
     host = fleet.add("flock-0")
-    monkeypatch.setattr(push_module, "SPARE_BYTES", 10**18)
-    code, lines = robots("push")
+    monkeypatch.setattr(deploy_module, "SPARE_BYTES", 10**18)
+    code, lines = robots("deploy")
     assert code == 1
     assert "1000000000000 MB" in lines[0]
     assert host.environments() == []
@@ -147,7 +147,7 @@ def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, m
 def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, packages, after):
     packages.size = 400_000
     cut = fleet.add("cut")
-    robots("push")
+    robots("deploy")
     before, release = cut.files(), cut.current("cut")
     fleet.add("good")
     packages.version, packages.size = "2", 500_000
@@ -156,19 +156,19 @@ def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, pack
     assert cut.current("cut") == release
     assert before <= cut.files()
     cut.cut_after = None
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 0, lines
     assert cut.parts() == []
     assert cut.current("cut") != release
 
 
-def test_what_a_cut_push_left_behind_is_removed_by_the_next(fleet, robots):
+def test_what_an_interrupted_deployment_left_behind_is_removed_by_the_next(fleet, robots):
     host = fleet.add("flock-0")
     left = host.root / "flock-0" / "releases" / "0123456789ab.part"
     left.mkdir(parents=True)
     (left / "robot.toml").touch()
     (host.root / "env" / "ba9876543210.part").mkdir(parents=True)
-    assert robots("push")[0] == 0
+    assert robots("deploy")[0] == 0
     assert host.parts() == []
 
 
@@ -237,20 +237,20 @@ def test_a_host_that_does_not_let_us_in_is_told_with_its_cure_and_sent_nothing(f
 
 def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
     host = fleet.add("flock-0")
-    robots("push")
+    robots("deploy")
     before, files = host.current("flock-0"), host.files()
     fleet.agent(STUMBLES)
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 1
     assert "ImportError: it stumbles" in lines[0]
     assert host.current("flock-0") == before
     assert host.files() == files
 
 
-def test_a_package_that_was_not_pushed_is_told_with_its_cure(fleet, robots):
+def test_a_package_that_was_not_deployed_is_told_with_its_cure(fleet, robots):
     fleet.add("flock-0")
     fleet.agent(AGENT + "# lacks a package on robots\n")
-    told = robots("push")[1][0]
+    told = robots("deploy")[1][0]
     assert "ModuleNotFoundError: No module named 'scipy.spatial'" in told
     assert 'packages = ["scipy"]' in told
 
@@ -263,22 +263,22 @@ def test_a_trial_run_that_fails_holds_up_no_other_robot(fleet, robots):
     fails(robots, "bad")
 
 
-def test_two_pushes_to_one_host_do_not_meet(fleet, robots):
+def test_two_deployments_to_one_host_do_not_meet(fleet, robots):
     import fcntl
 
     host = fleet.add("flock-0")
     host.root.mkdir()
     with (host.root / "lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        code, lines = robots("push")
+        code, lines = robots("deploy")
     assert code == 1
-    assert "another push" in lines[0]
+    assert "another deployment" in lines[0]
 
 
 def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots):
     host = fleet.add("flock-0")
     (host.bin / "systemctl").write_text("#!/bin/sh\necho 'Failed to connect to bus' >&2; exit 1\n")
-    code, lines = robots("push")
+    code, lines = robots("deploy")
     assert code == 1
     assert "systemd" in lines[0]
     assert host.environments() == []

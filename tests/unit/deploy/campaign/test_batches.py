@@ -6,10 +6,10 @@ from types import SimpleNamespace
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.deploy.campaign.batches import tasks_of, usual_batch
 from swarmwire.deploy.campaign.campaign import Campaign
 from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
 from swarmwire.deploy.campaign.columns import Columns
-from swarmwire.deploy.campaign.pieces import tasks_of, usual_pack
 
 
 class Made(SimpleNamespace):
@@ -27,13 +27,13 @@ def made(points, seeds, robots=10, recorded=(), duration_s=60.0):
         point_overrides=[(f"a={point}",) for point in range(points)],
         series=True,
         record_seeds=recorded,
-        pack=None,
+        batch=None,
         columns=lambda: None,
     )
 
 
-def packed(campaign, done=(), pack=None, workers=2):
-    return tasks_of(campaign, CampaignFolder(Path("c"), campaign), done, pack, workers)
+def packed(campaign, done=(), batch=None, workers=2):
+    return tasks_of(campaign, CampaignFolder(Path("c"), campaign), done, batch, workers)
 
 
 @given(st.integers(1, 5), st.integers(1, 130), st.integers(1, 8), st.sets(st.integers(0, 100)))
@@ -51,16 +51,16 @@ def test_each_missing_run_is_in_one_task_of_its_point(points, seeds, workers, do
 
 
 def test_packs_are_large_and_smaller_where_workers_would_be_idle_or_pieces_long():
-    assert usual_pack(made(9, 200), 2) == 200
-    assert usual_pack(made(9, 1000), 2) == 250
-    assert usual_pack(made(9, 300), 2) == 150
-    assert usual_pack(made(9, 200, duration_s=300.0), 2) == 100
-    assert usual_pack(made(9, 200, duration_s=36_000.0), 2) == 50
-    assert usual_pack(made(1, 60), 2) == 15
-    assert usual_pack(made(1, 3), 8) == 1
-    assert usual_pack(made(9, 200, robots=1000), 2) == 5
-    assert usual_pack(made(9, 200, robots=100_000), 2) == 1
-    assert {len(task.runs) for task in packed(made(2, 30), pack=7)} == {6}
+    assert usual_batch(made(9, 200), 2) == 200
+    assert usual_batch(made(9, 1000), 2) == 250
+    assert usual_batch(made(9, 300), 2) == 150
+    assert usual_batch(made(9, 200, duration_s=300.0), 2) == 100
+    assert usual_batch(made(9, 200, duration_s=36_000.0), 2) == 50
+    assert usual_batch(made(1, 60), 2) == 15
+    assert usual_batch(made(1, 3), 8) == 1
+    assert usual_batch(made(9, 200, robots=1000), 2) == 5
+    assert usual_batch(made(9, 200, robots=100_000), 2) == 1
+    assert {len(task.runs) for task in packed(made(2, 30), batch=7)} == {6}
 
 
 def test_of_a_run_with_several_rows_the_last_counts() -> None:

@@ -1,4 +1,4 @@
-"""A field of an own sense that cannot be is refused at the door; one that can is not."""
+"""A field of a custom sensor that cannot be is refused at the door; one that can is not."""
 
 import re
 from math import inf, nan
@@ -18,7 +18,7 @@ SHEET: dict[str, Any] = {"like": "epuck", "sensors": {"x": {"kind": "tests.suppo
 
 
 def fit(monkeypatch: pytest.MonkeyPatch, *fields: Field) -> dict[str, int]:
-    """The fields that agents are told of, of an own sense with these."""
+    """The fields that agents are told of, of a custom sensor with these."""
     monkeypatch.setattr(custom_code.Alone, "fields", fields)
     spec: Any = fitted(body_from(SHEET, "mine.toml"), "mine.toml").sensors["x"]
     return spec.fields

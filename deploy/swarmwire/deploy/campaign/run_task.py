@@ -1,6 +1,6 @@
 """A task, run: its seeds as arenas of one world; where something raises, in halves until those that fail are alone.
 
-So one bad seed costs its neighbours nothing but time. A run that failed did so alone, whatever it was packed with:
+So one bad seed costs its neighbours nothing but time. A run that failed did so alone, whatever its batch was:
 its row does not depend on the packing.
 """
 
@@ -16,7 +16,7 @@ from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.campaign.row import failed_row, row_of
 from swarmwire.deploy.campaign.silence import Alive
-from swarmwire.deploy.campaign.task import PieceResult, Row, Task
+from swarmwire.deploy.campaign.task import Row, Task, TaskResult
 from swarmwire.deploy.campaign.tick_series import TickSeries
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.simulation import Simulation
@@ -26,7 +26,7 @@ def nobody_listens() -> None:
     """For whoever does not watch over its workers."""
 
 
-def run_piece(task: Task, worker: str = "", alive: Callable[[], None] = nobody_listens) -> PieceResult:
+def run_task(task: Task, worker: str = "", alive: Callable[[], None] = nobody_listens) -> TaskResult:
     """Run a task to its end in this process; `worker` names who does, for the rows; `alive` is called now and then.
 
     There is a row for each run of the task: what a run raises is in its row. (Interrupted alone is passed on.)
@@ -35,21 +35,21 @@ def run_piece(task: Task, worker: str = "", alive: Callable[[], None] = nobody_l
     began_ns = clock.now_ns()
     rows, series, error = _tried(task, alive)
     if error and len(task.runs) > 1:
-        return _joined([run_piece(half, worker, alive) for half in task.halves()])
+        return _joined([run_task(half, worker, alive) for half in task.halves()])
     if error:
         rows = [failed_row(error)]
     wall_s = to_s(clock.now_ns() - began_ns) / len(rows)
     machines = {"timing_wall_s": wall_s, **_machine(), "machine_worker": worker}
     numbered = zip(task.runs, task.seeds, rows, strict=True)
-    return PieceResult(
+    return TaskResult(
         tuple({"run": run, "point": task.point, "seed": seed, **row, **machines} for run, seed, row in numbered), series
     )
 
 
-def lost_piece(task: Task, why: str) -> PieceResult:
+def lost_task(task: Task, why: str) -> TaskResult:
     """What is told of a task of one run whose workers died of it."""
     run, seed = task.runs[0], task.seeds[0]
-    return PieceResult(({"run": run, "point": task.point, "seed": seed, **failed_row(why)},))
+    return TaskResult(({"run": run, "point": task.point, "seed": seed, **failed_row(why)},))
 
 
 def _tried(task: Task, alive: Callable[[], None]) -> tuple[list[Row], bytes | None, str]:
@@ -100,18 +100,18 @@ def _told(error: BaseException, task: Task) -> str:
     return text.replace(str(Path(task.scenario).parent), "scenario")
 
 
-def _joined(parts: list[PieceResult]) -> PieceResult:
+def _joined(parts: list[TaskResult]) -> TaskResult:
     rows = tuple(row for part in parts for row in part.rows)
     series = [part.series for part in parts if part.series is not None]
     if len(series) < 2:
-        return PieceResult(rows, series[0] if series else None)
+        return TaskResult(rows, series[0] if series else None)
     import polars as pl
 
     from swarmwire.metrics.record.part_files import PARQUET
 
     file = BytesIO()
     pl.concat([pl.read_parquet(BytesIO(of)) for of in series]).write_parquet(file, **PARQUET)
-    return PieceResult(rows, file.getvalue())
+    return TaskResult(rows, file.getvalue())
 
 
 @cache
