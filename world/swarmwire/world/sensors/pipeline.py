@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal, uniform
@@ -23,9 +24,8 @@ from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Sensor
 
+wrap = njit()(wrap_angle)
 NOISE, OUTLIER, OUTLIER_VALUE, DROP_OUT = range(4)  # indices of `purposes`
-FULL_TURN = 2.0 * np.pi
-MIN_ANGLE = np.nextafter(-np.pi, 0.0)
 ROUNDING = 1e-9  # of a tick: a reading or delay that misses a tick by less belongs to it
 
 Reading = tuple[FloatArray, ...]  # a finished reading of each field, (arenas, n) or (arenas, n, width)
@@ -163,16 +163,7 @@ def _clip(flat, low, high):
 @njit()
 def _wrap(flat):
     for k in range(len(flat)):
-        flat[k] = _wrapped(flat[k])
-
-
-@njit()
-def _wrapped(angle):
-    """The angle in (-pi, pi], unchanged bit for bit if it is there already (as `world.placement.placement.wrapped`)."""
-    if -np.pi < angle <= np.pi:
-        return angle
-    turned = angle - FULL_TURN * np.ceil((angle - np.pi) / FULL_TURN)
-    return min(max(turned, MIN_ANGLE), np.pi)
+        flat[k] = wrap(flat[k])
 
 
 class Staged:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import normal
@@ -16,7 +17,7 @@ from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 RANGE_NOISE, BEARING_NOISE = purpose("range noise"), purpose("bearing noise")
 RSSI_NOISE = purpose("rssi noise")
-TURN = 2.0 * np.pi
+wrap = njit()(wrap_angle)
 
 
 @njit()
@@ -110,17 +111,8 @@ def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, no
             bearing = np.arctan2(dy, dx) - pose[r, 2]
             if noise_rad > 0.0:
                 bearing += noise_rad * normal(keys[s // robots], s % robots, r % robots, sequence[i], BEARING_NOISE)
-            out_rad[i] = wrapped(bearing)
+            out_rad[i] = wrap(bearing)
     return out_rad
-
-
-@njit()
-def wrapped(angle):
-    """The angle wrapped to (-pi, pi]; an angle in this interval is unchanged."""
-    if -np.pi < angle <= np.pi:
-        return angle
-    turned = angle - TURN * np.ceil((angle - np.pi) / TURN)
-    return min(turned, np.pi) if turned > -np.pi else np.pi
 
 
 class MeasuredRssi(Stage):
