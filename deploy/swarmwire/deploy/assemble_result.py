@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
-from swarmwire.deploy.record.interventions import InterventionsRecord
+from swarmwire.deploy.record.live_events import LiveEventsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
 from swarmwire.metrics.record.recorders import record_summary
@@ -34,7 +34,7 @@ def assemble_result(
     arena_counts: Sequence[dict[str, int]],
     origin: Origin,
     inputs: InputsRecord | None,
-    interventions: InterventionsRecord | None,
+    live_events: LiveEventsRecord | None,
     losses: Sequence[Loss],
     changes: Sequence[RunnerEvent],
     engines: Sequence[str],
@@ -75,9 +75,9 @@ def assemble_result(
         modules=dict(origin.modules),
         files=origin.files,
         inputs=inputs,
-        interventions=interventions,
+        live_events=live_events,
         lost_runners=tuple(str(loss) for loss in losses),
-        runner_changes=tuple(changes),
+        runner_events=tuple(changes),
         realtime=realtime,
         gateways=dict(origin.gateways),
         record=record,

@@ -9,7 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.record.interventions import read_interventions
+from swarmwire.deploy.record.live_events import read_live_events
 from swarmwire.deploy.record.origin import Origin, read_origin
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.trajectory_log import TrajectoryCheck, ticks_logged
@@ -17,7 +17,7 @@ from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.record.names import INPUTS, INTERVENTIONS, SCENARIO, SUMMARY
+from swarmwire.metrics.record.names import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
 from swarmwire.metrics.run_folder import RunFolder
 
 
@@ -82,10 +82,10 @@ class RepeatedRun:
         self.origin = read_origin(folder)
         self._summary = _read_summary(folder)
         self._inputs = _inputs(folder, self.origin, self._summary)
-        interventions, self._interventions_sha256 = read_interventions(folder)
-        if self._summary and self._summary.interventions_sha256 and not interventions:
+        live_events, self._live_events_sha256 = read_live_events(folder)
+        if self._summary and self._summary.live_events_sha256 and not live_events:
             expected = "expected the record of what people did to this run, on which it depends"
-            raise BadInput(str(folder / INTERVENTIONS), "", expected)
+            raise BadInput(str(folder / LIVE_EVENTS), "", expected)
         if self._inputs is not None and runners not in (None, "none"):
             raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
         self.simulation = Simulation(
@@ -95,9 +95,7 @@ class RepeatedRun:
             out=out,
             observers=observers,
             record=record,
-            replay=Replay(
-                self._ticks(recorded_anew=out is not None), self._inputs, interventions, self.origin.subtick_s
-            ),
+            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, live_events, self.origin.subtick_s),
         )
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
         self.simulation.watch(self._check)
@@ -108,8 +106,8 @@ class RepeatedRun:
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
-        if summary and self._interventions_sha256 != summary.interventions_sha256:
-            changes.append(f"{INTERVENTIONS} is not as the run left it: its sha256 differs")
+        if summary and self._live_events_sha256 != summary.live_events_sha256:
+            changes.append(f"{LIVE_EVENTS} is not as the run left it: its sha256 differs")
         result = finished(self.simulation)
         why_not_all = self._why_not_all(result)
         return Repetition(
@@ -145,7 +143,7 @@ class _Summary:
     ticks: int
     hashes: tuple[str, ...]
     inputs_sha256: str | None
-    interventions_sha256: str | None
+    live_events_sha256: str | None
 
 
 def _read_summary(folder: Path) -> _Summary | None:
@@ -154,7 +152,7 @@ def _read_summary(folder: Path) -> _Summary | None:
     if found is None:
         return None
     inputs: dict[str, Any] = found["inputs"] or {}
-    given: dict[str, Any] = found["interventions"] or {}
+    given: dict[str, Any] = found["live_events"] or {}
     hashes = tuple(found["trajectory_sha256"])
     return _Summary(found["ended"], found["ticks"], hashes, inputs.get("sha256"), given.get("sha256"))
 

@@ -12,5 +12,5 @@ class Replay:
 
     ticks: int  # instead of the scenario's
     inputs: RecordedInputs | None  # None: all follows from scenario and seed
-    interventions: tuple[LiveEvent, ...] = ()  # what people did to it
+    live_events: tuple[LiveEvent, ...] = ()  # what people did to it
     subtick_s: float | None = None  # at which packets came in the middle of ticks; None: at their starts

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.deploy.record.inputs import InputsRecord
-from swarmwire.deploy.record.interventions import InterventionsRecord
+from swarmwire.deploy.record.live_events import LiveEventsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
 from swarmwire.metrics.whole_file import write_whole
@@ -105,9 +105,9 @@ class Result:
     stop: tuple[str, ...] = ()  # what ends an arena, in words: "order at least 0.9 for 5 s"
     files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
     inputs: InputsRecord | None = None  # what came from outside, if anything did
-    interventions: InterventionsRecord | None = None  # what people did to it while it went on, if anything
+    live_events: LiveEventsRecord | None = None  # what people did to it while it went on, if anything
     lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
-    runner_changes: tuple[RunnerEvent, ...] = ()  # who joined, left, was lost and returned, in order
+    runner_events: tuple[RunnerEvent, ...] = ()  # who joined, left, was lost and returned, in order
     realtime: RealTimeReport | None = None
     gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
     error: str | None = None  # why it failed
@@ -162,10 +162,10 @@ class Result:
             "radio": radios[0] if one else radios,
             "metrics": metrics[0] if one else metrics,
             "events": events,
-            "global_senses": self.global_sensors,
+            "global_sensors": self.global_sensors,
             "counts": self.counts,
             "lost_runners": list(self.lost_runners),
-            "runner_changes": [asdict(change) for change in self.runner_changes],
+            "runner_events": [asdict(change) for change in self.runner_events],
             "realtime": asdict(self.realtime) if self.realtime else None,
             "gateways": self.gateways,
             "record": self.record,
@@ -174,7 +174,7 @@ class Result:
             "modules": self.modules,
             "files": [asdict(file) for file in self.files],
             "inputs": asdict(self.inputs) if self.inputs else None,
-            "interventions": asdict(self.interventions) if self.interventions else None,
+            "live_events": asdict(self.live_events) if self.live_events else None,
         }
 
     def write(self, path: Path) -> None:

@@ -90,7 +90,7 @@ class Simulation:
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         judge: says which arenas are over, by the scenario's stop conditions; another may take its place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
-        interventions: events given while it goes on, and ended, from any thread.
+        live_events: events given while it goes on, and ended, from any thread.
         served: entered, the robots that answer as real ones, if any.
     """
 
@@ -150,11 +150,11 @@ class Simulation:
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.controls = Controls(self._clock, rate_hz, self._pace, speed_fixed=bool(self._behind.kinds))
         self.run_id, self.interrupt = new_run_id(), Interrupt()
-        self.interventions = LiveEvents(
+        self.live_events = LiveEvents(
             self.scenario,
             {group.name: group.body for group in self.static.groups},
             self._record.keep,
-            replay.interventions if replay else None,
+            replay.live_events if replay else None,
         )
         self._status = self._new_status()
         self._observers: list[Guarded] = []
@@ -238,12 +238,12 @@ class Simulation:
         """One tick; what the observers saw of it. It may go on beyond the scenario's duration."""
         return self._entered().step()
 
-    def intervene(self, event: Mapping[str, Any]) -> int:
+    def apply_event(self, event: Mapping[str, Any]) -> int:
         """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
 
-        BadInput says what is wrong with it. `interventions.end` undoes one that lasts.
+        BadInput says what is wrong with it. `live_events.end` undoes one that lasts.
         """
-        return self.interventions.give(event)
+        return self.live_events.give(event)
 
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
@@ -278,7 +278,7 @@ class Simulation:
                 arena_counts=loop.arena_counts(),
                 origin=self._origin,
                 inputs=self._record.inputs(),
-                interventions=self._record.interventions(),
+                live_events=self._record.live_events(),
                 losses=self._losses,
                 changes=self._changes,
                 engines=self.world.engines,
@@ -324,7 +324,7 @@ class Simulation:
             self._watching,
             self.scenario.events,
             self.stop_conditions,
-            self.interventions,
+            self.live_events,
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
         )
 
@@ -351,7 +351,7 @@ class Simulation:
     def _recorders(self, what: Recording, listening: Listening | None) -> Sequence[Observer]:
         """Those that fill the run folder, which may drop something only where the run keeps to the wall clock."""
         may_drop = self._pace is not None
-        given = self.interventions
+        given = self.live_events
         if self._observed and self.folder is None:
             raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
         door = listening.observers_door(self.run_id) if listening else None
@@ -375,8 +375,8 @@ class Simulation:
             clock=self._clock,
             health=self.health,
             counts=lambda: self._loop.counts() if self._loop else {},
-            radio=lambda: self.interventions.course.radio,
-            events=self.interventions.told,
+            radio=lambda: self.live_events.course.radio,
+            events=self.live_events.told,
         )
 
     def _hold(self, tick: int) -> None:

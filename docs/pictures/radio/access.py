@@ -83,7 +83,7 @@ def throughput(load: float) -> float:
     """Frames received per airtime by one listener amidst many equal senders, each of which sends one frame a tick."""
     bit_rate_bps = round(SENDERS * RATE_HZ * FRAME_BYTES * 8 / load)
     settings = [f"radio.bit_rate_bps={bit_rate_bps}", "radio.access.method=aloha", "radio.overhead_bytes=0"]
-    settings += ["radio.reception.model=threshold", "radio.reception.least_sinr_db=3"]
+    settings += ["radio.reception.model=threshold", "radio.reception.min_sinr_db=3"]
     radio = radio_of("ieee802154", settings)
     keys = np.array([derive_key("figure of access")], np.uint64)
     medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)

@@ -201,8 +201,8 @@ def test_who_joins_leaves_or_is_lost(joiners, tmp_path, case):
     assert not watcher.steps
     first = [f"joined {line.split()[0]}" for line in case.first]
     assert [" ".join(told) for told in joiners.told] == [*first, *(case.told.split(", ") if case.told else [])]
-    assert all(change.tick == -1 for change in result.runner_changes[: len(first)])
-    assert not case.reason or result.runner_changes[len(first)].reason == case.reason
+    assert all(change.tick == -1 for change in result.runner_events[: len(first)])
+    assert not case.reason or result.runner_events[len(first)].reason == case.reason
     assert result.ended == case.over
     assert result.mode == ("realtime" if case.realtime else "lockstep")
     told = {name: count for name, count in result.counts.items() if name.startswith("runners_")}

@@ -66,7 +66,7 @@ SIGNAL = """
 preset = "ieee802154"
 loss = 0.3
 queue_limit = 4
-access = { method = "csma-802154", most_retries = 2 }
+access = { method = "csma-802154", max_retries = 2 }
 antenna = { power_dbm = -30.0 }
 log_distance = { exponent = 3.5 }
 shadowing = { deviation_db = 6.0, correlation_m = 1.0 }

@@ -76,7 +76,7 @@ def test_two_terminals_make_the_same_run_as_one(tmp_path):
     summary = RunFolder(folder).summary
     assert summary is not None
     assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
-    assert [change["what"] for change in summary["runner_changes"]] == ["joined", "joined"]
+    assert [change["what"] for change in summary["runner_events"]] == ["joined", "joined"]
     assert repeat(folder).same
 
 

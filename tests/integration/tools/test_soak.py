@@ -40,7 +40,7 @@ def summary(*changes):
     rows = [{"what": what, "runner": runner, "robots": robots, "tick": tick} for what, runner, robots, tick in changes]
     kinds = [what for what, *_ in changes]
     return {
-        "runner_changes": rows,
+        "runner_events": rows,
         "counts": {"runners_lost": kinds.count("lost"), "runners_left": kinds.count("left")},
     }
 

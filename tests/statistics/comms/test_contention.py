@@ -20,7 +20,7 @@ DCF_A = replace(
     DCF_B,
     frame="802.11a",
     bit_rate_bps=6_000_000,
-    reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, take_over_s=4e-6),
+    reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, capture_window_s=4e-6),
     noise=Noise(20e6, 7.0),
 )
 # Figures of ns-3: nodes, payload in bytes, interval in s; delivery ratio, mean delay in ms.
@@ -61,7 +61,7 @@ A_6M = replace(
     frame="802.11a",
     bit_rate_bps=6_000_000,
     noise=Noise(20e6, 7.0),
-    reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, take_over_s=4e-6),
+    reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, capture_window_s=4e-6),
 )
 PER_TICK = {"802.11a": 200, "802.11b": 40}  # more than there is time for in 0.1 s
 TICKS = {"802.11a": 60, "802.11b": 180}

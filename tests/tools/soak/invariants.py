@@ -7,7 +7,7 @@ from typing import Any
 import psutil
 
 from swarmwire.deploy import repeat
-from swarmwire.deploy.record.interventions import read_interventions
+from swarmwire.deploy.record.live_events import read_live_events
 from swarmwire.deploy.record.origin import read_origin
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.running import finished
@@ -38,14 +38,14 @@ def fates_add_up(summary: Mapping[str, Any]) -> str:
 def owners_are_known(
     summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True, own: bool = False
 ) -> str:
-    """Each robot has one runner or, by `runner_changes`, none; nobody takes what another has, or loses what is not his.
+    """Each robot has one runner or, by `runner_events`, none; nobody takes what another has, or loses what is not his.
 
     `all_played` says that the run began with an agent for each robot, of which an open world tells. A run with `own`
     runners does not tell who they were.
     """
     owner: dict[str, str | None] = dict.fromkeys(robots, SOMEBODY if own else None)
     begun = False
-    for change in summary["runner_changes"]:
+    for change in summary["runner_events"]:
         if change["tick"] >= 0 and not begun:
             begun = True
             if all_played and None in owner.values():
@@ -58,7 +58,7 @@ def owners_are_known(
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())
-    gone = sum(change["what"] in GOES for change in summary["runner_changes"])
+    gone = sum(change["what"] in GOES for change in summary["runner_events"])
     told = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))
     if gone != told:
         raise Broken(f"{gone} runners left or were lost, the counts say {told}")
@@ -85,8 +85,8 @@ def repeats(folder: Path) -> str:
 def undisturbed(folder: Path) -> str:
     """Where no fault matters, it is the run in which none happened: same orders, agents in one process."""
     summary, origin = read_summary(folder), read_origin(folder)
-    interventions, _ = read_interventions(folder)
-    replay = Replay(summary["ticks"], None, interventions)
+    live_events, _ = read_live_events(folder)
+    replay = Replay(summary["ticks"], None, live_events)
     simulation = Simulation(folder / SCENARIO, seeds=origin.seeds, replay=replay)
     got = finished(simulation).trajectory_sha256
     if list(got) != list(summary["trajectory_sha256"]):

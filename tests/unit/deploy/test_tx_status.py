@@ -23,7 +23,7 @@ seldom = {{ body = "epuck", count = 3, agent = "{PLAYERS}:Insisting", act_every_
 [radio]
 preset = "ieee802154"
 loss = 0.4
-access = {{ method = "csma-802154", most_retries = 1 }}
+access = {{ method = "csma-802154", max_retries = 1 }}
 
 [[events]]
 at_s = 1.0

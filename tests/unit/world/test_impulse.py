@@ -100,5 +100,5 @@ def test_of_engines_side_by_side_only_the_one_with_forces_pushes():
     scenario = scenario_from(mapping, "s.toml")
     world, watch = World(scenario, [1], {}), Watch()
     assert set(world.engines) == {"discs", "kinematic"}
-    Loop(world, None, Ahead(0.0), [watch], scenario.events, interventions=LiveEvents(scenario, {})).run(2)
+    Loop(world, None, Ahead(0.0), [watch], scenario.events, live_events=LiveEvents(scenario, {})).run(2)
     assert watch.seen[0].velocity[:, 0].tolist() == [0.4 if row == 2 else 0.0 for row in range(15)]

@@ -186,7 +186,7 @@ def test_a_repetition_takes_what_was_done_and_nothing_new():
 def test_an_event_that_is_given_begins_and_ends_in_the_run_at_the_ticks_it_was_given_and_ended():
     scenario = posed([[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]])
     given, watch = LiveEvents(scenario, bodies_of(scenario, "s.toml")), Watch()
-    loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], interventions=given)
+    loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], live_events=given)
     loop.run(2)
     number = given.give({"do": "kill", "robots": {"names": ["a-1"]}})
     loop.run(5)

@@ -77,7 +77,7 @@ class Loop:
         observers: Sequence[Observer],
         events: Sequence[Event] = (),
         stop_conditions: StopConditions | None = None,
-        interventions: LiveEvents | None = None,
+        live_events: LiveEvents | None = None,
         timed: TimedBackend | None = None,
     ) -> None:
         """Make a loop for a backend that has been started before `run`.
@@ -89,15 +89,15 @@ class Loop:
             observers: they see each tick at its end.
             events: the scenario's events.
             stop_conditions: checked after each tick, after the observers; None: no arena ends before the run.
-            interventions: live events, taken at the start of each tick.
+            live_events: live events, taken at the start of each tick.
             timed: the backend, if it sends and delivers packets within a tick.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
         self._stop_conditions = stop_conditions
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
-        self._interventions = interventions
-        progress = interventions.course if interventions else None
+        self._live_events = live_events
+        progress = live_events.course if live_events else None
         self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, progress)
         self._mailbox = Mailbox(world.static)
         self._timed = timed
@@ -127,7 +127,7 @@ class Loop:
         """One tick: events, radio medium, sensors, backend, radio medium, physics, observers, stop conditions."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
-        self._intervene(tick, start_ns)
+        self._apply_live_events(tick, start_ns)
         effects = self._events.apply(start_ns, world)
         results, packets, tx_status = self._receive(start_ns, effects)
         readings = world.sense(tick)
@@ -233,11 +233,11 @@ class Loop:
             np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         return actions
 
-    def _intervene(self, tick: int, start_ns: int) -> None:
+    def _apply_live_events(self, tick: int, start_ns: int) -> None:
         """Begin and end the live events of this tick."""
-        if self._interventions is None:
+        if self._live_events is None:
             return
-        for number, event in self._interventions.take(tick, self.world.static.rate_hz):
+        for number, event in self._live_events.take(tick, self.world.static.rate_hz):
             if event is None:
                 self._events.end(number, start_ns)
             else:

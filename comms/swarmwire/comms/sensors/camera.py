@@ -17,7 +17,7 @@ WHITE = 0xFFFFFF  # the brightest colour
 class CameraSpec(SensorSpec):
     """An omnidirectional camera: a mirror above the body shows the lit LEDs of other robots, the nearest first.
 
-    Readings: distance_m, bearing_rad, colour (n, most_blobs), nan after the last blob.
+    Readings: distance_m, bearing_rad, colour (n, max_blobs), nan after the last blob.
     """
 
     truth: ClassVar[str] = "swarmwire.world.sensors.camera:CameraSensor"
@@ -26,7 +26,7 @@ class CameraSpec(SensorSpec):
     aperture_deg: float = parameter(
         help="angle between straight down and the farthest that it sees", unit="deg", above=0, below=90
     )
-    most_blobs: int = parameter(
+    max_blobs: int = parameter(
         32, help="largest number of blobs in a reading: the nearest ones", at_least=1, at_most=1000
     )
     noise_relative: float = parameter(
@@ -36,7 +36,7 @@ class CameraSpec(SensorSpec):
     @classmethod
     def example(cls) -> Self:
         """As `SensorSpec.example`."""
-        return cls(height_m=0.2, aperture_deg=70.0, most_blobs=4)
+        return cls(height_m=0.2, aperture_deg=70.0, max_blobs=4)
 
     def reach_m(self, altitude_m: float) -> float:
         """Radius in m of the visible floor, for a body at this altitude."""
@@ -44,7 +44,7 @@ class CameraSpec(SensorSpec):
 
     def reading_fields(self) -> tuple[Field, ...]:
         """As `SensorSpec.reading_fields`."""
-        blobs, noise = self.most_blobs, Noise("normal", 0.0, self.noise_relative)
+        blobs, noise = self.max_blobs, Noise("normal", 0.0, self.noise_relative)
         distance = "over the floor to each blob of light, the nearest first; nan: no further blob"
         bearing = "in the body's frame, 0 ahead, positive to the left"
         return (
@@ -55,7 +55,7 @@ class CameraSpec(SensorSpec):
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
         """As `SensorSpec.synthetic`."""
-        blobs = self.most_blobs
+        blobs = self.max_blobs
         none = np.arange(blobs) >= draw("blobs", 1) * blobs
         nearest_first = np.sort(draw("distance", blobs), axis=1)
         bearing = (draw("bearing", blobs) * 2.0 - 1.0) * np.pi
@@ -80,7 +80,7 @@ class CameraReading:
 
     @classmethod
     def of(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
-        """The reading of these columns (most_blobs,), nan where there is no blob."""
+        """The reading of these columns (max_blobs,), nan where there is no blob."""
         seen = np.isfinite(distance_m)
         columns = (column[seen].tolist() for column in (distance_m, bearing_rad, colour))
         return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True)])
@@ -90,9 +90,9 @@ class CameraReading:
 class CameraReadings:
     """The blobs in view of n robots' cameras, a column per blob, by true distance; nan where there is none."""
 
-    distance_m: FloatArray  # (n, most_blobs) over the floor, from the body's centre
-    bearing_rad: FloatArray  # (n, most_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
-    colour: FloatArray  # (n, most_blobs) 0xRRGGBB
+    distance_m: FloatArray  # (n, max_blobs) over the floor, from the body's centre
+    bearing_rad: FloatArray  # (n, max_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
+    colour: FloatArray  # (n, max_blobs) 0xRRGGBB
 
     @property
     def count(self) -> IntArray:

@@ -19,7 +19,7 @@ class ControlServer:
     """Answers who asks how a run is doing, and does what those ask who may control it.
 
     What is refused is answered with one line, and changes nothing. `give` takes an event's table and returns its
-    number, `end` undoes an event; both are `Interventions`'.
+    number, `end` undoes an event; both are `LiveEvents`'.
     """
 
     def __init__(

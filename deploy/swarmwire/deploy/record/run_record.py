@@ -14,7 +14,7 @@ from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
-from swarmwire.deploy.record.interventions import InterventionsLog, InterventionsRecord
+from swarmwire.deploy.record.live_events import LiveEventsLog, LiveEventsRecord
 from swarmwire.deploy.record.new_folder import make_folder
 from swarmwire.deploy.record.origin import Origin, origin_of
 from swarmwire.deploy.record.recording import Recording
@@ -45,7 +45,7 @@ class RunRecord:
         self._clock = clock
         self._log = RunLog(self.folder, clock) if self.folder else None
         self._recorded: RecordedBackend | None = None
-        self._interventions = InterventionsLog(self.folder) if self.folder else None
+        self._live_events = LiveEventsLog(self.folder) if self.folder else None
         self.failed: RecordFailed | None = None
 
     def observers(
@@ -142,20 +142,20 @@ class RunRecord:
         """What was recorded of the backend; None if nothing."""
         return self._recorded.record() if self._recorded else None
 
-    def keep(self, intervention: LiveEvent) -> None:
+    def keep(self, live_event: LiveEvent) -> None:
         """Record what somebody does to the run, before it takes effect; OSError if it cannot be recorded."""
-        if self._interventions is None:
+        if self._live_events is None:
             return
         try:
-            self._interventions.keep(intervention)
+            self._live_events.keep(live_event)
         except OSError as error:
-            what = "end" if intervention.table is None else "happen"
-            self.say(f"event {intervention.number} does not {what}, as it cannot be recorded: {error}")
+            what = "end" if live_event.table is None else "happen"
+            self.say(f"event {live_event.number} does not {what}, as it cannot be recorded: {error}")
             raise
 
-    def interventions(self) -> InterventionsRecord | None:
+    def live_events(self) -> LiveEventsRecord | None:
         """What was recorded of what people did to the run; None if nothing."""
-        return self._interventions.record() if self._interventions else None
+        return self._live_events.record() if self._live_events else None
 
     def say(self, text: str) -> None:
         """Keep it in the log, and tell people at once; a terminal that is gone must not end a run."""

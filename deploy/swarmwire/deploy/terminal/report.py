@@ -52,7 +52,7 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
         table.add_row("counts", ", ".join(counts))
     for loss in result.lost_runners:
         table.add_row("lost runner", loss)
-    for change in result.runner_changes:
+    for change in result.runner_events:
         if change.what != "lost" and change.tick >= 0:
             table.add_row(f"{change.what} runner", str(change))
     _add_real_time(table, result)

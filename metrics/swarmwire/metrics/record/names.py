@@ -7,7 +7,7 @@ STATIC = "static.json"  # arena, bodies and names: what does not change
 RECORDING = "run.rrd"  # for the viewer
 DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
 INPUTS = "inputs/actions.frames"  # what came from outside
-INTERVENTIONS = "interventions.jsonl"  # what people did to it while it went on
+LIVE_EVENTS = "live_events.jsonl"  # what people did to it while it went on
 LOG = "log.txt"  # what people were told
 
 DIGEST_BYTES = 8  # of each tick in DIGESTS

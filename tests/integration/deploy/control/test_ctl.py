@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat
 from swarmwire.deploy.cli import app
 from swarmwire.deploy.live.live_file import read_live
-from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.record.names import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY, started
 from tests.support.waiting import until
 
@@ -64,7 +64,7 @@ def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path,
     process.kill()
     process.communicate()
     assert ctl("status").startswith("no run ")
-    assert len((tmp_path / "run" / INTERVENTIONS).read_text().splitlines()) == 5
+    assert len((tmp_path / "run" / LIVE_EVENTS).read_text().splitlines()) == 5
     repetition = repeat(tmp_path / "run")
     assert repetition.same
     assert repetition.compared == tick + 25

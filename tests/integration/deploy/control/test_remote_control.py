@@ -6,7 +6,7 @@ from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling, only_run_at
 from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.live_file import read_live
-from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.record.names import LIVE_EVENTS
 from swarmwire.metrics.run_folder import RunFolder
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.control.going import at_tick, going
@@ -84,13 +84,13 @@ def test_an_interactive_session_is_repeated_bit_for_bit_in_whatever_layout(tmp_p
     with going(tmp_path / "run", SHORT, runners=then) as (simulation, control):
         session_of_people(control)
     result = simulation.result
-    assert result.interventions is not None
-    assert result.interventions.lines == 9 + 1  # and the loss that was set before ends
+    assert result.live_events is not None
+    assert result.live_events.lines == 9 + 1  # and the loss that was set before ends
     assert result.trajectory_sha256 != run(LOSSY, overrides=[SHORT]).trajectory_sha256
     repetition = repeat(tmp_path / "run", runners=now, out=tmp_path / "again")
     assert repetition.same
     assert repetition.changes == ()
-    assert repetition.result.interventions == result.interventions
+    assert repetition.result.live_events == result.live_events
     assert (repetition.result.events, repetition.result.radio) == (result.events, result.radio)
     assert repeat(tmp_path / "again").same
 
@@ -108,15 +108,15 @@ def test_an_interactive_session_in_real_time_is_repeated(tmp_path):
 def test_what_people_did_from_python_and_an_altered_record_are_noticed(tmp_path):
     with Simulation(LOSSY, overrides=[SHORT], out=tmp_path / "run") as simulation:
         simulation.run(5)
-        number = simulation.intervene(KILL)
+        number = simulation.apply_event(KILL)
         simulation.run(9)
-        simulation.interventions.end(number)
+        simulation.live_events.end(number)
         simulation.run()
     assert repeat(tmp_path / "run").same
     rows = RunFolder(tmp_path / "run").events().select("tick", "do", "ended").rows()
     assert rows == [(5, "kill", False), (9, "kill", True)]
-    path = tmp_path / "run" / INTERVENTIONS
+    path = tmp_path / "run" / LIVE_EVENTS
     path.write_text(path.read_text().replace("flock-2", "flock-3"))
     repetition = repeat(tmp_path / "run")
     assert (repetition.same, repetition.first_difference) == (False, 5)
-    assert repetition.changes == (f"{INTERVENTIONS} is not as the run left it: its sha256 differs",)
+    assert repetition.changes == (f"{LIVE_EVENTS} is not as the run left it: its sha256 differs",)

@@ -79,7 +79,7 @@ def test_the_run_goes_on_where_it_was_and_says_what_happened(tmp_path):
         result = finished(simulation)
     assert sorted(joiners.told[2:4]) == [("lost", "r1"), ("lost", "r2")]
     assert sorted(joiners.told[4:]) == [("returned", "r1"), ("returned", "r2")]
-    assert {change.tick for change in result.runner_changes[2:]} == {9}
+    assert {change.tick for change in result.runner_events[2:]} == {9}
     assert result.counts["runners_lost"] == result.counts["runners_returned"] == 2
     assert result.trajectory_sha256 == run(LOSSY, overrides=overrides).trajectory_sha256
     assert repeat(tmp_path / "run").same

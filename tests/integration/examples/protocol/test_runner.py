@@ -124,7 +124,7 @@ def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Pa
     with closing(joiners):
         listening = Listening(HERE, told=joiners)
         result = run(flock, overrides=["duration_s=3"], listening=listening, out=tmp_path / "run")
-    assert result.runner_changes[0].runner == "foreign"
+    assert result.runner_events[0].runner == "foreign"
     assert result.inputs is not None
     assert result.inputs.first_tick == 0
     assert result.trajectory_sha256 != run(flock, overrides=["duration_s=3"]).trajectory_sha256

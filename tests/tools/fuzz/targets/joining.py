@@ -146,25 +146,25 @@ class Control(DocumentTarget):
     def feed(self, case: bytes) -> None:
         if self.taken > MAX_EVENTS:
             self._start()
-        before = len(self.interventions._events)
+        before = len(self.live_events._events)
         try:
             self.server._do(case)
         except BadInput as error:
             check_line(error)
-            if len(self.interventions._events) != before:
+            if len(self.live_events._events) != before:
                 raise AssertionError("refused, and yet an event began") from None
             raise
         self.taken += 1
 
     def _start(self) -> None:
         self.taken, clock = 0, WallClock()
-        self.interventions = LiveEvents(self.scenario, self.bodies)
+        self.live_events = LiveEvents(self.scenario, self.bodies)
 
         class Now:
             tick = 0
 
         controls = Controls(clock, 10)
-        self.server = ControlServer(Now(), controls, self.interventions.give, self.interventions.end, lambda _: None)
+        self.server = ControlServer(Now(), controls, self.live_events.give, self.live_events.end, lambda _: None)
 
 
 class Replies(DocumentTarget):

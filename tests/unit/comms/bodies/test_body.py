@@ -176,7 +176,7 @@ WHEELLESS = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "m
         ("sensors.proximity.angles_deg", [1, "x"], "sensors.proximity.angles_deg[1]"),
         ("sensors.ground.points_m", [[0, 0]] * 1001, "sensors.ground.points_m"),
         ("sensors.scan", {"rays": 10_001, "range_m": 1}, "sensors.scan.rays"),
-        ("sensors.camera.most_blobs", 1001, "sensors.camera.most_blobs"),
+        ("sensors.camera.max_blobs", 1001, "sensors.camera.max_blobs"),
         ("leds.angles_deg", [1] * 1001, "leds.angles_deg"),
         *((f"leds.{name}", value, f"leds.{name}") for name, value in (("radius_m", 0.044), ("height_m", 0.173))),
         ("leds.beacon_height_m", 1, "leds.beacon_height_m"),

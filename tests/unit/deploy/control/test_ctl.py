@@ -77,7 +77,7 @@ def test_an_event_is_any_table_of_a_scenario(going_run):
     simulation, control = going_run
     [event] = control.status()["events"]
     assert event["text"] == 'fail part = "motors", robots = { count = 3 }, for_s = 10.0'
-    assert tomllib.loads(f"event = {table}")["event"] == dict(simulation.interventions._waiting[0][1])
+    assert tomllib.loads(f"event = {table}")["event"] == dict(simulation.live_events._waiting[0][1])
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.control.remote_control import Refused
 from swarmwire.deploy.live.live_file import Live, read_live
-from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.record.names import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.control.going import at_tick, going
 from tests.support.waiting import until
@@ -17,7 +17,7 @@ KILL = {"do": "kill", "robots": {"names": ["flock-1", "flock-2"]}}
 
 
 def lines(folder):
-    return [json.loads(line) for line in (folder / INTERVENTIONS).read_text().splitlines()]
+    return [json.loads(line) for line in (folder / LIVE_EVENTS).read_text().splitlines()]
 
 
 def test_paused_means_that_the_tick_stands_still_and_steps_are_so_many_ticks(tmp_path):
@@ -47,8 +47,8 @@ def test_pause_step_and_speed_do_not_change_the_run(tmp_path):
         control.pause()
         control.speed(None)
     assert simulation.result.trajectory_sha256 == run(LOSSY, overrides=[SHORT]).trajectory_sha256
-    assert not (tmp_path / "run" / INTERVENTIONS).exists()
-    assert simulation.result.interventions is None
+    assert not (tmp_path / "run" / LIVE_EVENTS).exists()
+    assert simulation.result.live_events is None
 
 
 def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path):
@@ -58,7 +58,7 @@ def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path
         number = control.event(KILL)
         assert number == 0
         assert [event["tick"] for event in control.status()["events"]] == [None]
-        assert not (tmp_path / "run" / INTERVENTIONS).exists()
+        assert not (tmp_path / "run" / LIVE_EVENTS).exists()
         control.step(2)
         status = at_tick(control, 5)
         assert lines(tmp_path / "run") == [{"tick": 3, "number": 0, "event": KILL}]
@@ -99,7 +99,7 @@ def test_what_is_refused_is_told_in_the_runs_own_line_and_the_run_goes_on(tmp_pa
                 ask()
         control._session.put(control._keys.control, b"no request")  # nobody takes it
     assert simulation.result.ended == "duration"
-    assert simulation.result.interventions is None
+    assert simulation.result.live_events is None
 
 
 def test_in_real_time_there_is_no_speed_without_a_limit(tmp_path):

@@ -81,7 +81,7 @@ def test_the_nearest_blobs_are_kept_in_order() -> None:
     apart_m = 0.75, 0.25, 0.5, 0.625, 0.375, 0.725
     others = [[d * np.cos(a), d * np.sin(a), 0.0] for a, d in enumerate(apart_m)]
     assert distances(*others, dark=0) == pytest.approx([0.25, 0.375, 0.5, 0.625, 0.725, 0.75])
-    assert distances(*others, dark=0, spec=replace(HIGH, most_blobs=3)) == pytest.approx([0.25, 0.375, 0.5])
+    assert distances(*others, dark=0, spec=replace(HIGH, max_blobs=3)) == pytest.approx([0.25, 0.375, 0.5])
 
 
 def test_the_error_of_a_distance_is_a_share_of_it() -> None:

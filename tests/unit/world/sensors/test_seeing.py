@@ -76,7 +76,7 @@ def test_photocells_see_the_lights_that_nothing_beside_them_hides(seed: int, bou
 @pytest.mark.parametrize("height_m", [0.12, 0.25])
 def test_a_camera_sees_the_leds_within_its_cone_that_no_body_hides(height_m: float, boundary: Boundary) -> None:
     of = sample(6, boundary, each=8)
-    spec = CameraSpec(height_m=height_m, aperture_deg=70.0, most_blobs=200)
+    spec = CameraSpec(height_m=height_m, aperture_deg=70.0, max_blobs=200)
     seen, hidden = truth(of, "camera", spec), 0
     rows = [(arena, group, i) for arena in range(2) for group in of.groups for i in range(group.start, group.stop)]
     for row, (arena, group, robot) in enumerate(rows):

@@ -27,7 +27,7 @@ SENSOR_SPECS: dict[str, Any] = {
     "proximity": ProximitySpec(**RING),
     "infrared": InfraredSpec(**RING),
     "scan": ScanSpec(rays=45, range_m=1.0, at_m=0.02),
-    "camera": CameraSpec(height_m=0.2887, aperture_deg=70.0, most_blobs=200),
+    "camera": CameraSpec(height_m=0.2887, aperture_deg=70.0, max_blobs=200),
     "light": LightSpec(angles_deg=RING["angles_deg"]),
 }
 

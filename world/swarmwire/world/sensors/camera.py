@@ -104,7 +104,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         """Index what the camera may see."""
         scene, group, spec = self.scene, self.group, self.spec
         reach_m = spec.reach_m(group.body.altitude_m)
-        self._shape = len(scene.keys), group.stop - group.start, spec.most_blobs
+        self._shape = len(scene.keys), group.stop - group.start, spec.max_blobs
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))

@@ -151,7 +151,7 @@ class Reception:
         help="what turns the ratio of signal to interference and noise into success",
         choices=("threshold", "table", "802.15.4", "802.11b", "802.11ag"),
     )
-    least_sinr_db: float = parameter(
+    min_sinr_db: float = parameter(
         6.0, help="of threshold: the ratio that a frame needs", unit="dB", at_least=-100, at_most=100
     )
     table: SuccessTable | None = parameter(None, help="of table: success by ratio")
@@ -159,7 +159,7 @@ class Reception:
         -5.0, help="a receiver finds a frame above this ratio, and nothing else until its end", unit="dB"
     )
     preamble_dbm: float = parameter(-200.0, help="a receiver finds no frame below this power", unit="dBm")
-    take_over_s: float = parameter(
+    capture_window_s: float = parameter(
         0.0,
         help="how long after its start a frame gives way to a stronger one; 0: only to one that starts with it",
         unit="s",
@@ -234,7 +234,7 @@ class Access:
     acknowledged: bool = parameter(
         True, help="of csma-802154 and dcf: addressed packets are acknowledged, and sent again if that fails"
     )
-    busy_dbm: float | None = parameter(
+    cca_threshold_dbm: float | None = parameter(
         None,
         help="power from which the medium counts as busy; without it 10 dB above the sensitivity (csma-802154) or "
         "-62 dBm (dcf)",
@@ -242,7 +242,7 @@ class Access:
         at_least=-200,
         at_most=100,
     )
-    most_retries: int | None = parameter(
+    max_retries: int | None = parameter(
         None,
         help="how often an addressed packet is sent again; without it the standard's 3 or 7",
         at_least=0,

@@ -182,7 +182,7 @@ STANDARDS: dict[str, Preset] = {
             "bit_rate_bps": 1_000_000,
             "frame": "802.11b",
             "noise": {"bandwidth_hz": 22e6, "figure_db": 7.0},
-            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "take_over_s": 4e-6},
+            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "capture_window_s": 4e-6},
         },
     ),
     "wifi-a-6M": Preset(
@@ -194,7 +194,12 @@ STANDARDS: dict[str, Preset] = {
             "bit_rate_bps": 6_000_000,
             "frame": "802.11a",
             "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
-            "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "take_over_s": 4e-6},
+            "reception": {
+                "model": "802.11ag",
+                "preamble_sinr_db": 4.0,
+                "preamble_dbm": -82.0,
+                "capture_window_s": 4e-6,
+            },
         },
     ),
     "ble-1M": Preset(
@@ -242,7 +247,7 @@ OTHER_MEDIA: dict[str, Preset] = {
             "max_payload_bytes": 11,
             "queue_limit": 1,
             "log_distance": {"reference_loss_db": 40.0},
-            "reception": {"model": "threshold", "least_sinr_db": 6.0, "preamble_sinr_db": 6.0},
+            "reception": {"model": "threshold", "min_sinr_db": 6.0, "preamble_sinr_db": 6.0},
             "access": {"method": "csma-802154", "acknowledged": False},
             "measures": {"range": {"noise_m": 0.002}},
         },
@@ -263,7 +268,7 @@ OTHER_MEDIA: dict[str, Preset] = {
             "log_distance": {"exponent": 2.0, "reference_loss_db": 0.0, "absorption_db_per_m": 0.0074},
             "antenna": {"power_dbm": 27.2},
             "noise": {"bandwidth_hz": 8e3, "figure_db": 70.8},  # 37.6 dB re 1 uPa in 1 Hz
-            "reception": {"model": "threshold", "least_sinr_db": -4.5, "preamble_sinr_db": -4.5},
+            "reception": {"model": "threshold", "min_sinr_db": -4.5, "preamble_sinr_db": -4.5},
             "access": {"method": "aloha"},
         },
         "spherical spreading with absorption and the noise of 5 m/s of wind, without echoes, layers and Doppler shift; "

@@ -278,7 +278,7 @@ def _check_signal(radio: Radio, where: str) -> None:
 def _check_fits(radio: Radio, where: str) -> None:
     """Raise BadInput for what the chosen access, reception, frame or fading has no use for."""
     access, reception, fading = radio.access_or_default, radio.reception_or_default, radio.fading
-    for name in ("busy_dbm", "most_retries"):
+    for name in ("cca_threshold_dbm", "max_retries"):
         if getattr(access, name) is not None and access.method not in ("csma-802154", "dcf"):
             raise BadInput(
                 where, f"radio.access.{name}", f'expected method csma-802154 or dcf with it, got "{access.method}"'
@@ -289,7 +289,7 @@ def _check_fits(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.reception.model", expected)
     given = {
         "reception.table": (reception.table is not None, reception.model, "table"),
-        "reception.least_sinr_db": (reception.least_sinr_db != Reception.least_sinr_db, reception.model, "threshold"),
+        "reception.min_sinr_db": (reception.min_sinr_db != Reception.min_sinr_db, reception.model, "threshold"),
     }
     if fading is not None:
         given["fading.k"] = fading.k != Fading.k, fading.distribution, "rician"

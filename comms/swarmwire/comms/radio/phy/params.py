@@ -62,10 +62,10 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
     csma, dcf = IEEE_802_15_4, DCF_TIMING.get(radio.frame, IEEE_802_11B)
     is_dcf = access.method == "dcf"
-    busy_dbm = access.busy_dbm
-    if busy_dbm is None:
-        busy_dbm = dcf.cca_ed_dbm if is_dcf else sensitivity_of(radio) + csma.cca_ed_above_sensitivity_db
-    max_retries = access.most_retries
+    cca_threshold_dbm = access.cca_threshold_dbm
+    if cca_threshold_dbm is None:
+        cca_threshold_dbm = dcf.cca_ed_dbm if is_dcf else sensitivity_of(radio) + csma.cca_ed_above_sensitivity_db
+    max_retries = access.max_retries
     if max_retries is None:
         max_retries = dcf.max_retries if is_dcf else csma.max_retries
     ack_bytes = acknowledgement_bytes(radio)
@@ -84,8 +84,8 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         min_preamble_sinr=float(from_db(reception.preamble_sinr_db)),
         min_preamble_mw=float(from_db(reception.preamble_dbm)),
         error_free_sinr=float(from_db(sinr_for_db(receiver, CERTAIN, max_bits))),
-        capture_window_ns=to_ns(reception.take_over_s),
-        cca_ed_mw=float(from_db(busy_dbm)),
+        capture_window_ns=to_ns(reception.capture_window_s),
+        cca_ed_mw=float(from_db(cca_threshold_dbm)),
         max_retries=max_retries,
         sifs_ns=sifs_ns,
         ack_airtime_ns=ack_ns,

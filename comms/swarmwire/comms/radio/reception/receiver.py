@@ -52,9 +52,9 @@ MIN_DB, MAX_DB = -60.0, 100.0  # bounds of `sinr_for_db`
 HALVINGS = 60
 
 
-def by_threshold(least_sinr_db: float) -> Receiver:
+def by_threshold(min_sinr_db: float) -> Receiver:
     """A receiver by threshold: a frame is right if its SINR never falls below this."""
-    return Receiver(_THRESHOLD, 0, from_db(least_sinr_db), 0.0, _NO_ROWS, _NO_ROWS)
+    return Receiver(_THRESHOLD, 0, from_db(min_sinr_db), 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def by_table(table: SuccessTable) -> Receiver:
@@ -81,7 +81,7 @@ def ieee80211ag(rate_bps: int) -> Receiver:
 def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
     """The receiver of a scenario's `Reception`, after `refuse_unfit`."""
     if reception.model == "threshold":
-        return by_threshold(reception.least_sinr_db)
+        return by_threshold(reception.min_sinr_db)
     if reception.table is not None and reception.model == "table":
         return by_table(reception.table)
     if reception.model == "802.11b":

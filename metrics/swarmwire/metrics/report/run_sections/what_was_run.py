@@ -147,7 +147,7 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     lost: list[Any] = summary["lost_runners"]
     if lost:
         said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
-    changes: list[dict[str, Any]] = summary["runner_changes"]
+    changes: list[dict[str, Any]] = summary["runner_events"]
     moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
     if moved:
         said.append(f"Runners that came and went: {'; '.join(moved)}.")
@@ -155,7 +155,7 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
         said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
-    readings: dict[str, list[str]] = summary["global_senses"]
+    readings: dict[str, list[str]] = summary["global_sensors"]
     if readings:
         bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in readings.items())
         said.append(f"Bodies that know more than their surroundings: {bodies}.")

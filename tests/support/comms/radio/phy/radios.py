@@ -22,7 +22,7 @@ WIFI_B = replace(
     bit_rate_bps=1_000_000,
     overhead_bytes=36,
     noise=Noise(22e6, 7.0),
-    reception=Reception("802.11b", preamble_sinr_db=4.0, take_over_s=4e-6),
+    reception=Reception("802.11b", preamble_sinr_db=4.0, capture_window_s=4e-6),
 )
 ALL_GIVEN = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
 METHODS = ("none", "aloha", "csma-802154", "dcf")

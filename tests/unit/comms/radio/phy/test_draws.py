@@ -154,7 +154,7 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
 def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
     """A packet is sent up to three times, until an answer to it is right; it is received if one of its frames is."""
     radio = with_access("csma-802154")
-    radio = replace(radio, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    radio = replace(radio, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     rules, ticks, frame_bits = phy_params_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     rssi_dbm = on_air(told, "rssi_dbm")[:1]
@@ -208,7 +208,7 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])
 def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     radio = with_access(method)
-    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     ticks = 60
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
@@ -230,7 +230,7 @@ def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
 def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
     """Of packets whose first frame is lost and whose second is right, all that differs in time are two backoffs."""
     radio = with_access("csma-802154")
-    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, most_retries=2), send_offset="tick")
+    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     rules, ticks = phy_params_of(radio, 2), 60
     told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
     arena, sequence = on_air(told, "arena"), on_air(told, "sequence")

@@ -64,7 +64,7 @@ def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bo
 
 def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():
     """One of IEEE 802.15.4 has as much, by its spreading: at 0 dB it hears 95 of 100 frames."""
-    radio = replace(with_access("aloha"), reception=Reception("threshold", least_sinr_db=3.0))
+    radio = replace(with_access("aloha"), reception=Reception("threshold", min_sinr_db=3.0))
     told = run(make_medium(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
 
@@ -100,7 +100,7 @@ def test_throughput_of_aloha_is_that_of_abramson(load: float):
         send_offset="uniform",
         range_m=300.0,
         bit_rate_bps=int(senders * 10 * 27 * 8 / load),
-        reception=Reception("threshold", least_sinr_db=3.0),
+        reception=Reception("threshold", min_sinr_db=3.0),
     )
     angle = np.linspace(0, 2 * np.pi, senders, endpoint=False)
     pose = np.vstack([np.column_stack([10 * np.cos(angle), 10 * np.sin(angle), angle]), [[0.0, 0.0, 0.0]]])

@@ -58,7 +58,7 @@ def results(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, q
 def radios(draw: st.DrawFn) -> Radio:
     radio = with_access(draw(st.sampled_from(ACKNOWLEDGING)))
     slow = radio.frame == "plain" and draw(st.booleans())
-    access = replace(radio.access_or_default, most_retries=draw(st.integers(0, 3)))
+    access = replace(radio.access_or_default, max_retries=draw(st.integers(0, 3)))
     return replace(
         radio,
         access=access,
@@ -149,7 +149,7 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
 def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_acknowledged(method: str):
     radio = with_access(method)
-    radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, most_retries=0))
+    radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, max_retries=0))
     ask = Asking(2)
     of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
     received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))

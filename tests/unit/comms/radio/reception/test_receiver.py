@@ -175,7 +175,7 @@ TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
     ("reception", "bit_rate_bps", "expected"),
     [
         (Reception(), 250_000, ieee802154()),
-        (Reception("threshold", least_sinr_db=3.0), 1, by_threshold(3.0)),
+        (Reception("threshold", min_sinr_db=3.0), 1, by_threshold(3.0)),
         (Reception("table", table=TABLE), 1, by_table(TABLE)),
         *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in DSSS_RATES_BPS),
         *((Reception("802.11ag"), rate_bps, ieee80211ag(rate_bps)) for rate_bps in error_rates.OFDM_RATES_BPS),

@@ -1,4 +1,4 @@
-"""What people did to a run while it went on: `interventions.jsonl`, a line for each event given and each one ended.
+"""What people did to a run while it went on: `live_events.jsonl`, a line for each event given and each one ended.
 
 Each line is there before the event takes effect, and goes to the system in one write: a run that is killed can be
 repeated with all that was done to it. A line that is cut off at the end of the file is passed over.
@@ -16,33 +16,33 @@ from typing import Any, cast
 
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.record.names import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 
 
 @dataclass(frozen=True)
-class InterventionsRecord:
-    """The recorded interventions of a run."""
+class LiveEventsRecord:
+    """The recorded live_events of a run."""
 
     path: str  # within the run folder
     sha256: str  # of the file
     lines: int
 
 
-class InterventionsLog:
-    """Appends interventions to the file in a run folder."""
+class LiveEventsLog:
+    """Appends live_events to the file in a run folder."""
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / INTERVENTIONS
+        self._path = folder / LIVE_EVENTS
         self._sha256, self._lines, self._broken = hashlib.sha256(), 0, False
 
-    def keep(self, intervention: LiveEvent) -> None:
+    def keep(self, live_event: LiveEvent) -> None:
         """Write its line; OSError if that fails, and from then on: half a line may be there, which ends the record."""
         if self._broken:
             raise OSError(f"{self._path} could not be written before")
-        table = intervention.table
+        table = live_event.table
         what = {"end": True} if table is None else {"event": table}
-        line = json.dumps({"tick": intervention.tick, "number": intervention.number, **what}).encode() + b"\n"
+        line = json.dumps({"tick": live_event.tick, "number": live_event.number, **what}).encode() + b"\n"
         self._broken = True
         with self._path.open("ab", buffering=0) as file:
             if file.write(line) != len(line):
@@ -51,17 +51,17 @@ class InterventionsLog:
         self._lines += 1
         self._sha256.update(line)
 
-    def record(self) -> InterventionsRecord | None:
+    def record(self) -> LiveEventsRecord | None:
         """What was recorded; None if nothing was done to the run."""
-        return InterventionsRecord(INTERVENTIONS, self._sha256.hexdigest(), self._lines) if self._lines else None
+        return LiveEventsRecord(LIVE_EVENTS, self._sha256.hexdigest(), self._lines) if self._lines else None
 
 
-def read_interventions(folder: Path) -> tuple[tuple[LiveEvent, ...], str | None]:
+def read_live_events(folder: Path) -> tuple[tuple[LiveEvent, ...], str | None]:
     """What was done to the run of this folder, and the sha256 of its lines, None if there are none.
 
     BadInput names the line that is none of ours.
     """
-    path = folder / INTERVENTIONS
+    path = folder / LIVE_EVENTS
     try:
         data = path.read_bytes()
     except FileNotFoundError:

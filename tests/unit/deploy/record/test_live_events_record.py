@@ -7,9 +7,9 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Simulation, repeat
-from swarmwire.deploy.record.interventions import InterventionsLog, read_interventions
+from swarmwire.deploy.record.live_events import LiveEventsLog, read_live_events
 from swarmwire.deploy.record.recording import Recording
-from swarmwire.metrics.record.names import INTERVENTIONS
+from swarmwire.metrics.record.names import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.support.deploy.commands import LOSSY
 
@@ -18,8 +18,8 @@ DONE = (LiveEvent(3, 0, KILL), LiveEvent(9, 0, None))
 
 
 @pytest.fixture
-def log(tmp_path) -> InterventionsLog:
-    log = InterventionsLog(tmp_path)
+def log(tmp_path) -> LiveEventsLog:
+    log = LiveEventsLog(tmp_path)
     for one in DONE:
         log.keep(one)
     return log
@@ -28,22 +28,22 @@ def log(tmp_path) -> InterventionsLog:
 def test_what_was_kept_is_read_with_the_same_hash(tmp_path, log):
     record = log.record()
     assert record is not None
-    assert (record.path, record.lines) == (INTERVENTIONS, 2)
-    assert read_interventions(tmp_path) == (DONE, record.sha256)
+    assert (record.path, record.lines) == (LIVE_EVENTS, 2)
+    assert read_live_events(tmp_path) == (DONE, record.sha256)
 
 
 def test_a_run_to_which_nothing_was_done_has_no_record(tmp_path):
-    assert InterventionsLog(tmp_path).record() is None
-    assert read_interventions(tmp_path) == ((), None)
+    assert LiveEventsLog(tmp_path).record() is None
+    assert read_live_events(tmp_path) == ((), None)
 
 
 def test_a_line_that_was_cut_off_is_passed_over(tmp_path, log):
-    record, path = log.record(), tmp_path / INTERVENTIONS
+    record, path = log.record(), tmp_path / LIVE_EVENTS
     assert record is not None
     path.write_bytes(path.read_bytes() + b'{"tick": 12, "num')
-    assert read_interventions(tmp_path) == (DONE, record.sha256)
+    assert read_live_events(tmp_path) == (DONE, record.sha256)
     path.write_bytes(b'{"tick"')
-    assert read_interventions(tmp_path) == ((), None)
+    assert read_live_events(tmp_path) == ((), None)
 
 
 @pytest.mark.parametrize(
@@ -60,15 +60,15 @@ def test_a_line_that_was_cut_off_is_passed_over(tmp_path, log):
     ],
 )
 def test_a_line_that_is_none_of_ours_is_named(tmp_path, log, line):
-    path = tmp_path / INTERVENTIONS
+    path = tmp_path / LIVE_EVENTS
     path.write_text(path.read_text() + line + "\n")
     with pytest.raises(BadInput, match="line 3: ") as caught:
-        read_interventions(tmp_path)
+        read_live_events(tmp_path)
     assert "\n" not in str(caught.value)
 
 
 def test_after_a_line_that_could_not_be_written_there_is_no_other(tmp_path):
-    log = InterventionsLog(tmp_path / "nowhere")
+    log = LiveEventsLog(tmp_path / "nowhere")
     for _ in range(2):
         with pytest.raises(OSError):
             log.keep(DONE[0])
@@ -82,10 +82,10 @@ def test_an_event_that_cannot_be_recorded_does_not_happen_and_people_are_told(tm
     (tmp_path / "run").mkdir()
     record = Recording(rrd=False, tables=False)
     with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
-        (tmp_path / "run" / INTERVENTIONS).mkdir()
-        simulation.intervene(KILL)
+        (tmp_path / "run" / LIVE_EVENTS).mkdir()
+        simulation.apply_event(KILL)
         simulation.run()
-        (tmp_path / "run" / INTERVENTIONS).rmdir()
+        (tmp_path / "run" / LIVE_EVENTS).rmdir()
     assert simulation.result.events == ()
     assert "event 0 does not happen" in capsys.readouterr().err
     assert repeat(tmp_path / "run").same
@@ -94,12 +94,12 @@ def test_an_event_that_cannot_be_recorded_does_not_happen_and_people_are_told(tm
 def test_a_run_whose_record_is_gone_cannot_be_repeated_and_a_wrong_event_is_named(tmp_path):
     record = Recording(rrd=False, tables=False)
     with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
-        simulation.intervene(KILL)
+        simulation.apply_event(KILL)
         simulation.run()
-    path = tmp_path / "run" / INTERVENTIONS
+    path = tmp_path / "run" / LIVE_EVENTS
     path.write_text(path.read_text().replace("flock-1", "nobody"))
     with pytest.raises(BadInput, match="event 0 .*robots.names: "):
         repeat(tmp_path / "run")
     path.unlink()
-    with pytest.raises(BadInput, match=INTERVENTIONS):
+    with pytest.raises(BadInput, match=LIVE_EVENTS):
         repeat(tmp_path / "run")
