@@ -22,6 +22,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable
+from enum import Enum
 from functools import cache
 from types import CodeType, ModuleType
 from typing import Any, NoReturn, TypeVar, cast
@@ -149,7 +150,8 @@ def _own(function: Any) -> tuple[bytes, tuple[Any, ...]]:
                     if attribute in vars(value):
                         add_value(f"{name}.{attribute}", vars(value)[attribute])
         elif isinstance(value, type):
-            digest.update(repr((name, getattr(value, "_fields", ()))).encode())
+            members = [member.value for member in value] if issubclass(value, Enum) else []
+            digest.update(repr((name, getattr(value, "_fields", ()), members)).encode())
         elif isinstance(value, np.ndarray):
             digest.update(repr((name, value.dtype.descr, value.shape)).encode() + value.tobytes())
         elif isinstance(value, tuple):

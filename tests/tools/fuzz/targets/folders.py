@@ -65,7 +65,7 @@ class RunFolders(FolderTarget):
         with simulation:
             for tick in range(simulation.ticks):
                 if tick == 5:
-                    simulation.intervene({"do": "kill", "robots": {"count": 1}, "for_s": 0.5})
+                    simulation.apply_event({"do": "kill", "robots": {"count": 1}, "for_s": 0.5})
                 simulation.step()
         assert not (folder / RECORDING).exists()
 
