@@ -15,6 +15,14 @@ from tests.support.robots.rigs import RIGS
 from tests.support.waiting import until
 
 SLACK_S = 2.0  # of a machine that is busy
+OWN = [name for name, kind in RIGS.items() if issubclass(kind, OwnWireRig)]
+ON_OWN_WIRE = pytest.mark.parametrize("rig", OWN, indirect=True)
+
+
+@pytest.fixture(autouse=True)
+def soon_lost(rig: Rig) -> None:
+    """A robot that is silent for a moment counts as lost, before any driver is made."""
+    rig.silent_s = 0.3 if isinstance(rig, OwnWireRig) else 1.0
 
 
 def test_nobody_at_the_address_is_told_at_once(rig: Rig) -> None:
@@ -130,10 +138,6 @@ def test_to_stop_a_robot_that_is_not_connected_does_nothing(rig: Rig) -> None:
     assert rig.told().speeds == []
 
 
-OWN = [name for name, kind in RIGS.items() if issubclass(kind, OwnWireRig)]
-pytestmark = pytest.mark.parametrize("rig", OWN, indirect=True)
-
-
 @pytest.fixture
 def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
     """A link that passes everything on, with the rig's driver open at its end."""
@@ -144,12 +148,14 @@ def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
         rig.driver.close()
 
 
+@ON_OWN_WIRE
 def test_answers_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers = ByteByByte()
     for travel_m in (0.1, 0.2, 0.3):
         rig.come_back(readings(travel_m))
 
 
+@ON_OWN_WIRE
 def test_commands_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
     link.commands = ByteByByte()
     for linear_mps in (0.05, -0.02):
@@ -157,6 +163,7 @@ def test_commands_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyL
         rig.until_told(linear_mps, 1.0)
 
 
+@ON_OWN_WIRE
 def test_garbage_ends_the_connection_and_a_new_one_reads_on(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers = Before(b"\x77")
     sense_until_lost(rig)
@@ -165,6 +172,7 @@ def test_garbage_ends_the_connection_and_a_new_one_reads_on(rig: OwnWireRig, lin
     rig.come_back(readings(0.1))
 
 
+@ON_OWN_WIRE
 @pytest.mark.parametrize("size", [0, 1, 60])
 def test_a_robot_that_falls_silent_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
     link.answers = CutAfter(size)
@@ -175,6 +183,7 @@ def test_a_robot_that_falls_silent_within_an_answer_is_lost(rig: OwnWireRig, lin
     rig.come_back(readings(0.1))
 
 
+@ON_OWN_WIRE
 @pytest.mark.parametrize("size", [0, 1, 60])
 def test_a_robot_that_hangs_up_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
     link.answers = CutAfter(size, hang_up=True)
@@ -185,6 +194,7 @@ def test_a_robot_that_hangs_up_within_an_answer_is_lost(rig: OwnWireRig, link: F
     rig.come_back(readings(0.1))
 
 
+@ON_OWN_WIRE
 def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_comes(
     rig: OwnWireRig, link: FaultyLink
 ) -> None:
@@ -199,6 +209,7 @@ def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_co
     assert "hung_up" not in rig.driver.counts()
 
 
+@ON_OWN_WIRE
 def test_a_robot_that_cannot_be_reached_is_not_waited_for_by_who_stops_it(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers, link.commands = CutAfter(0), CutAfter(0)
     began_ns = rig.clock.now_ns()
@@ -208,6 +219,7 @@ def test_a_robot_that_cannot_be_reached_is_not_waited_for_by_who_stops_it(rig: O
     sense_until_lost(rig)
 
 
+@ON_OWN_WIRE
 def test_a_robot_goes_on_as_it_was_told_when_its_link_is_lost(rig: OwnWireRig, link: FaultyLink) -> None:
     rig.driver.act(Command(0.05, 0.0))
     rig.until_told(0.05, 0.0)

@@ -41,7 +41,7 @@ class Rig(ABC):
         limits: by "sense.field", the least and the greatest that the wire can tell; others have none.
         speed_resolution: the same of commands, in m/s and rad/s.
         farthest_m: how far a wheel may roll in a tick for the wire to tell it.
-        silent_s: the driver was told to call a robot lost that is silent for so long.
+        silent_s: drivers that are made call a robot lost that is silent for so long; long, for machines are busy.
         connect_s: drivers that are made wait so long for their robot.
     """
 
@@ -50,10 +50,9 @@ class Rig(ABC):
     limits: ClassVar[dict[str, tuple[float, float]]] = {}
     speed_resolution: ClassVar[tuple[float, float]]
     farthest_m: ClassVar[float] = 3.0
-    silent_s: ClassVar[float] = 0.3
 
     def __init__(self) -> None:
-        self.connect_s = 10.0
+        self.connect_s, self.silent_s = 10.0, 60.0
         self.clock, self.tick = WallClock(), 0
         self.body = self.made_body()
         self.gateway = self.made_gateway("")

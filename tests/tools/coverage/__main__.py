@@ -15,15 +15,8 @@ DATA = Path(".coverage")
 ENOUGH = Counted(lines=0.95, branches=0.90)
 # A worker that is killed at a time-out takes along what it has seen: the limit is for those that hang for ever.
 PYTEST = ["-m", "pytest", "-q", "-m", "not slow", "-n", "2", "--dist", "worksteal", "--timeout", "900"]
-# As `make test-all`, and once more what waits: tracing makes it longer.
-AGAIN = [
-    "--reruns",
-    "1",
-    "--only-rerun",
-    "ZError",
-    "--only-rerun",
-    "it did not come to hold",
-]
+# Network errors, as in `make test-all`; and waits that run out, since tracing slows the program.
+AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not come to hold"]
 PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
 THREADS = ["-p", "tests.tools.coverage.network_threads"]
 UNITS = [f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends", "world/gateways")]

@@ -219,7 +219,7 @@ def key_with_a_passphrase(fleet):
 
 
 @pytest.mark.parametrize(
-    ("bad", "told"),
+    ("bad", "message"),
     [
         (changed_key, "another machine.*swarmwire robots check --trust"),
         (unknown_key, "is not in.*swarmwire robots check --trust"),
@@ -228,10 +228,10 @@ def key_with_a_passphrase(fleet):
         (key_with_a_passphrase, "/locked cannot be used"),
     ],
 )
-def test_a_host_that_does_not_let_us_in_is_told_with_its_cure_and_sent_nothing(fleet, robots, bad, told):
+def test_a_host_that_does_not_let_us_in_is_told_with_its_cure_and_sent_nothing(fleet, robots, bad, message):
     fleet.add("good")
     host = bad(fleet)
-    assert re.search(told, fails(robots, "bad"))
+    assert re.search(message, fails(robots, "bad"))
     assert host.commands == []
 
 

@@ -47,7 +47,6 @@ class Ros2Rig(Rig):
         "battery.voltage_v": SINGLE,
     }
     speed_resolution: ClassVar[tuple[float, float]] = (0.0, 0.0)
-    silent_s: ClassVar[float] = 1.0
     farthest_m: ClassVar[float] = 0.1  # a pose that moves further in a tick is no travel of wheels
     transport: ClassVar[str] = "bridge"
     stamped: ClassVar[bool] = False
