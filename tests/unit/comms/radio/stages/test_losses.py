@@ -67,8 +67,5 @@ def test_the_radio_graph_counts_each_loss(name: str, radio: Radio):
     for enough in (0.3, 0.45, 0.55, 0.65, 0.9):
         lossy = replace(radio, min_delivery=enough, **LOSSES[name])
         medium = make_medium(lossy, TRIO, traces=RATIOS if lossy.trace else None)
-        alive = np.ones(TRIO, np.bool_)
-        medium.advance(0)
-        medium.hold(POSE, alive)
         joined = [pair for pair, delivery in zip([[0, 1], [0, 2], [1, 2]], worse, strict=True) if delivery >= enough]
-        assert medium.edges(POSE, alive).tolist() == joined
+        assert medium.step(0, POSE).edges.tolist() == joined
