@@ -10,7 +10,7 @@ from benchmarks.scenes import flocking
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.deploy import run, sweep
 from swarmwire.deploy.campaign.local_executor import usable_cores
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 ROBOTS, TICKS = 10, 600
 SEEDS = 250

@@ -10,7 +10,7 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 SETS = {"": None, "-all": list(METRICS)}  # by how the benchmark's name goes on
 

@@ -11,7 +11,7 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.runner_processes import RunnerProcesses
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 PLAIN = "benchmarks.plain_agent_host"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"

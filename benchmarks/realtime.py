@@ -7,7 +7,7 @@ from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.deploy import run
 from swarmwire.world.backends.pacing import LatencySummary
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 AGENT = "benchmarks.agents:Relay"
 MS_PER_S = 1000.0

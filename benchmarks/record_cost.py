@@ -11,8 +11,8 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.recorders import recorders
-from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import scenario_from
 
 
 def one_run(scenario: Scenario, folder: Path | None) -> tuple[float, Result]:

@@ -7,7 +7,7 @@ from typing import Any
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.deploy import run
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 KINDS = ("unix", "tcp", "tls")
 WARM_UP = 20

@@ -12,7 +12,7 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 
 class Timed:

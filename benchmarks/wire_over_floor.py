@@ -30,7 +30,7 @@ from swarmwire.comms.wire import frames, tick_frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 AGENT = "benchmarks.agents:TimedBoid"
 EVERY, WARM = 10, 20  # ticks

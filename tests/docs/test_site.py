@@ -27,7 +27,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.cli import app
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
-from swarmwire.world.scenario.file import scenario_schema
+from swarmwire.world.scenario_file import scenario_schema
 from tests.docs.pages import ROOT
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
 
 FASTEST = 1e6  # factor in real time
 MIN_SUBTICK_S = 0.001

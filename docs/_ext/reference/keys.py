@@ -5,7 +5,7 @@ from typing import Any
 
 from reference.markdown import NOTHING, code, sentence, table, toml, toml_code
 from reference.schema_values import variants_of, without_null, words_of
-from swarmwire.world.scenario.file import scenario_schema
+from swarmwire.world.scenario_file import scenario_schema
 
 HEAD = ("key", "value", "default", "meaning")
 

@@ -11,7 +11,7 @@ from swarmwire.deploy.new_medium import new_medium
 from swarmwire.deploy.rehearsal import rehearse
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.swarm.speed import Speed
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "robots" / "flocking-epuck2.toml"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.tick_io import Actions
-from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 
 SAMPLE: dict[str, Any] = {

@@ -22,7 +22,7 @@ from swarmwire.world.backends.allocation import split, whole
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.agent.hosts import spec
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.arguments import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.world.samples import changed
 
 SCENARIO = scenario_from(changed("seed", 5), "mine.toml")

@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import LOSSY, called
 
 AGENTS = """

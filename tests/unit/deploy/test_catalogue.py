@@ -27,9 +27,9 @@ from swarmwire.deploy.catalogue.kinds import KINDS
 from swarmwire.deploy.catalogue.text import print_entry, print_list
 from swarmwire.deploy.catalogue.units import unit_of
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.scenario.file import scenario_schema
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form
+from swarmwire.world.scenario_file import scenario_schema
 from tests.support.deploy.commands import LOSSY, ROOT, called
 from tests.support.metrics.packages import install
 

@@ -9,7 +9,7 @@ from swarmwire.deploy.campaign.responses import responses_of
 from swarmwire.deploy.campaign.row import row_of
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.metrics.packages import CODE
 
 SCENARIO = """

@@ -12,7 +12,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import LOSSY, ROOT
 
 WALLED = ROOT / "scenarios" / "flocking-802154.toml"

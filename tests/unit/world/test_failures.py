@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, commanded, posed
 

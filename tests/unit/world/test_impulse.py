@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, posed
 from tests.unit.world.test_event_scheduler import Ahead, Watch

@@ -9,7 +9,7 @@ from swarmwire.comms.events.robot_events import Kill
 from swarmwire.world.live_events import MAX_WAITING, LiveEvent, LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed, posed
 from tests.unit.world.test_event_scheduler import Ahead, Watch

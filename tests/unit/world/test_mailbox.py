@@ -4,7 +4,7 @@ import numpy as np
 
 from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.world.loop import Mailbox
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed
 

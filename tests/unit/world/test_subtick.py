@@ -16,7 +16,7 @@ from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.new_medium import new_medium
 from swarmwire.world.loop import Loop
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.world import World
 from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_medium, scattered

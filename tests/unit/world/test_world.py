@@ -6,7 +6,7 @@ import pytest
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import Actions
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
 

@@ -27,7 +27,7 @@ from swarmwire.world.event_scheduler import EventProgress
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import Node, OneOf
 from swarmwire.world.scenario.tables import Table
-from swarmwire.world.scenario.validation import check_event, fault
+from swarmwire.world.validation import check_event, fault
 
 KEY = "event"
 AT_S = "at_s"

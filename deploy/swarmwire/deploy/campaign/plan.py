@@ -17,8 +17,8 @@ from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.metrics.campaign.response import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
-from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
+from swarmwire.world.scenario_file import load_scenario, scenario_from
 
 MAX_RUNS = 10_000_000
 

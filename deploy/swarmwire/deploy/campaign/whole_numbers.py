@@ -6,9 +6,9 @@ from typing import Any, cast
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.deploy.agents import agent_specs
-from swarmwire.world.scenario.file import scenario_schema
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario.schema import Node, plain
+from swarmwire.world.scenario_file import scenario_schema
 
 
 def whole_numbers(scenario: Scenario) -> Callable[[str], bool]:

@@ -5,7 +5,7 @@ from functools import cache
 
 from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.schema_parameters import parameters_of_schema
-from swarmwire.world.scenario.file import scenario_schema
+from swarmwire.world.scenario_file import scenario_schema
 
 
 def keys() -> list[Entry]:

@@ -8,7 +8,7 @@ from swarmwire.deploy.commands.options import Overrides, ScenarioFile
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario without running it: keys, values, agents, what they need, and room for everything."""
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.world.scenario.file import load_scenario
+    from swarmwire.world.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
     simulation = Simulation(checked)

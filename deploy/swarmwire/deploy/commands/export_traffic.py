@@ -56,7 +56,7 @@ def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     """The radio of a run whose packets were recorded, and the kind of link that captures know it as."""
     from swarmwire.metrics.capture.link_headers import link_of
     from swarmwire.metrics.record.names import SCENARIO
-    from swarmwire.world.scenario.file import load_scenario
+    from swarmwire.world.scenario_file import load_scenario
 
     radio = load_scenario(run / SCENARIO).radio
     if radio is None:

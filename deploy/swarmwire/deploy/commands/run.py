@@ -105,7 +105,7 @@ def run_command(
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.world.scenario.file import load_scenario
+    from swarmwire.world.scenario_file import load_scenario
 
     if ui:
         UI.need("--ui")

@@ -88,7 +88,7 @@ def world_command(
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.deploy.terminal.gathering import Gathering
-    from swarmwire.world.scenario.file import load_scenario
+    from swarmwire.world.scenario_file import load_scenario
 
     if ui:
         UI.need("--ui")

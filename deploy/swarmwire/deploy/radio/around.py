@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 
 
 def checked_radio(table: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Radio:

@@ -14,8 +14,8 @@ from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.record.names import SCENARIO, STATIC
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns, runs_of_campaign, runs_of_folder
-from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 
 

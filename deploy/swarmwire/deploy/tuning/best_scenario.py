@@ -11,7 +11,7 @@ from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.trial import Trial
 from swarmwire.deploy.tuning.tuning import Tuning, scenario_file
 from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 
 FILE = "best.toml"
 

@@ -3,7 +3,7 @@
 import pytest
 
 from swarmwire.deploy import Result, run
-from swarmwire.world.scenario.file import load_scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import ROOT
 
 FOLDER = ROOT / "scenarios" / "robots"

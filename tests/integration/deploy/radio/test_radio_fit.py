@@ -6,7 +6,7 @@ import tomllib
 
 import pytest
 
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.deploy.commands import ROOT, called
 
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"

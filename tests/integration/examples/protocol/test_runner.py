@@ -17,8 +17,8 @@ from swarmwire.comms.wire import frames
 from swarmwire.deploy import backends, repeat, run
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.runner_processes import RunnerProcesses
-from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.deploy.joiners import HERE, Joiners
 

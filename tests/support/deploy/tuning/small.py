@@ -15,8 +15,8 @@ from swarmwire.deploy.tuning.plan import TuningAsked, TuningPlan, planned_tuning
 from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune, resume_tune
 from swarmwire.deploy.tuning.search import asked_search
 from swarmwire.deploy.tuning.seeds import fresh_seeds
-from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import mapping_of
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.campaign.small import InThisProcess
 
 SCENARIO = """

@@ -22,7 +22,7 @@ from swarmwire.deploy.page.orders import Order
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.agent.runners import assigned_robots
 from tests.tools.fuzz.mutations import JSON, TEXTS, one_in, pick
 from tests.tools.fuzz.small_run import SCENARIO, small_run

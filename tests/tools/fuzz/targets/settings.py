@@ -24,8 +24,8 @@ from swarmwire.deploy.fleet.robot_settings import robot_settings
 from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.world.scenario.file import load_scenario
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.target import File, FolderTarget, Target, check_refusal, mutated_file
 from tests.unit.agent.on_robot.test_settings_file import WHOLE

@@ -13,8 +13,8 @@ from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
-from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
 from tests.support.world.samples import commanded

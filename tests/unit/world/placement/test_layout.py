@@ -14,7 +14,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Patch
 from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
-from swarmwire.world.scenario.file import load_scenario, scenario_from
+from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import SAMPLE, changed
 

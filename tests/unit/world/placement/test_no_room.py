@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import changed
 

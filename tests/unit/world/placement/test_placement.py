@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle, Static
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.samples import SAMPLE, changed
 

@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body, sheet_path
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors import loading
 
 

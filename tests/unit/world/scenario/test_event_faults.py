@@ -8,7 +8,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.robot_events import Kill
 from swarmwire.comms.events.selection import Selection
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.world.samples import SAMPLE, changed
 
 FLOCK = {"group": "flock"}

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario.tables import MetricTable
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.world.samples import changed
 
 FAULTS: list[tuple[str, Any, str]] = [

@@ -9,8 +9,8 @@ from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.world.scenario.file import scenario_from
 from swarmwire.world.scenario.scenario import mapping_of
+from swarmwire.world.scenario_file import scenario_from
 from tests.support.world.samples import SAMPLE
 
 

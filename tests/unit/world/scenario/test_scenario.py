@@ -8,8 +8,8 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.world.scenario.file import load_scenario, scenario_from, scenario_schema
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.support.world.samples import SAMPLE, changed, without
 
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}

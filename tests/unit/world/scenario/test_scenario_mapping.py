@@ -4,9 +4,9 @@ import tomllib
 
 import pytest
 
-from swarmwire.world.scenario.file import load_scenario, scenario_from
 from swarmwire.world.scenario.scenario import mapping_of, same_content
 from swarmwire.world.scenario.schema import Node, plain, words
+from swarmwire.world.scenario_file import load_scenario, scenario_from
 from tests.support.deploy.commands import LOSSY, ROOT
 
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))

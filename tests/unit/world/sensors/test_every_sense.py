@@ -11,7 +11,7 @@ import pytest
 from swarmwire.comms.plugins import NotLoaded
 from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec
-from swarmwire.world.scenario.file import scenario_from
+from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import truth_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 from swarmwire.world.world import World

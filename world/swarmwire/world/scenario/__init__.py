@@ -1,1 +1,1 @@
-"""The scenario: from a file to checked, frozen tables."""
+"""The tables of a scenario, checked each by itself; `scenario_file` reads them, `validation` checks how they fit."""

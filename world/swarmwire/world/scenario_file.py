@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from swarmwire.comms.config import check_format, from_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.validation import check, fault
+from swarmwire.world.validation import check, fault
 
 FORMAT = 1  # the format number in a scenario's file
 
