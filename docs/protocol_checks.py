@@ -58,17 +58,17 @@ Comparison = tuple[str, Any, Any]  # of what, as the page has it, as the code ha
 def _joining(page: _Page) -> Iterator[Comparison]:
     version = str(frames.VERSION)
     yield "the version in examples", set(re.findall(r'"v": (\d)', page.text)), {version}
-    for name in ("offer", "join request", "assignment", "frame"):
+    for name in ("session_info", "join request", "assignment", "frame"):
         yield f"the version in {name}", page.table(name).get("v", ["", ""])[1], version
     keys = Keys("RUN")
-    named = {f"`{getattr(keys, of)('NAME')}`" for of in ("offer", "join", "alive", "frame", "answer")}
+    named = {f"`{getattr(keys, of)('NAME')}`" for of in ("session_info", "join", "alive", "frame", "answer")}
     named.add(f"`{keys.world}`")
     yield "keys", named & set(page.text.split()), named
     group = GroupAssignment("g", "a", {}, load_body("epuck"), ROWS, ("g-0", "g-1"), np.zeros(2, np.uint64))
     assigned = Assignment((group,), 1, ()).as_mapping()
     for name, keys_of_it in {
-        "offer": _names(SessionInfo) | {"v"},
-        "offered group": _names(GroupInfo),
+        "session_info": _names(SessionInfo) | {"v"},
+        "group": _names(GroupInfo),
         "join request": _names(JoinRequest) | {"v"},
         "assignment": {*assigned, "v", "memory"},
         "assigned group": set(assigned["groups"][0]),

@@ -158,7 +158,9 @@ def _awaited_runs(session: zenoh.Session) -> set[str]:
 
 
 def _session_info(session: zenoh.Session, keys: Keys, runner: str) -> SessionInfo:
-    for reply in session.get(keys.offer(runner), payload=msgpack.packb({"v": VERSION}), timeout=SESSION_INFO_TIMEOUT_S):
+    for reply in session.get(
+        keys.session_info(runner), payload=msgpack.packb({"v": VERSION}), timeout=SESSION_INFO_TIMEOUT_S
+    ):
         if reply.err is not None:
             raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string())
         if reply.ok is not None:

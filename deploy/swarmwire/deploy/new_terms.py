@@ -40,7 +40,7 @@ def new_terms(
         )
         for group in static.groups
     )
-    offer = SessionInfo(
+    session_info = SessionInfo(
         run=run_id,
         scenario=scenario.name,
         scenario_sha256=_sha256(scenario.source),
@@ -49,7 +49,7 @@ def new_terms(
         real_time=factor,
         groups=groups,
     )
-    return JoinPolicy(offer, True, listening.start_with, listening.limits, kept)
+    return JoinPolicy(session_info, True, listening.start_with, listening.limits, kept)
 
 
 def _sha256(source: str) -> str:

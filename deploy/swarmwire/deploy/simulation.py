@@ -375,7 +375,7 @@ class Simulation:
             clock=self._clock,
             health=self.health,
             counts=lambda: self._loop.counts() if self._loop else {},
-            radio=lambda: self.live_events.course.radio,
+            radio=lambda: self.live_events.progress.radio,
             events=self.live_events.told,
         )
 

@@ -28,7 +28,7 @@ MEASURES = {
 }
 COLUMNS = tuple(MEASURES)
 
-ARENA, OBSTACLE, FAINT = "arena.size_m", "arena.obstacles.0.radius_m", "robots.walkers.params.faint"
+ARENA, OBSTACLE, FAINT = "arena.size_m", "arena.obstacles.0.radius_m", "robots.walkers.params.detection_threshold"
 BLIND = 2.0  # no ray answers so much
 SHOWN = ("coverage.final", "oscillation.final", "deadlocked.mean")
 
@@ -41,7 +41,10 @@ def side_m(size: str) -> float:
 def points(runs: pl.DataFrame) -> list[tuple[float, float, bool, pl.DataFrame]]:
     """Side and radius in m, whether the robots look, and the runs, by point."""
     groups = runs.group_by(ARENA, OBSTACLE, FAINT, maintain_order=True)
-    return [(side_m(size), float(radius), faint < BLIND, of) for (size, radius, faint), of in groups]
+    return [
+        (side_m(size), float(radius), detection_threshold < BLIND, of)
+        for (size, radius, detection_threshold), of in groups
+    ]
 
 
 def mean_of(runs: pl.DataFrame, measure: str) -> Summary:

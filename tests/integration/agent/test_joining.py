@@ -64,9 +64,9 @@ def test_a_runner_that_is_removed_is_told_why() -> None:
 
 
 def test_an_agent_that_fails_is_told_to_the_world_before_the_runner_ends() -> None:
-    offer = OFFER.replace(b"players.py:Counter", b"players.py:Failing")
+    session_info = OFFER.replace(b"players.py:Counter", b"players.py:Failing")
     robots = given().replace(b"players.py:Counter", b"players.py:Failing")
-    with made_up_world(offer, robots) as world:
+    with made_up_world(session_info, robots) as world:
         world.to_send = [*ticks_of(0, 1, 2, 3), END]
         played(world)
         failed = world.answers[-1]
@@ -102,7 +102,7 @@ def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
 
 
 @pytest.mark.parametrize(
-    ("offer", "robots", "expected"),
+    ("session_info", "robots", "expected"),
     [
         (None, given(), REFUSED),
         (b"\xc1", given(), "another version of swarmwire"),
@@ -115,8 +115,8 @@ def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
         (OFFER, given(memory=b"\xc1"), "the world's answer to join is none"),
     ],
 )
-def test_who_is_not_let_in_is_told_why(offer: bytes | None, robots: bytes | None, expected: str) -> None:
-    with made_up_world(offer, robots) as world:
+def test_who_is_not_let_in_is_told_why(session_info: bytes | None, robots: bytes | None, expected: str) -> None:
+    with made_up_world(session_info, robots) as world:
         assert expected in refusal(world)
 
 

@@ -36,22 +36,22 @@ class MadeUpWorld:
         holds: whether it keeps those who ask for robots waiting, until `go_on`.
     """
 
-    def __init__(self, session: zenoh.Session, run: str, offer: bytes | None, join: bytes | None) -> None:
+    def __init__(self, session: zenoh.Session, run: str, session_info: bytes | None, join: bytes | None) -> None:
         self.keys, self.endpoint = Keys(run), listens_at(session)[0]
         self.asked: list[bytes] = []
         self.answers: list[frames.Frame] = []
         self.to_send: list[bytes] = []
         self.holds, self._held = False, list[zenoh.Query]()
-        self._session, self._replies = session, {self.keys.any_offer: offer, self.keys.any_join: join}
+        self._session, self._replies = session, {self.keys.any_session_info: session_info, self.keys.any_join: join}
         self._declared = (
-            session.declare_queryable(self.keys.any_offer, Callback(self._offer, indirect=False)),
+            session.declare_queryable(self.keys.any_session_info, Callback(self._offer, indirect=False)),
             session.declare_queryable(self.keys.any_join, Callback(self._join, indirect=False)),
             session.declare_subscriber(self.keys.any_answer, Callback(self._answer, indirect=False)),
             session.liveliness().declare_token(self.keys.world),
         )
 
     def _offer(self, query: zenoh.Query) -> None:
-        self._reply(query, self.keys.any_offer)
+        self._reply(query, self.keys.any_session_info)
 
     def _join(self, query: zenoh.Query) -> None:
         assert query.payload is not None
@@ -85,10 +85,10 @@ class MadeUpWorld:
 
 @contextmanager
 def made_up_world(
-    offer: bytes | None = OFFER,
+    session_info: bytes | None = OFFER,
     join: bytes | None = given(),
     run: str = "run1",
 ) -> Generator[MadeUpWorld]:
     """A world at a port that the system chooses."""
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
-        yield MadeUpWorld(session, run, offer, join)
+        yield MadeUpWorld(session, run, session_info, join)

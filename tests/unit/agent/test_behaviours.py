@@ -214,7 +214,7 @@ def test_avoidance_goes_by_the_sum_of_all_rays() -> None:
 def test_avoidance_takes_faint_answers_for_noise() -> None:
     noise = 0.09 * one_ray(60.0, 0.005)
     assert command(Avoidance, noise) == command(Avoidance, NOTHING) == AHEAD
-    assert command(Avoidance, noise, faint=0.05) == (0.0, -AWAY_RADPS)
+    assert command(Avoidance, noise, detection_threshold=0.05) == (0.0, -AWAY_RADPS)
 
 
 def test_avoidance_turns_on_an_arc_if_asked_to() -> None:

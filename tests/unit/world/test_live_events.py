@@ -71,7 +71,7 @@ def test_an_event_is_ended_once_and_only_if_it_goes_on():
     given = door()
     number = given.give(KILL)
     given.take(0, RATE_HZ)
-    given.course.begun[number] = 0
+    given.progress.begun[number] = 0
     given.end(number)
     assert given.take(1, RATE_HZ) == [(number, None)]
     for wrong, line in (
@@ -81,7 +81,7 @@ def test_an_event_is_ended_once_and_only_if_it_goes_on():
         (0, "expected an event that has begun; 0, a kill, has not"),
         (1, "expected an event that lasts; 1 is a revive, which happens once"),
     ):
-        given.course.over.add(number)
+        given.progress.over.add(number)
         with pytest.raises(BadInput, match="^event: ") as caught:
             given.end(wrong)
         assert line in str(caught.value)
@@ -151,7 +151,7 @@ def test_an_event_whose_end_cannot_be_recorded_goes_on():
     given = door(keep=ends_do_not_fit)
     number = given.give({**KILL, "for_s": 9.0})
     given.take(0, RATE_HZ)
-    given.course.begun[number] = 0
+    given.progress.begun[number] = 0
     given.end(number)
     assert given.take(1, RATE_HZ) == []
     assert not given.told()[-1]["over"]

@@ -49,15 +49,15 @@ class EventScheduler:
         static: Static,
         keys: KeyArray,
         radio: Radio | None = None,
-        course: EventProgress | None = None,
+        progress: EventProgress | None = None,
     ) -> None:
-        """`radio` is the scenario's; `course` is told how far the events have come."""
+        """`radio` is the scenario's; `progress` is told how far the events have come."""
         self._events = dict(enumerate(events))
-        self._course, self._rate_hz = course or EventProgress(), static.rate_hz
+        self._progress, self._rate_hz = progress or EventProgress(), static.rate_hz
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
         rows = len(keys) * static.robots
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
-        self._radio = self._course.radio = radio
+        self._radio = self._progress.radio = radio
         self._conditions = ActiveEffects(self._swarm.rows)
         self._evolving: list[int] = []  # numbers of events that go on changing things
         self._coming: list[tuple[int, bool, int]] = []  # in order: time in ns, whether it begins, number
@@ -72,7 +72,7 @@ class EventScheduler:
     def end(self, serial: int, start_ns: int) -> None:
         """Undo an event in the tick that starts then, instead of at its own time; none if it is over by then."""
         self._coming = [item for item in self._coming if item[2] != serial or item[1]]
-        if serial in self._course.begun and serial not in self._course.over:
+        if serial in self._progress.begun and serial not in self._progress.over:
             insort(self._coming, (start_ns, False, serial))
 
     def apply(self, start_ns: int, world: World) -> Effects:
@@ -99,10 +99,10 @@ class EventScheduler:
         """The radio's parameters from now on; None if the run has no radio, or if they stay."""
         if self._radio is None:
             return None
-        radio, known = self._conditions.radio_at(self._radio, start_ns), self._course.radio
+        radio, known = self._conditions.radio_at(self._radio, start_ns), self._progress.radio
         if radio is known or radio == known:  # mostly the same object, which costs nothing
             return None
-        self._course.radio = radio
+        self._progress.radio = radio
         return radio
 
     def _plan(self, serial: int, event: Event, at_ns: int) -> None:
@@ -114,9 +114,9 @@ class EventScheduler:
         event, conditions = self._events[serial], self._conditions
         if begins:
             # The tick is rounded up, as its start was rounded down to a whole number of ns.
-            self._course.begun[serial] = -(-start_ns * self._rate_hz // NS_PER_S)
+            self._progress.begun[serial] = -(-start_ns * self._rate_hz // NS_PER_S)
         if not begins or not event.undoable:
-            self._course.over.add(serial)
+            self._progress.over.add(serial)
         if event.evolves:
             (self._evolving.append if begins else self._evolving.remove)(serial)
         changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)

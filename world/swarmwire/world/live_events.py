@@ -33,7 +33,7 @@ KEY = "event"
 AT_S = "at_s"
 
 
-class GivenTable(Table):
+class SubmittedEvent(Table):
     """What somebody gives: one event."""
 
     event: Annotated[Event, OneOf("do", ACTIONS)]
@@ -48,7 +48,7 @@ def event_of(table: Mapping[str, Any], scenario: Scenario, bodies: Mapping[str, 
         raise BadInput("", AT_S, "expected no time: an event that is given takes effect at the start of the next tick")
     given = {KEY: {**deepcopy(dict(table)), AT_S: 0.0}}
     try:
-        event = GivenTable.model_validate(given).event
+        event = SubmittedEvent.model_validate(given).event
         check_event(scenario, bodies, event, KEY, "")
     except ValidationError as error:
         raise _as_given(fault(error, _schema(), "")) from None
@@ -63,7 +63,7 @@ def _as_given(error: BadInput) -> BadInput:
 
 @cache
 def _schema() -> Node:
-    return GivenTable.model_json_schema()
+    return SubmittedEvent.model_json_schema()
 
 
 MAX_TOLD = 200
@@ -106,7 +106,7 @@ class LiveEvents:
         self._replayed: dict[int, list[LiveEvent]] | None = None if replayed is None else {}
         for given in replayed or ():
             self._replay(given)
-        self.course = EventProgress(radio=scenario.radio)
+        self.progress = EventProgress(radio=scenario.radio)
 
     def give(self, table: Mapping[str, Any]) -> int:
         """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
@@ -146,7 +146,7 @@ class LiveEvents:
                 )
             if self._is_over(number):
                 raise BadInput("", "event", f"expected an event that goes on; {number}, a {event.do}, is over")
-            if number < len(self._scenario.events) and number not in self.course.begun:
+            if number < len(self._scenario.events) and number not in self.progress.begun:
                 raise BadInput("", "event", f"expected an event that has begun; {number}, a {event.do}, has not")
             self._undo(number)
 
@@ -183,7 +183,7 @@ class LiveEvents:
             return [
                 {
                     "number": number,
-                    "tick": self.course.begun.get(number),
+                    "tick": self.progress.begun.get(number),
                     "do": self._events[number].do,
                     "text": self._text(number),
                     "over": self._is_over(number),
@@ -199,11 +199,11 @@ class LiveEvents:
 
     def _radios(self) -> list[Radio]:
         """The radio as events have made it by now, and as those that go on or wait will have made it."""
-        now = to_come = self.course.radio
+        now = to_come = self.progress.radio
         if now is None or to_come is None:
             return []
         for number, event in self._events.items():
-            known = number in self.course.begun or number >= len(self._scenario.events)
+            known = number in self.progress.begun or number >= len(self._scenario.events)
             if isinstance(event, Ramp) and known and not self._is_over(number):
                 to_come = with_number(to_come, event.what, event.to)
         return [now, to_come]
@@ -221,7 +221,7 @@ class LiveEvents:
 
     def _is_over(self, number: int) -> bool:
         waits_for_its_end = any(waiting == number and table is None for waiting, table in self._waiting)
-        return number in self.course.over or number in self._dropped or waits_for_its_end
+        return number in self.progress.over or number in self._dropped or waits_for_its_end
 
     def _undo(self, number: int) -> None:
         """Have it end; one that still waits for a tick never begins."""

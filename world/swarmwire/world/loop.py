@@ -97,7 +97,7 @@ class Loop:
         self._stop_conditions = stop_conditions
         self._running, self._left_after = world.running.copy(), np.zeros(world.static.arenas, np.int64)
         self._live_events = live_events
-        progress = live_events.course if live_events else None
+        progress = live_events.progress if live_events else None
         self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, progress)
         self._mailbox = Mailbox(world.static)
         self._timed = timed

@@ -59,12 +59,14 @@ class Aggregation(VectorAgent[Gathering]):
     approach_m: float = 0.1  # length of a spell towards or away from neighbours
     spell_m: float = 1.0  # mean length of a spell where nobody is received, exponential
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    detection_threshold: float = (
+        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    )
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Spells and turns end, and no rate is negative."""
-        check_above_zero(params, "spell_m", "approach_m", "turn_radps", "faint")
+        check_above_zero(params, "spell_m", "approach_m", "turn_radps", "detection_threshold")
         check_not_negative(params, "leave_per_s", "return_per_s")
 
     def step(self, robots: Robots, state: Gathering) -> None:
@@ -98,6 +100,6 @@ class Aggregation(VectorAgent[Gathering]):
         length = np.where(receives, self.approach_m, spell_lengths(robots, self.spell_m))
         walks = state.at != WAIT
         begin_spells(state, walks & ended(state), turn, length)
-        blocked, away = turns_away(robots, self.faint)
+        blocked, away = turns_away(robots, self.detection_threshold)
         begin_spells(state, walks & blocked & (state.turn_rad == 0.0), away, length)
         walk_on(robots, state, self.speed_mps, self.turn_radps, walks)

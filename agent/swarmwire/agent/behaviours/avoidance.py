@@ -21,8 +21,8 @@ class Avoidance(VectorAgent):
     round; one dead ahead counts as to the right.
 
     Where the paper is silent this is our reading: the obstacle's distance is that of the nearest ray; while
-    no ray answers at least `faint` there is none, since noise alone has a sum too; the turn is on the spot, or on an
-    arc with `turn_mps` above 0. There is no memory: between obstacles to both sides a robot may dither.
+    no ray answers at least `detection_threshold` there is none, since noise alone has a sum too; the turn is on the
+    spot, or on an arc with `turn_mps` above 0. There is no memory: between obstacles to both sides a robot may dither.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
@@ -32,14 +32,16 @@ class Avoidance(VectorAgent):
     safe_m: float = 0.03  # an obstacle ahead is harmless if its nearest point is farther than this from the rim
     ahead_rad: float = 0.7854  # half width of the sector ahead (45 degrees)
     behind_rad: float = 2.618  # an obstacle is behind beyond this angle to either side (150 degrees)
-    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    detection_threshold: float = (
+        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    )
 
     def step(self, robots: Robots, state: State) -> None:
         """Straight, or turning."""
         proximity = robots.proximity
         x, y = proximity.vector_sum()
         angle = np.arctan2(y, x)
-        nothing = np.max(proximity.value, axis=1) < self.faint
+        nothing = np.max(proximity.value, axis=1) < self.detection_threshold
         behind = np.abs(angle) > self.behind_rad
         far_ahead = (np.abs(angle) <= self.ahead_rad) & (np.min(proximity.distance_m, axis=1) > self.safe_m)
         harmless = nothing | behind | far_ahead
@@ -86,9 +88,11 @@ class ThresholdRuleProximity(ThresholdRule):
     safe_m: float = 0.04  # least distance from the rim at which the robot goes on
     speed_mps: float = 0.1  # straight ahead
     back_mps: float = 0.05  # backwards, while anything is nearer
-    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    detection_threshold: float = (
+        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    )
 
     def nearest_m(self, robots: Robots) -> FloatArray:
         """The least distance of all rays with an answer, (n,), from the rim; inf if none has one."""
         proximity = robots.proximity
-        return np.min(np.where(proximity.value >= self.faint, proximity.distance_m, np.inf), axis=1)
+        return np.min(np.where(proximity.value >= self.detection_threshold, proximity.distance_m, np.inf), axis=1)

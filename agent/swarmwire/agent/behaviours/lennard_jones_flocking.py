@@ -34,7 +34,8 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
 
     with t = `target_m`, e = `exponent`, and d its range in m: negative, so away from the neighbour, if that is nearer
     than t. Their mean is cut to `speed_mps`, and a vector to the light of length `light` x `speed_mps` is added
-    wherever the photocells see one (vector sum at least `faint`). The sum's length, cut again, is the wheels' speed v;
+    wherever the photocells see one (vector sum at least `detection_threshold`). The sum's length, cut again, is the
+    wheels' speed v;
     its angle a to the way ahead says how they turn: a hard turn, one wheel back and one ahead at `speed_mps`, begins
     beyond 90 degrees and lasts until 70; no turn within 10 degrees; else a soft one, v (1 - |a| / 90) and
     v (1 + |a| / 90). The gap between 70 and 90 is hysteresis: it keeps a robot from dithering between kinds of turn.
@@ -51,7 +52,7 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
     exponent: float = 2.0  # e: how steep it is
     reach: float = 1.8  # neighbours farther than so many times t do not count
     light: float = 0.25  # length of the vector to the light, in `speed_mps`; 0: no goal
-    faint: float = 0.01  # least length of the photocells' vector sum that counts as a light
+    detection_threshold: float = 0.01  # least length of the photocells' vector sum that counts as a light
     hard_rad: float = 1.5708  # a hard turn begins beyond this angle (90 degrees)
     soft_rad: float = 1.2217  # and ends within this one (70 degrees)
     straight_rad: float = 0.1745  # no turn within this angle (10 degrees)
@@ -59,7 +60,7 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """What is divided by is above 0, and hysteresis has a gap."""
-        check_above_zero(params, "speed_mps", "target_m", "exponent", "faint", "hard_rad")
+        check_above_zero(params, "speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad")
         check_order(cls, params, "soft_rad", "hard_rad")
 
     def step(self, robots: Robots, state: Wheels) -> None:
@@ -84,7 +85,11 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
     def _to_light(self, robots: Robots) -> tuple[FloatArray, FloatArray]:
         x, y = robots.light.vector_sum()
         length = np.hypot(x, y)
-        scale = np.where(length >= self.faint, self.light * self.speed_mps / np.maximum(length, self.faint), 0.0)
+        scale = np.where(
+            length >= self.detection_threshold,
+            self.light * self.speed_mps / np.maximum(length, self.detection_threshold),
+            0.0,
+        )
         return scale * x, scale * y
 
     def _roll(self, robots: Robots, state: Wheels, x: FloatArray, y: FloatArray) -> None:

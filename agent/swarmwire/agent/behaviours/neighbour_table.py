@@ -9,7 +9,7 @@ from swarmwire.agent.vector_agent import FloatColumn, IntColumn, State, column
 from swarmwire.comms.arrays import FloatArray, IntArray
 
 SLOTS = 8  # neighbours that a robot remembers
-NOBODY = -1  # sender in an empty slot
+NO_ROBOT = -1  # sender in an empty slot
 
 
 class Remembered(State):
@@ -18,8 +18,8 @@ class Remembered(State):
     An empty slot has the sender NOBODY, and is infinitely old.
     """
 
-    sender: IntColumn = column(NOBODY, width=SLOTS)
-    sequence: IntColumn = column(NOBODY, width=SLOTS)  # of the newest packet
+    sender: IntColumn = column(NO_ROBOT, width=SLOTS)
+    sequence: IntColumn = column(NO_ROBOT, width=SLOTS)  # of the newest packet
     x_m: FloatColumn = column(0.0, width=SLOTS)
     y_m: FloatColumn = column(0.0, width=SLOTS)
     x_mps: FloatColumn = column(0.0, width=SLOTS)  # as its newest packet said
@@ -29,7 +29,7 @@ class Remembered(State):
 
 def known(table: Remembered) -> FloatArray:
     """1 for a slot that is taken, 0 for an empty one, (n, SLOTS)."""
-    return np.where(table.sender == NOBODY, 0.0, 1.0)
+    return np.where(table.sender == NO_ROBOT, 0.0, 1.0)
 
 
 def pass_time(table: Remembered, own_mps: Vectors, period_s: float) -> None:
@@ -63,7 +63,7 @@ def remember(
     if len(row) == 0:
         return
     new_columns = (sender, sequence, place_m.x, place_m.y, velocity_mps.x, velocity_mps.y, age_s)
-    held, slot = np.nonzero(table.sender != NOBODY)
+    held, slot = np.nonzero(table.sender != NO_ROBOT)
     rows = np.concatenate((held, row))
     both: dict[str, Any] = {
         name: np.concatenate((getattr(table, name)[held, slot], new))
@@ -79,7 +79,7 @@ def remember(
 def _newest(rows: IntArray, sender: IntArray, sequence: IntArray) -> IntArray:
     """Which of all entries is the newest of its row and sender."""
     order = np.lexsort((sequence, sender, rows))
-    last = (np.diff(rows[order], append=NOBODY) != 0) | (np.diff(sender[order], append=NOBODY) != 0)
+    last = (np.diff(rows[order], append=NO_ROBOT) != 0) | (np.diff(sender[order], append=NO_ROBOT) != 0)
     return order[last]
 
 

@@ -38,14 +38,15 @@ def ended(state: Walk) -> BoolArray:
     return (state.left_m <= 0.0) & (state.turn_rad == 0.0)
 
 
-def turns_away(robots: Robots, faint: float) -> tuple[BoolArray, FloatArray]:
+def turns_away(robots: Robots, detection_threshold: float) -> tuple[BoolArray, FloatArray]:
     """Robots with an obstacle ahead, and a turn to a heading uniform over the half circle away from it, (n,) each.
 
-    An obstacle is ahead if a ray of the front half answers at least `faint`; its direction is that of their vector sum.
+    An obstacle is ahead if a ray of the front half answers at least `detection_threshold`; its direction is that of
+    their vector sum.
     """
     near, ahead = robots.proximity, np.cos(robots.proximity.angle_rad) > 0.0
     value = np.where(ahead, near.value, 0.0)
-    blocked = np.max(value, axis=1) >= faint
+    blocked = np.max(value, axis=1) >= detection_threshold
     x = np.add.reduce(value * np.cos(near.angle_rad), 1)
     y = np.add.reduce(value * np.sin(near.angle_rad), 1)
     half_circle = robots.draw.uniform("turn away", -0.5 * np.pi, 0.5 * np.pi)
@@ -81,19 +82,21 @@ class RandomWalk(VectorAgent[Walk]):
     exponential: bool = True  # lengths are exponential; false: all are spell_m
     persistence: float = 0.0  # mean cosine of the turn between two spells, 0 to 1
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    detection_threshold: float = (
+        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    )
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Spells and turns end."""
-        check_above_zero(params, "spell_m", "turn_radps", "faint")
+        check_above_zero(params, "spell_m", "turn_radps", "detection_threshold")
         check_share(params, "persistence")
 
     def step(self, robots: Robots, state: Walk) -> None:
         """On with the spell, or with the turn to the next."""
         length = spell_lengths(robots, self.spell_m, self.exponential)
         begin_spells(state, ended(state), turns_at_random(robots, self.persistence), length)
-        blocked, away = turns_away(robots, self.faint)
+        blocked, away = turns_away(robots, self.detection_threshold)
         begin_spells(state, blocked & (state.turn_rad == 0.0), away, length)
         walk_on(robots, state, self.speed_mps, self.turn_radps)
 
@@ -159,12 +162,14 @@ class Coverage(VectorAgent[Walk]):
     repulsion_m2: float = 1.0  # a neighbour at the root of this, in m, pushes as much as chance
     nearest_m: float = 0.1  # a nearer neighbour pushes as at this range
     turn_radps: float = 2.0  # turn rate, on the spot
-    faint: float = 0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    detection_threshold: float = (
+        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
+    )
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
         """Spells and turns end, and every push is bounded."""
-        check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "faint")
+        check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "detection_threshold")
 
     def step(self, robots: Robots, state: Walk) -> None:
         """On with the spell, or with the turn to the next; and be received."""
@@ -176,7 +181,7 @@ class Coverage(VectorAgent[Walk]):
 
         length = spell_lengths(robots, self.spell_m)
         begin_spells(state, ended(state), np.arctan2(y, x), length)
-        blocked, away = turns_away(robots, self.faint)
+        blocked, away = turns_away(robots, self.detection_threshold)
         begin_spells(state, blocked & (state.turn_rad == 0.0), away, length)
         walk_on(robots, state, self.speed_mps, self.turn_radps)
         robots.radio.send(Present)

@@ -25,18 +25,18 @@ class PacketCounters:
         self._arenas, self._robots = arenas, robots
         self._open()
 
-    def take_up(self, packets: Transmissions) -> None:
+    def count_sent(self, packets: Transmissions) -> None:
         """Count packets that were sent."""
         arena = packets.sender // self._robots
         np.add.at(self._sent, arena, 1)
         np.add.at(self._intended, arena, packets.intended)
 
-    def settle(self, links: Links, until_ns: int) -> None:
+    def count_final(self, links: Links, until_ns: int) -> None:
         """Count the fates of links that are final by `until_ns`."""
         columns = links.sender, links.final_at_ns, links.fate, links.receivers, links.in_range
-        _settle(*columns, until_ns, self._robots, self._fates, self._in_range)
+        _count_final(*columns, until_ns, self._robots, self._fates, self._in_range)
 
-    def strand(self, links: Links, queued: Transmissions) -> None:
+    def count_in_flight(self, links: Links, queued: Transmissions) -> None:
         """Count the links under way and the queued packets at the end of the run as IN_FLIGHT."""
         np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receivers)
         np.add.at(self._fates[:, Fate.IN_FLIGHT], queued.sender // self._robots, queued.intended)
@@ -58,7 +58,7 @@ class PacketCounters:
 
 
 @njit()
-def _settle(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fates_out, in_range_out):
+def _count_final(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fates_out, in_range_out):
     for i in range(len(sender)):
         if final_at_ns[i] <= until_ns:
             arena = sender[i] // robots

@@ -192,7 +192,7 @@ class RadioMedium:
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
-        self._counters.strand(self._links, self._without_left(self._model.drain()))
+        self._counters.count_in_flight(self._links, self._without_left(self._model.drain()))
         self._keep(np.empty(0, np.int64))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
         self._parts = []
@@ -205,7 +205,9 @@ class RadioMedium:
         """
         leaving, queued = np.repeat(over, self._robots), self._without_left(self._model.queued)
         is_leaving = leaving[self._links.sender]
-        self._counters.strand(self._links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0])
+        self._counters.count_in_flight(
+            self._links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0]
+        )
         self._keep(np.flatnonzero(~is_leaving))
         counts = self._counters.close(over)
         if self._parts:
@@ -230,7 +232,7 @@ class RadioMedium:
 
     def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         packets = self._model.accept(sent_at_ns, sent, self._others_alive, self._liveness.epoch)
-        self._counters.take_up(packets)
+        self._counters.count_sent(packets)
 
     def _pass_time(self, until_ns: int) -> None:
         if until_ns < self._now_ns:
@@ -248,7 +250,7 @@ class RadioMedium:
         )
         if len(still_open) == len(links.fate):
             return replace(self._nothing, tally=self._counters.close(), tx_status=tx_status)
-        self._counters.settle(links, until_ns)
+        self._counters.count_final(links, until_ns)
         rows, robots = len(self._others_alive), self._robots
         final = Results(
             results.received(received, links, packets, self.radio.measures.columns, robots, rows),

@@ -148,7 +148,7 @@ def _rights_of_operator(keys: SwarmKeys) -> Rights:
 # The endpoints of a run. A unix socket, which only programs of its owner can open, needs no certificate and has the
 # rights of any runner or operator.
 #
-#     runner R    queries offer/R and join/R, is alive/R, puts answer/R, subscribes to frame/R and world
+#     runner R    queries session_info/R and join/R, is alive/R, puts answer/R, subscribes to frame/R and world
 #     observer    sees that the run is published, queries scene and status, subscribes to truth
 #     operator    as the observer, and queries control
 #     router      at the agents' endpoint the rights of all runners, at the observers' endpoint those of operators
@@ -230,7 +230,7 @@ def router_access(access: RunAccess) -> dict[str, Any]:
 def _runners(keys: Keys, names: Iterable[str]) -> Member:
     """The messages between a world and runners of these names."""
     names = list(names)
-    joins = [key for name in names for key in (keys.offer(name), keys.join(name))]
+    joins = [key for name in names for key in (keys.session_info(name), keys.join(name))]
     return Member(
         sends=[
             ("put", [keys.answer(name) for name in names]),
@@ -242,7 +242,7 @@ def _runners(keys: Keys, names: Iterable[str]) -> Member:
         receives=[
             ("put", [keys.frame(name) for name in names]),
             ("declare_subscriber", [keys.answer(ANY)]),
-            ("declare_queryable", [keys.offer(ANY), keys.join(ANY)]),
+            ("declare_queryable", [keys.session_info(ANY), keys.join(ANY)]),
             ("reply", joins),
             ("liveliness_token", [keys.world]),
             (LIVELINESS, [keys.alive(ANY)]),

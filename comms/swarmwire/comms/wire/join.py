@@ -91,7 +91,7 @@ class SessionInfo:
     @classmethod
     def decode(cls, data: bytes) -> "SessionInfo":
         """The session info in these bytes; BadFrame if they hold none, "version" if they are of another version."""
-        return typed(cls, versioned(data, frames.MAX_BYTES), "offer")  # with the names of all robots
+        return typed(cls, versioned(data, frames.MAX_BYTES), "session info")  # with the names of all robots
 
 
 @dataclass(frozen=True)

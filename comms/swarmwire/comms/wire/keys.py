@@ -33,14 +33,14 @@ class Keys:
     def __init__(self, run: str) -> None:
         self.root = f"swarmwire/{run}"
         self.world = f"{self.root}/world"  # liveliness token of the world
-        self.any_offer = f"{self.root}/offer/*"
+        self.any_session_info = f"{self.root}/session_info/*"
         self.any_join = f"{self.root}/join/*"
         self.any_answer = f"{self.root}/answer/*"
         self.any_alive = f"{self.root}/alive/*"
 
-    def offer(self, runner: str) -> str:
+    def session_info(self, runner: str) -> str:
         """Queryable: a runner requests the session info."""
-        return f"{self.root}/offer/{runner}"
+        return f"{self.root}/session_info/{runner}"
 
     def join(self, runner: str) -> str:
         """Queryable: a runner requests robots and gets its assignment."""

@@ -1,7 +1,5 @@
 """Stages of the radio: what a packet passes on its way to a receiver, in order."""
 
-import inspect
-
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import Stage
@@ -24,5 +22,5 @@ def _stage(kind: type[Stage | LossModel], place: int) -> Entry:
         help=first_line(kind.__doc__),
         facts=(("place", f"{place} of {len(ORDER)}"), ("in the chain", first_line(kind.of.__doc__))),
         tables=(ParameterTable("keys", keys),) if keys else (),
-        text="\n\n".join(paragraphs(inspect.getdoc(kind) or "")),
+        text=paragraphs(kind.__doc__),
     )

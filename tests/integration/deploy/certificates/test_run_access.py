@@ -65,7 +65,7 @@ def as_name(folder: Path, name: str) -> Network:
 
 
 class World:
-    """The agents' endpoint of a world: it answers to offer and join, and keeps what else it hears."""
+    """The agents' endpoint of a world: it answers to session_info and join, and keeps what else it hears."""
 
     def __init__(self, folder: Path, opened: ExitStack) -> None:
         network = as_name(folder, "world")
@@ -76,7 +76,7 @@ class World:
         self.received: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self.asked: list[str] = []
         self.alive: list[str] = []
-        for key in (KEYS.any_offer, KEYS.any_join):
+        for key in (KEYS.any_session_info, KEYS.any_join):
             self.session.declare_queryable(key, at_once(self._answer))
         self.session.declare_subscriber(KEYS.any_answer, at_once(self._hear))
         live = self.session.liveliness()
@@ -127,13 +127,13 @@ def test_a_runner_does_its_own_and_nothing_of_anothers(folder, world, endpoint, 
         a.put(key, b"forged", congestion_control=BLOCK)
     tokens = [a.liveliness().declare_token(key) for key in (KEYS.alive("b"), KEYS.world, KEYS.alive("a"))]
     until(lambda: world.alive)
-    for key in (KEYS.join("b"), KEYS.offer("b"), KEYS.join("*"), "swarmwire/**", KEYS.alive("b")):
+    for key in (KEYS.join("b"), KEYS.session_info("b"), KEYS.join("*"), "swarmwire/**", KEYS.alive("b")):
         assert replies(a, key) == []
-    assert replies(a, KEYS.offer("a")) == replies(a, KEYS.join("a")) == [b"yes"]
+    assert replies(a, KEYS.session_info("a")) == replies(a, KEYS.join("a")) == [b"yes"]
     a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
     assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
     assert world.received.empty()
-    assert world.asked == [KEYS.offer("a"), KEYS.join("a")]
+    assert world.asked == [KEYS.session_info("a"), KEYS.join("a")]
     assert world.alive == [KEYS.alive("a")]
     del tokens
 
@@ -166,7 +166,7 @@ def test_nobody_reads_anothers_frames_or_answers_or_poses_as_the_world(folder, w
 def test_who_is_revoked_or_no_runner_has_a_link_and_nothing_else(folder, world, name, opened):
     session = runner(folder, name, world.endpoint, opened)
     until(lambda: [link for link in world.session.info.links() if link.auth_identifier == name])
-    for key in (KEYS.offer(name), KEYS.join(name)):
+    for key in (KEYS.session_info(name), KEYS.join(name)):
         assert replies(session, key) == []
     assert [token for token in session.liveliness().get(KEYS.world) if token.ok] == []
     session.put(KEYS.answer(name), b"x", congestion_control=BLOCK)

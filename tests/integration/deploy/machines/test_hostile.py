@@ -105,7 +105,7 @@ class Hostile:
         for key in (keys.join("r0"), keys.any_join, seen.control, seen.scene, seen.status):
             replies = [reply for reply in session.get(key, payload=request, timeout=20.0) if reply.ok]
             assert replies == [], key
-        for key in (keys.any_join, keys.any_offer, seen.control):  # only now: it would be asked by itself
+        for key in (keys.any_join, keys.any_session_info, seen.control):  # only now: it would be asked by itself
             self._kept.append(session.declare_queryable(key, at_once(self._be_asked)))
 
     def _flood(self, session: zenoh.Session, keys: Keys) -> None:

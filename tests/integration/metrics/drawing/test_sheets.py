@@ -60,7 +60,9 @@ def test_rays_start_at_the_rim_and_end_at_their_range_with_the_front_up():
 
 
 @pytest.mark.parametrize(("range_m", "faint"), [(0.12, 1.0), (2.0, 0.1)])
-def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(range_m, faint):
+def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(
+    range_m, detection_threshold
+):
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
@@ -68,7 +70,7 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
     axes = Figure().add_axes((0, 0, 1, 1))
     draw_from_above(axes, body_from({"like": "epuck", "name": "a", "sensors": readings}, "a.toml"))
     drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
-    assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
+    assert min(part.get_alpha() for part in drawn) == pytest.approx(detection_threshold)
     legend = axes.get_legend()
     assert legend
     assert any(text.get_text().endswith(f" {range_m:g} m") for text in legend.get_texts())

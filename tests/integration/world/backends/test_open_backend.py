@@ -57,15 +57,15 @@ def test_who_takes_robots_and_builds_no_agents_loses_them(endpoint: str) -> None
         assert told.endpoints == (endpoint,)
         with closed_after(open_runner(endpoint)) as idler:
             asked = [
-                idler.get(keys.offer("idler")),
+                idler.get(keys.session_info("idler")),
                 idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
             ]
             until(lambda: (backend._take_in(), told.changes)[1])
             replies = [next(iter(replies)) for replies in asked]
     assert all(reply.ok is not None for reply in replies)
-    offer = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None
-    assert offer is not None
-    assert offer.groups[0].robots == 3
+    session_info = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None
+    assert session_info is not None
+    assert session_info.groups[0].robots == 3
     reason = "its agents were not ready within 0.2 s"
     assert told.changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
     assert [sorted(free) for free in told.free] == [["flock-0", "flock-1", "flock-2"]]

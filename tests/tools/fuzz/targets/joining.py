@@ -1,4 +1,4 @@
-"""Joining a run, and its control: requests, offers, assignments, live events, the page in a browser."""
+"""Joining a run, and its control: requests, session infos, assignments, live events, the page in a browser."""
 
 from typing import Any, NamedTuple
 
@@ -50,7 +50,7 @@ class NamedRequest(NamedTuple):
 
 
 class Join(DocumentTarget):
-    """Requests to join, and for the offer: a roster allocates robots, or refuses and is as before."""
+    """Requests to join, and for the session info: a roster allocates robots, or refuses and is as before."""
 
     name = "join"
     quick = 150
@@ -62,8 +62,8 @@ class Join(DocumentTarget):
             GroupInfo(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
             for group in self.run.whole.groups
         )
-        offer = SessionInfo("small-1", "small", SHA256, "0.1.0", 10, None, groups)
-        self.terms = JoinPolicy(offer=offer, open=True, memory=self.run.layouts)
+        session_info = SessionInfo("small-1", "small", SHA256, "0.1.0", 10, None, groups)
+        self.terms = JoinPolicy(session_info=session_info, open=True, memory=self.run.layouts)
         agents = {group.name: SHA256 for group in groups}
         return [
             JoinRequest().encode(),
@@ -80,7 +80,7 @@ class Join(DocumentTarget):
         roster = Lockstep([self.run.whole], "wait", self.terms)
         free = roster.missing_robots
         try:
-            roster.offer(data)
+            roster.session_info(data)
             assignment, _ = assigned_robots(roster.join(runner, data))
         except JoinRefused:
             if roster.missing_robots != free or roster._by_runner:
@@ -91,19 +91,22 @@ class Join(DocumentTarget):
 
 
 class Offers(DocumentTarget):
-    """A world's offer as a runner reads it; encoded again, it says the same."""
+    """A world's session info as a runner reads it; encoded again, it says the same."""
 
-    name = "offer"
+    name = "session-info"
 
     def make_samples(self) -> list[bytes]:
         groups = tuple(GroupInfo(name, "a.b:C", SHA256, 3, (f"{name}-0", f"{name}-2")) for name in ("a", "b"))
-        offer = SessionInfo("run-1", "small", SHA256, "0.1.0", 10, None, groups)
-        return [offer.encode(), SessionInfo("run-2", "other", "", "0.1.0", 10, 2.5, ()).encode()]
+        session_info = SessionInfo("run-1", "small", SHA256, "0.1.0", 10, None, groups)
+        return [session_info.encode(), SessionInfo("run-2", "other", "", "0.1.0", 10, 2.5, ()).encode()]
 
     def feed(self, case: bytes) -> None:
-        offer = SessionInfo.decode(case)
-        if SessionInfo.decode(offer.encode()) != offer and offer.real_time == offer.real_time:
-            raise AssertionError("an offer that is not what was read")
+        session_info = SessionInfo.decode(case)
+        if (
+            SessionInfo.decode(session_info.encode()) != session_info
+            and session_info.real_time == session_info.real_time
+        ):
+            raise AssertionError("a session info that is not what was read")
 
 
 class Assignments(DocumentTarget):

@@ -15,14 +15,14 @@ from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
-from swarmwire.comms.robots.ros2.links import Inlet
+from swarmwire.comms.robots.ros2.links import Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.base import CommandInbox
-from swarmwire.world.gateways.ros2.publishers import tellers_of
+from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from tests.support.robots.ros2.ros2_rig import AT_START
 from tests.tools.fuzz.mutations import mutated_bytes, pick
 from tests.tools.fuzz.target import ByteTarget
@@ -162,11 +162,11 @@ class Ros2Sensors(ByteTarget):
         fields = {**AT_START, "proximity.value": np.zeros((1, 4))}
         samples: list[Ros2Message] = []
         for tick in range(3):
-            for teller in tellers_of(self.body, 1, Ros2GatewayOptions(north_deg=30.0)):
-                teller.follow(100_000_000 * tick, fields)
-                message = teller.message(self.messages, fields, 0, UTC_NS + tick)
+            for broadcaster in broadcasters_of(self.body, 1, Ros2GatewayOptions(north_deg=30.0)):
+                broadcaster.follow(100_000_000 * tick, fields)
+                message = broadcaster.message(self.messages, fields, 0, UTC_NS + tick)
                 if message is not None:
-                    samples.append(Ros2Message(teller.kind, self.messages.encode(teller.kind, message)))
+                    samples.append(Ros2Message(broadcaster.kind, self.messages.encode(broadcaster.kind, message)))
         return samples
 
     def mutated(self, draw: DrawFn) -> Any:
@@ -207,11 +207,11 @@ class Ros2Commands(ByteTarget):
 
     def feed(self, case: bytes) -> str | None:
         inbox = CommandInbox(1_000_000_000, CLOCK)
-        inlet: Any = object.__new__(Inlet)
-        inlet._attached, inlet._refuse = True, inbox.refuse
-        inlet._take = lambda payload: inbox.take(payload, decode_either)
+        subscription: Any = object.__new__(Subscription)
+        subscription._attached, subscription._refuse = True, inbox.refuse
+        subscription._take = lambda payload: inbox.take(payload, decode_either)
         size = len(attachment(0, 0, bytes(16)))
-        inlet._receive(AttachedSample(Payload(case[:size]), Payload(case[size:])))
+        subscription._receive(AttachedSample(Payload(case[:size]), Payload(case[size:])))
         newest, refused = inbox.newest(), sum(inbox.counts().values())
         if (newest is None) != (refused == 1):
             raise AssertionError("neither taken nor counted")

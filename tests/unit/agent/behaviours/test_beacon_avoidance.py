@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.agent.behaviours import BeaconAvoidance
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon, Traffic
-from swarmwire.agent.behaviours.neighbour_table import NOBODY, SLOTS, Remembered, forget, remember
+from swarmwire.agent.behaviours.neighbour_table import NO_ROBOT, SLOTS, Remembered, forget, remember
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
@@ -97,7 +97,7 @@ def test_a_neighbour_is_remembered_where_it_should_be_by_now_and_then_forgotten(
     one.steps(10)
     assert one.place() == pytest.approx((0.05, 0.9), abs=1e-7)
     one.step()
-    assert (one.known.sender == NOBODY).all()
+    assert (one.known.sender == NO_ROBOT).all()
 
 
 def test_a_packet_is_moved_on_by_its_age_and_by_a_delay_that_is_known() -> None:
@@ -119,7 +119,7 @@ def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
     table, many = Remembered.fresh(2), SLOTS + 5
     told(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
     assert table.sender[1].tolist() == list(range(many - 1, many - 1 - SLOTS, -1))
-    assert (table.sender[0] == NOBODY).all()
+    assert (table.sender[0] == NO_ROBOT).all()
     told(table, [1], [99], [0], np.array([0.1]))
     assert table.sender[1, :2].tolist() == [99, many - 1]
     assert table.sender[1, -1] == many - SLOTS + 1, "the farthest gave way"
@@ -129,7 +129,7 @@ def test_of_a_sender_the_newest_packet_counts_also_if_an_older_one_comes_later()
     table = Remembered.fresh(1)
     told(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
     told(table, [0], [3], [6], np.array([0.6]))
-    assert (table.sender[0, :2].tolist(), table.x_m[0, 0]) == ([3, NOBODY], 0.7)
+    assert (table.sender[0, :2].tolist(), table.x_m[0, 0]) == ([3, NO_ROBOT], 0.7)
     forget(table, -1.0)
     assert table.age_s.tolist() == [[np.inf] * SLOTS]
 

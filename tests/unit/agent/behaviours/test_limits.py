@@ -20,13 +20,13 @@ from swarmwire.agent.behaviours import (
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 
 ABOVE_ZERO: dict[type, tuple[str, ...]] = {
-    Aggregation: ("spell_m", "approach_m", "turn_radps", "faint"),
+    Aggregation: ("spell_m", "approach_m", "turn_radps", "detection_threshold"),
     BeaconAvoidance: ("speed_mps", "clear_m", "horizon_s", "close_m"),
-    Coverage: ("spell_m", "nearest_m", "turn_radps", "faint"),
+    Coverage: ("spell_m", "nearest_m", "turn_radps", "detection_threshold"),
     Flocking: ("separation_m",),
-    LennardJonesFlocking: ("speed_mps", "target_m", "exponent", "faint", "hard_rad"),
+    LennardJonesFlocking: ("speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad"),
     PsoModel: ("update_every_ticks",),
-    RandomWalk: ("spell_m", "turn_radps", "faint"),
+    RandomWalk: ("spell_m", "turn_radps", "detection_threshold"),
     SmoothedAvoidance: ("reach_m",),
 }
 NOT_NEGATIVE: dict[type, tuple[str, ...]] = {

@@ -81,10 +81,10 @@ def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
         return Admission(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
 
     accounts = PacketCounters(arenas=3, robots=2)
-    accounts.take_up(handed_over([0, 2, 3, 4, 5, 5]))
+    accounts.count_sent(handed_over([0, 2, 3, 4, 5, 5]))
     closed = accounts.close(np.array([True, False, True]))
     assert (closed.sent.tolist(), closed.intended.tolist()) == ([1, 0, 3], [1, 0, 3])
-    accounts.take_up(handed_over([0]))
+    accounts.count_sent(handed_over([0]))
     rest = accounts.close()
     assert (rest.sent.tolist(), rest.intended.tolist(), rest.fates.sum()) == ([1, 2, 0], [1, 2, 0], 0)
     assert accounts.close().sent.tolist() == [0, 0, 0]

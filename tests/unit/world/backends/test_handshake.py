@@ -153,12 +153,12 @@ def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str
 @pytest.mark.parametrize("asked", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
 def test_an_offer_is_not_told_to_who_asks_in_another_version(roster: Made, asked: bytes) -> None:
     with pytest.raises(JoinRefused):
-        roster.offer(asked)
+        roster.session_info(asked)
     assert roster.counts() == {"bad_join": 1}
 
 
 def test_where_there_is_nothing_to_offer_nothing_is_told(roster: Made) -> None:
-    assert roster.offer() is None
+    assert roster.session_info() is None
 
 
 def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made) -> None:

@@ -62,9 +62,9 @@ def rows(assignment: Assignment) -> dict[str, list[int]]:
 
 
 def free(roster: Made) -> dict[str, tuple[str, ...]]:
-    offer = roster.offer()
-    assert offer is not None
-    return {group.name: group.free for group in offer.groups if group.free}
+    session_info = roster.session_info()
+    assert session_info is not None
+    return {group.name: group.free for group in session_info.groups if group.free}
 
 
 def test_so_many_robots_are_the_next_that_are_free_in_their_order(roster: Made) -> None:
@@ -229,9 +229,9 @@ def test_who_leaves_a_run_that_bears_it_frees_its_robots_or_they_are_given_up(ki
 
 
 def test_an_offer_comes_over_whole(roster: Made) -> None:
-    offer = roster.offer()
-    assert offer is not None
-    assert SessionInfo.decode(offer.encode()) == offer
+    session_info = roster.session_info()
+    assert session_info is not None
+    assert SessionInfo.decode(session_info.encode()) == session_info
     assert free(roster)["flock"] == tuple(f"flock-{row}" for row in FLOCK)
 
 

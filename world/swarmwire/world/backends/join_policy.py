@@ -54,7 +54,7 @@ class JoinPolicy:
     """The conditions under which runners join a run.
 
     Attributes:
-        offer: the session info for runners; None: none is sent, and no agent hash is compared.
+        session_info: the session info for runners; None: none is sent, and no agent hash is compared.
         open: whether runners from elsewhere may join at any time. The loss of a runner before the first tick then only
             frees its robots.
         start_with: the number of robots with an agent at which the first tick may begin; None: all.
@@ -62,7 +62,7 @@ class JoinPolicy:
         memory: by group, the layout of the agent memory that the next runner gets; None: none is kept.
     """
 
-    offer: SessionInfo | None = None
+    session_info: SessionInfo | None = None
     open: bool = False
     start_with: int | None = None
     limits: JoinLimits = LIMITS
@@ -145,16 +145,16 @@ def _named(names: Sequence[str], allocations: Allocations[AllocationT]) -> IntAr
 
 
 def _check_scenario(request: JoinRequest, policy: JoinPolicy) -> None:
-    offer = policy.offer
-    if offer is not None and request.scenario_sha256 not in (None, offer.scenario_sha256):
-        raise JoinRefused(f"another scenario: here is {offer.scenario!r}, whose file has another sha256")
+    session_info = policy.session_info
+    if session_info is not None and request.scenario_sha256 not in (None, session_info.scenario_sha256):
+        raise JoinRefused(f"another scenario: here is {session_info.scenario!r}, whose file has another sha256")
 
 
 def _check_agents(request: JoinRequest, policy: JoinPolicy, groups: Sequence[str]) -> None:
     """Raise JoinRefused if the hash of one of the runner's agents differs; a runner may send no hashes."""
-    if request.agents is None or policy.offer is None:
+    if request.agents is None or policy.session_info is None:
         return
-    for group in policy.offer.groups:
+    for group in policy.session_info.groups:
         runner_sha256 = request.agents.get(group.name)
         if group.name in groups and runner_sha256 != group.agent_sha256:
             runner_text = "none" if runner_sha256 is None else f"{runner_sha256[:12]}…"

@@ -201,18 +201,18 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         allocation = self._by_runner.get(runner)
         return allocation is not None and allocation.state == "joined"
 
-    def offer(self, request: bytes = b"") -> SessionInfo | None:
+    def session_info(self, request: bytes = b"") -> SessionInfo | None:
         """The session info with the free robots; None if the policy has none. JoinRefused for another version."""
         if request:
             with self._refusals_counted():
                 check_version(request)
-        if self._policy.offer is None:
+        if self._policy.session_info is None:
             return None
         free: dict[str, list[str]] = {}
         for allocation in self._allocations.free:
             for group in allocation.assignment.groups:
                 free.setdefault(group.name, []).extend(group.robot_names)
-        return self._policy.offer.with_free(free)
+        return self._policy.session_info.with_free(free)
 
     def join(self, runner: str, request: bytes) -> bytes:
         """Allocate the requested robots to a runner, and return the reply; JoinRefused with a reason for the runner."""

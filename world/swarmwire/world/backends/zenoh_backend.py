@@ -109,7 +109,7 @@ class ZenohBackend(ABC, Generic[R]):
         arrived = (self._inbox.put, self._inbox)
         self._answers = {self._keys.any_answer: session.declare_subscriber(self._keys.any_answer, arrived)}
         self._declarations = (
-            session.declare_queryable(self._keys.any_offer, arrived),
+            session.declare_queryable(self._keys.any_session_info, arrived),
             session.declare_queryable(self._keys.any_join, arrived),
             session.liveliness().declare_subscriber(self._keys.any_alive, arrived, history=True),
             session.liveliness().declare_token(self._keys.world),  # last: it announces that runners may join
@@ -254,10 +254,10 @@ class ZenohBackend(ABC, Generic[R]):
         with query:  # a query that is kept alive blocks the runner until its time-out
             request = query.payload.to_bytes() if query.payload else b""
             try:
-                if key == self._keys.offer(runner):
-                    offer = self._registry.offer(request)
-                    if offer is not None:
-                        query.reply(key, offer.encode())
+                if key == self._keys.session_info(runner):
+                    session_info = self._registry.session_info(request)
+                    if session_info is not None:
+                        query.reply(key, session_info.encode())
                     return
                 if runner in self._rate_limited:
                     raise JoinRefused(RATE_LIMITED)

@@ -1,6 +1,6 @@
 """The driver of a ROS 2 base: it takes Twist and publishes LaserScan, Odometry, Imu, BatteryState, Illuminance.
 
-`Commander` sends the current command when it changes and again 20 times per second, because bases time out.
+`CommandPublisher` sends the current command when it changes and again 20 times per second, because bases time out.
 `Ros2Driver` reads the newest message of each topic without waiting.
 """
 
@@ -20,7 +20,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import NS_PER_S, Clock, DatedClock, to_ns
 from swarmwire.comms.robots.ros2.keys import TWIST, TWIST_STAMPED, absolute, ros_name
-from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, is_linked, open_client
+from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, is_linked, open_client
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped
 
 RESEND_HZ = 20  # bases stop by themselves after 0.2 s to 1 s without a command
@@ -29,7 +29,7 @@ FRAME = "base_link"
 POLL_NS = NS_PER_S // 100  # until a base takes commands
 
 
-class Commander:
+class CommandPublisher:
     """Repeats commands from a thread of its own. A stop is sent at once, and no earlier command after it."""
 
     def __init__(self, send: Callable[[Command], None], clock: Clock) -> None:
@@ -96,8 +96,8 @@ class Ros2Driver(Driver):
         self._since_ns: int | None = None  # time of the connection
         self._session: zenoh.Session | None = None
         self._wiring: Wiring | None = None
-        self._commander: Commander | None = None
-        self._outlet: Outlet | None = None
+        self._commander: CommandPublisher | None = None
+        self._publisher: Publisher | None = None
 
     @property
     def target(self) -> str:
@@ -123,17 +123,17 @@ class Ros2Driver(Driver):
         for (topic, feed), reader in zip(self._feeds.items(), self._readers, strict=True):
             feed.begin()
             wiring.feed(topic, reader.kind, feed)
-        outlet = wiring.outlet(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
-        self._session, self._outlet, self._sensed_feeds = session, outlet, ()
-        self._wait_for_base(outlet)
+        publisher = wiring.publisher(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
+        self._session, self._publisher, self._sensed_feeds = session, publisher, ()
+        self._wait_for_base(publisher)
         self._counts["reconnections"] += self._since_ns is not None
         self._since_ns = self.clock.now_ns()
-        self._commander = Commander(lambda command: self._send(outlet, command), self.clock)
+        self._commander = CommandPublisher(lambda command: self._send(publisher, command), self.clock)
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
         """As `Driver.sense`: the messages until now, without waiting."""
         self._check_link()
-        if self._outlet is None or not self._outlet.wanted:
+        if self._publisher is None or not self._publisher.wanted:
             self.stop()
             raise DriverLost(self._no_base_text())
         self._sensed_feeds = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
@@ -173,12 +173,12 @@ class Ros2Driver(Driver):
             self._commander.end()
         self._counts["without_attachment"] += 0 if self._wiring is None else self._wiring.refused
         close(self._session)
-        self._session = self._wiring = self._commander = self._outlet = None
+        self._session = self._wiring = self._commander = self._publisher = None
 
-    def _wait_for_base(self, outlet: Outlet) -> None:
+    def _wait_for_base(self, publisher: Publisher) -> None:
         """Wait until a base takes commands; otherwise close, and raise DriverLost."""
         end_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
-        while not outlet.wanted:
+        while not publisher.wanted:
             if self.clock.now_ns() >= end_ns:
                 self.close()
                 raise DriverLost(self._no_base_text())
@@ -198,7 +198,7 @@ class Ros2Driver(Driver):
         topic = absolute(options.namespace or ros_name(self.robot), options.command_topic)
         return f"nobody takes {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
 
-    def _check_link(self) -> Commander:
+    def _check_link(self) -> CommandPublisher:
         """The commander of a working connection; otherwise DriverLost."""
         if self._session is None or self._commander is None:
             raise DriverLost(f"not connected to {self.address}")
@@ -206,14 +206,14 @@ class Ros2Driver(Driver):
             raise DriverLost(f"the connection to {self.address} is cut")
         return self._commander
 
-    def _send(self, outlet: Outlet, command: Command) -> None:
+    def _send(self, publisher: Publisher, command: Command) -> None:
         velocities = self._within_limits(command)
         if not all(map(isfinite, velocities)):
             self._counts["not_finite"] += 1
             velocities = Velocities(0.0, 0.0)
         utc_ns = self.clock.utc_ns()
         stamped = self._options.stamped
-        outlet.put(encode_twist_stamped(velocities, utc_ns, FRAME) if stamped else encode_twist(velocities), utc_ns)
+        publisher.put(encode_twist_stamped(velocities, utc_ns, FRAME) if stamped else encode_twist(velocities), utc_ns)
 
     def _within_limits(self, command: Command) -> Velocities:
         """The command with each speed clipped to the body's limit; nan stays nan."""

@@ -12,7 +12,7 @@ from swarmwire.agent.drivers.ros2.topics import Fields, Reader, Ros2Options
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import READ, WRITE, RmwNode, absolute, bridge_key, rmw_key
-from swarmwire.comms.robots.ros2.links import Inlet, Outlet
+from swarmwire.comms.robots.ros2.links import Publisher, Subscription
 from swarmwire.comms.robots.ros2.messages import Messages
 
 NODE = "swarmwire_driver"
@@ -82,13 +82,13 @@ class Wiring:
             self._node = RmwNode(options.domain, str(session.zid()), 0, full, NODE)
             self._tokens.append(session.liveliness().declare_token(self._node.token))
 
-    def outlet(self, topic: str, kind: str) -> Outlet:
+    def publisher(self, topic: str, kind: str) -> Publisher:
         """Declare a topic for messages of this kind to send."""
         full = absolute(self._namespace, topic)
         if self._node is None:
-            return Outlet(self._session, bridge_key(full), None)
+            return Publisher(self._session, bridge_key(full), None)
         token = self._declare(self._node, WRITE, full, kind)
-        return Outlet(self._session, rmw_key(self._node.domain, full, kind, self._messages.hash_of(kind)), token)
+        return Publisher(self._session, rmw_key(self._node.domain, full, kind, self._messages.hash_of(kind)), token)
 
     def feed(self, topic: str, kind: str, feed: Feed) -> None:
         """Subscribe to a topic with messages of this kind, of any hash."""
@@ -96,7 +96,7 @@ class Wiring:
         if self._node is not None:
             self._declare(self._node, READ, full, kind)
         key = bridge_key(full) if self._node is None else rmw_key(self._node.domain, full, kind)
-        Inlet(self._session, key, attached=self._node is not None, take=feed.take, refuse=self._refuse)
+        Subscription(self._session, key, attached=self._node is not None, take=feed.take, refuse=self._refuse)
 
     def _declare(self, node: RmwNode, direction: str, topic: str, kind: str) -> str:
         token = node.topic_token(len(self._tokens), direction, topic, kind, self._messages.hash_of(kind))

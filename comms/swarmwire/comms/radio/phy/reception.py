@@ -22,7 +22,7 @@ from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
 from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, DATA, RECEIVING, SILENT, TURNAROUND
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
-from swarmwire.comms.radio.stages.loss import Frame
+from swarmwire.comms.radio.stages.loss import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import frame_fate
 from swarmwire.comms.truth import NO_ROBOT
 
@@ -100,7 +100,7 @@ def fate_of_frame(params, losses, state, s, i, log_right):
             return JAMMED
         alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits))
         return COLLIDED if u < alone else TOO_WEAK
-    frame = Frame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.hold_ns)
+    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.hold_ns)
     return frame_fate(losses, frame)
 
 

@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
-class Frame(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """One frame at one receiver, as input of kernels.
 
     Key draws by `key`, (s, r, sequence) and a purpose of the loss model + `attempt`; acknowledgements have purposes of

@@ -12,7 +12,7 @@ from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.fixed_loss import FixedLoss
-from swarmwire.comms.radio.stages.loss import Frame, LossModel
+from swarmwire.comms.radio.stages.loss import LossModel, ReceivedFrame
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.stages.trace import TraceLoss
 
@@ -27,7 +27,7 @@ class Losses(NamedTuple):
     """The losses of a radio as input of kernels."""
 
     order: IntArray  # places in LOSS_MODELS of the losses that the radio has, in the order of the tests
-    hold_ns: int  # time of the current poses, see `Frame`; NO_HOLD in a unit disk
+    hold_ns: int  # time of the current poses, see `ReceivedFrame`; NO_HOLD in a unit disk
     params: tuple[Any, ...]  # of each of LOSS_MODELS
 
 
@@ -145,7 +145,9 @@ def _decide(losses, keys, robots, index, sender, receiver, sequence, at_ns, fate
             i = index[n] if len(index) > 0 else n
             if fate[i] == RECEIVED:
                 a, b, now_ns = sender[i], receiver[i], at_ns[i]
-                frame = Frame(keys[a // robots], a, b, a % robots, b % robots, sequence[i], 0, False, now_ns, now_ns)
+                frame = ReceivedFrame(
+                    keys[a // robots], a, b, a % robots, b % robots, sequence[i], 0, False, now_ns, now_ns
+                )
                 end = _fate_by(place, losses.params, frame)
                 fate[i] = end
                 in_range[i] *= end != OUT_OF_RANGE

@@ -18,7 +18,13 @@ from swarmwire.comms.radio.model import Decided, RadioModel
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.radio.unit_disk.neighbours import Reach, links_in_reach, pairs_in_reach, reach, reach_on_torus
+from swarmwire.comms.radio.unit_disk.neighbours import (
+    Neighbours,
+    links_in_range,
+    neighbours_of,
+    neighbours_on_torus,
+    pairs_in_range,
+)
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
 
 NEVER_NS = 2**63 - 1
@@ -30,7 +36,7 @@ class Channel:
     def __init__(self, context: ChannelContext) -> None:
         self._radio, self._size_m = context.radio, context.size_m
         self._arenas, self._running = len(context.keys), context.running
-        self._find_reach = reach_on_torus if context.is_torus else reach
+        self._find_neighbours = neighbours_on_torus if context.is_torus else neighbours_of
         self._columns = len(context.radio.measures.columns)
         self._stages = chain(context)
         self._neighbours_pose: FloatArray | None = None  # poses of the cached `_known`
@@ -49,7 +55,7 @@ class Channel:
         candidates = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
         # Alive or not: the intended receivers are those alive when the packet was sent.
         robots, sender, to = len(pose) // self._arenas, packets.sender.take(candidates), packets.to.take(candidates)
-        index, receiver = links_in_reach(self._reach(pose), robots, sender, to)
+        index, receiver = links_in_range(self._in_range(pose), robots, sender, to)
         packet = candidates.take(index)
         if liveness.any_dead:
             is_intended = liveness.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
@@ -79,7 +85,7 @@ class Channel:
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Edges of the radio graph at `at_ns`, robot rows a < b, sorted, (e, 2)."""
-        pair = pairs_in_reach(self._reach(pose), alive)
+        pair = pairs_in_range(self._in_range(pose), alive)
         stages = [stage for stage in self._stages if not stage.lets_all_pass]
         if not stages:
             return pair
@@ -91,11 +97,11 @@ class Channel:
             probability *= stage.delivery(links, pose)
         return edges(pair, probability, self._radio.min_delivery)
 
-    def _reach(self, pose: FloatArray) -> Reach:
+    def _in_range(self, pose: FloatArray) -> Neighbours:
         """The robots in range of each other, cached by pose: a tick's poses serve its packets and its radio graph."""
         if pose is not self._neighbours_pose:
             assert self._radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-            self._neighbours = self._find_reach(pose, self._running, self._size_m, self._radio.range_m)
+            self._neighbours = self._find_neighbours(pose, self._running, self._size_m, self._radio.range_m)
             self._neighbours_pose = pose
         return self._neighbours
 

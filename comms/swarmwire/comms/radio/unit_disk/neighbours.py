@@ -19,25 +19,25 @@ from swarmwire.comms.packets import BROADCAST
 CELLS = 5
 
 
-class Reach(NamedTuple):
+class Neighbours(NamedTuple):
     """Robots in range of each robot row r: other[first[r]:first[r + 1]], in grid order."""
 
     first: IntArray  # (rows + 1,)
     other: IntArray  # robot rows
 
 
-def reach(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Reach:
+def neighbours_of(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Neighbours:
     """Robots within `range_m` of each other in the same arena, centre to centre, alive or not.
 
     Arenas that are not `running` (arenas,) have none.
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
-    return Reach(*_within(x, y, len(x) // len(running), cells, range_m))
+    return Neighbours(*_within(x, y, len(x) // len(running), cells, range_m))
 
 
 @njit()
-def links_in_reach(neighbours: Reach, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+def links_in_range(neighbours: Neighbours, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
     """Packet row and robot row for each robot in range of a packet's sender, packet by packet.
 
     `sender` (k,) holds robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST.
@@ -56,7 +56,7 @@ def links_in_reach(neighbours: Reach, robots: int, sender: IntArray, to: IntArra
 
 
 @njit()
-def pairs_in_reach(neighbours: Reach, alive: BoolArray) -> IntArray:
+def pairs_in_range(neighbours: Neighbours, alive: BoolArray) -> IntArray:
     """Robot rows a < b of all pairs that are alive and in range of each other, sorted, (e, 2)."""
     first, other = neighbours.first, neighbours.other.view(np.uint64)
     pair = np.empty((len(other) + 1, 2), np.int64)
@@ -117,11 +117,13 @@ def _strips(x, y, robots, cells):
     return first, stop
 
 
-def reach_on_torus(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Reach:
-    """As `reach`, where opposite sides of each arena meet: shortest distances count."""
+def neighbours_on_torus(
+    pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float
+) -> Neighbours:
+    """As `neighbours_of`, where opposite sides of each arena meet: shortest distances count."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
-    return Reach(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
+    return Neighbours(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
 
 
 @njit()

@@ -1,6 +1,6 @@
 """zenoh sessions and topics of ROS 2 links: a gateway is a router, as in ROS 2, and a driver is a client of one.
 
-`Inlet` subscribes to a topic and `Outlet` publishes to one, each with or without rmw_zenoh's attachment.
+`Subscription` subscribes to a topic and `Publisher` publishes to one, each with or without rmw_zenoh's attachment.
 """
 
 import json
@@ -75,7 +75,7 @@ def _config(mode: str, more: dict[str, object], *, gossip: bool) -> zenoh.Config
     )
 
 
-class Inlet:
+class Subscription:
     """A subscriber on one key. `take` gets each payload in the network's thread, so it must return at once."""
 
     def __init__(
@@ -105,12 +105,12 @@ class Inlet:
         self._take(sample.payload.to_bytes())
 
 
-class Outlet:
+class Publisher:
     """A publisher on one key. Payloads are dropped where the network cannot keep up.
 
     Attributes:
         wanted: whether the key has a subscriber. The network's thread updates it: a query would cost 1 to 20 us, and a
-            gateway has hundreds of outlets.
+            gateway has hundreds of publishers.
     """
 
     def __init__(self, session: zenoh.Session, key: str, token: str | None) -> None:

@@ -24,9 +24,9 @@ from swarmwire.comms.robots.ros2.keys import (
     bridge_token,
     rmw_key,
 )
-from swarmwire.comms.robots.ros2.links import Inlet, Outlet
+from swarmwire.comms.robots.ros2.links import Publisher, Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, decode_twist, decode_twist_stamped
-from swarmwire.world.gateways.ros2.publishers import Teller
+from swarmwire.world.gateways.ros2.publishers import Broadcaster
 
 REST = Velocities(0.0, 0.0)
 
@@ -97,18 +97,18 @@ COMMAND_TOPIC, NODE = "cmd_vel", "base"
 
 
 class Base:
-    """A base that takes Twist and TwistStamped on `cmd_vel`, and has a topic for each teller.
+    """A base that takes Twist and TwistStamped on `cmd_vel`, and has a topic for each broadcaster.
 
     Attributes:
         inbox: its commands.
-        outlets: for each teller, where its messages go out: to nodes behind a bridge, and to those of rmw_zenoh.
+        publishers: of each broadcaster: to nodes behind a bridge, and to those of rmw_zenoh.
     """
 
     def __init__(
         self,
         session: zenoh.Session,
         node: RmwNode,
-        tellers: tuple[Teller, ...],
+        broadcasters: tuple[Broadcaster, ...],
         messages: Messages,
         inbox: CommandInbox,
         *,
@@ -117,16 +117,16 @@ class Base:
         """`node` is what it is in the graph of rmw_zenoh; `stamped` is which kind of command the graphs tell of."""
         self.inbox = inbox
         self._session = session
-        topics = [(WRITE, teller.topic, teller.kind) for teller in tellers]
+        topics = [(WRITE, broadcaster.topic, broadcaster.kind) for broadcaster in broadcasters]
         topics.append((READ, COMMAND_TOPIC, TWIST_STAMPED if stamped else TWIST))
         named = [(way, absolute(node.namespace, topic), kind, messages.hash_of(kind)) for way, topic, kind in topics]
         in_rmw = [node.topic_token(place, *of) for place, of in enumerate(named, start=1)]
         self._tokens = [node.token, *in_rmw, *(bridge_token(node.zid, *of) for of in named)]
         self._declared: list[Any] = []
-        self.outlets = [
+        self.publishers = [
             (
-                Outlet(session, bridge_key(topic), None),
-                Outlet(session, rmw_key(node.domain, topic, kind, type_hash), token),
+                Publisher(session, bridge_key(topic), None),
+                Publisher(session, rmw_key(node.domain, topic, kind, type_hash), token),
             )
             for (way, topic, kind, type_hash), token in zip(named, in_rmw, strict=True)
             if way == WRITE
@@ -137,27 +137,29 @@ class Base:
             (rmw_key(domain, topic, TWIST), decode_twist, True),
             (rmw_key(domain, topic, TWIST_STAMPED), decode_twist_stamped, True),
         )
-        self._inlets: list[Inlet] = []
+        self._subscriptions: list[Subscription] = []
         self.show()
 
     def show(self) -> None:
         """Take commands, and let the graphs have it; nothing happens if they do."""
-        if self._inlets:
+        if self._subscriptions:
             return
         self.inbox.is_open = True
         for key, decode, attached in self._commands:
             take = partial(self.inbox.take, decode=decode)
-            self._inlets.append(Inlet(self._session, key, attached=attached, take=take, refuse=self.inbox.refuse))
+            self._subscriptions.append(
+                Subscription(self._session, key, attached=attached, take=take, refuse=self.inbox.refuse)
+            )
         self._declared = [self._session.liveliness().declare_token(token) for token in self._tokens]
 
     def hide(self) -> None:
         """Vanish from the graphs, as a base that was switched off; nothing happens if it did."""
-        if not self._inlets:
+        if not self._subscriptions:
             return
         for token in self._declared:
             token.undeclare()
-        for inlet in self._inlets:
-            inlet.close()
-        self._declared, self._inlets = [], []
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._declared, self._subscriptions = [], []
         self.inbox.is_open = False
         self.inbox.forget()

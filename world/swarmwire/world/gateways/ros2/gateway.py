@@ -13,12 +13,12 @@ from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import DatedClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.ros2.keys import CLOCK, RmwNode, bridge_itself, bridge_key, rmw_key, ros_name
-from swarmwire.comms.robots.ros2.links import Outlet, check_endpoint, close, open_router
+from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, open_router
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
-from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, tellers_of
+from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
 CLOCK_TOPIC = "/clock"
@@ -42,12 +42,12 @@ class Ros2Gateway(Gateway):
         self._options = options
         self._spaces = _spaces(names)
         self._messages = Messages(options.distro)
-        self._tellers = tellers_of(body, len(names), options)
-        self._rates = [Rate(teller.rate_hz) for teller in self._tellers]
+        self._broadcasters = broadcasters_of(body, len(names), options)
+        self._rates = [Rate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
         self._began_ns: int | None = None
         self._session: zenoh.Session | None = None
         self._bases: list[Base] = []
-        self._clocks: tuple[Outlet, ...] = ()
+        self._clocks: tuple[Publisher, ...] = ()
         self._graph: tuple[object, ...] = ()  # tokens of the gateway itself
 
     def differences(self) -> tuple[str, ...]:
@@ -65,7 +65,7 @@ class Ros2Gateway(Gateway):
         self._graph = (self._session.liveliness().declare_token(bridge_itself(str(self._session.zid()))),)
         self._bases = [self._base(self._session, place) for place in range(len(self.names))]
         rmw = rmw_key(self._options.domain, CLOCK_TOPIC, CLOCK, self._messages.hash_of(CLOCK))
-        self._clocks = Outlet(self._session, bridge_key(CLOCK_TOPIC), None), Outlet(self._session, rmw, rmw)
+        self._clocks = Publisher(self._session, bridge_key(CLOCK_TOPIC), None), Publisher(self._session, rmw, rmw)
         return (endpoint,) * len(self.names)
 
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
@@ -75,12 +75,12 @@ class Ros2Gateway(Gateway):
         stamp_ns = self._began_ns + time_ns
         for base, lives in zip(self._bases, alive, strict=True):
             base.show() if lives else base.hide()
-        for place, (teller, rate) in enumerate(zip(self._tellers, self._rates, strict=True)):
-            if rate.is_due(time_ns) and teller.is_told(fields):
-                teller.follow(time_ns, fields)
+        for place, (broadcaster, rate) in enumerate(zip(self._broadcasters, self._rates, strict=True)):
+            if rate.is_due(time_ns) and broadcaster.is_told(fields):
+                broadcaster.follow(time_ns, fields)
                 for row in np.flatnonzero(alive):
                     self._tell(place, int(row), fields, stamp_ns)
-        if any(outlet.wanted for outlet in self._clocks):
+        if any(publisher.wanted for publisher in self._clocks):
             now = self._messages.make(CLOCK, self._messages.time(stamp_ns))
             _put(self._clocks, self._messages.encode(CLOCK, now), stamp_ns)
 
@@ -106,20 +106,20 @@ class Ros2Gateway(Gateway):
         options = self._options
         node = RmwNode(options.domain, str(session.zid()), place, f"/{self._spaces[place]}", NODE)
         inbox = CommandInbox(to_ns(options.cmd_timeout_s), self.clock)
-        return Base(session, node, self._tellers, self._messages, inbox, stamped=options.stamped)
+        return Base(session, node, self._broadcasters, self._messages, inbox, stamped=options.stamped)
 
     def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int) -> None:
-        outlets, teller = self._bases[row].outlets[place], self._tellers[place]
-        if any(outlet.wanted for outlet in outlets):
-            message = teller.message(self._messages, fields, row, stamp_ns)
+        publishers, broadcaster = self._bases[row].publishers[place], self._broadcasters[place]
+        if any(publisher.wanted for publisher in publishers):
+            message = broadcaster.message(self._messages, fields, row, stamp_ns)
             if message is not None:
-                _put(outlets, self._messages.encode(teller.kind, message), stamp_ns)
+                _put(publishers, self._messages.encode(broadcaster.kind, message), stamp_ns)
 
 
-def _put(outlets: tuple[Outlet, ...], payload: bytes, stamp_ns: int) -> None:
-    for outlet in outlets:
-        if outlet.wanted:
-            outlet.put(payload, stamp_ns)
+def _put(publishers: tuple[Publisher, ...], payload: bytes, stamp_ns: int) -> None:
+    for publisher in publishers:
+        if publisher.wanted:
+            publisher.put(payload, stamp_ns)
 
 
 def _spaces(names: Sequence[str]) -> tuple[str, ...]:

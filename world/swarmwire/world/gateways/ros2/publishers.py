@@ -57,7 +57,7 @@ class Rate:
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 
 
-class Teller(ABC):
+class Broadcaster(ABC):
     """One topic of every base.
 
     Attributes:
@@ -85,7 +85,7 @@ class Teller(ABC):
         """The message of one base; None: its reading was lost."""
 
 
-class ScanTeller(Teller):
+class ScanBroadcaster(Broadcaster):
     """`scan` as LaserScan."""
 
     kind = LASER_SCAN
@@ -96,11 +96,11 @@ class ScanTeller(Teller):
         self._spec, self.rate_hz = spec, spec.rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Teller.message`."""
+        """As `Broadcaster.message`."""
         return laser_scan(messages, self._spec, fields["scan.range_m"][base], stamp_ns)
 
 
-class OdometryTeller(Teller):
+class OdometryBroadcaster(Broadcaster):
     """`odometry` as Odometry: where the wheels say that the base is."""
 
     kind = ODOMETRY
@@ -112,16 +112,16 @@ class OdometryTeller(Teller):
         self._poses = WheelPoses(bases, wheel_base_m)
 
     def follow(self, time_ns: int, fields: Fields) -> None:
-        """As `Teller.follow`."""
+        """As `Broadcaster.follow`."""
         self._poses.follow(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Teller.message`."""
+        """As `Broadcaster.message`."""
         lost = isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
         return None if lost else self._poses.message(messages, base, stamp_ns)
 
 
-class ImuTeller(Teller):
+class ImuBroadcaster(Broadcaster):
     """`imu` and `compass`, or whichever there is, as Imu."""
 
     kind = IMU
@@ -133,12 +133,12 @@ class ImuTeller(Teller):
         self._north_deg = north_deg
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Teller.message`."""
+        """As `Broadcaster.message`."""
         motion = Motion(*(float(fields[name][base]) if name in fields else nan for name in self.reads))
         return None if all(map(isnan, motion)) else imu(messages, motion, self._north_deg, stamp_ns)
 
 
-class BatteryTeller(Teller):
+class BatteryBroadcaster(Broadcaster):
     """`battery` as BatteryState."""
 
     kind = BATTERY_STATE
@@ -149,12 +149,12 @@ class BatteryTeller(Teller):
         self.rate_hz = rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Teller.message`."""
+        """As `Broadcaster.message`."""
         charge, voltage_v = float(fields["battery.charge"][base]), float(fields["battery.voltage_v"][base])
         return None if isnan(charge + voltage_v) else battery_state(messages, charge, voltage_v, stamp_ns)
 
 
-class LightTeller(Teller):
+class LightBroadcaster(Broadcaster):
     """One cell of `light` as Illuminance."""
 
     kind = ILLUMINANCE
@@ -165,25 +165,27 @@ class LightTeller(Teller):
         self._cell, self._full_lux = cell, full_lux
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Teller.message`."""
+        """As `Broadcaster.message`."""
         brightness = float(fields["light.value"][base, self._cell])
         return illuminance(messages, brightness, self._full_lux, self.topic, stamp_ns)
 
 
-def tellers_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Teller, ...]:
+def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Broadcaster, ...]:
     """The topics of bases of this body."""
-    tellers: list[Teller] = []
+    broadcasters: list[Broadcaster] = []
     wheel_base_m = wheel_base_of(body.drive)
     if body.scan:
-        tellers.append(ScanTeller(body.scan))
+        broadcasters.append(ScanBroadcaster(body.scan))
     if body.odometry and wheel_base_m:
-        tellers.append(OdometryTeller(body.odometry.rate_hz, bases, wheel_base_m))
+        broadcasters.append(OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m))
     rates_hz = tuple(body.sensors[name].rate_hz for name in ("imu", "compass") if name in body.sensors)
     if rates_hz:
-        tellers.append(ImuTeller(rates_hz, options.north_deg))
+        broadcasters.append(ImuBroadcaster(rates_hz, options.north_deg))
     if "battery" in body.sensors:
-        tellers.append(BatteryTeller(body.sensors["battery"].rate_hz))
+        broadcasters.append(BatteryBroadcaster(body.sensors["battery"].rate_hz))
     if body.light:
         topics = topics_of_light("illuminance", len(body.light.angle_rad))
-        tellers.extend(LightTeller(t, body.light.rate_hz, cell, options.full_lux) for cell, t in enumerate(topics))
-    return tuple(tellers)
+        broadcasters.extend(
+            LightBroadcaster(t, body.light.rate_hz, cell, options.full_lux) for cell, t in enumerate(topics)
+        )
+    return tuple(broadcasters)

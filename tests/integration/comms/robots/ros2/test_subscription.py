@@ -7,7 +7,7 @@ import queue
 
 from swarmwire.comms.robots.ros2 import links
 from swarmwire.comms.robots.ros2.keys import attachment
-from swarmwire.comms.robots.ros2.links import Inlet
+from swarmwire.comms.robots.ros2.links import Subscription
 
 WAIT_S = 10.0
 
@@ -17,14 +17,14 @@ def test_frames_without_their_attachment_are_refused_by_name():
     client = links.open_client(endpoint, 5.0)
     taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     refused: queue.SimpleQueue[str] = queue.SimpleQueue()
-    inlet = Inlet(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
+    subscription = Subscription(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
     try:
         client.put("0/scan", b"bare")
         assert refused.get(timeout=WAIT_S) == "no_attachment"
         client.put("0/scan", b"whole", attachment=attachment(0, 1, bytes(16)))
         assert taken.get(timeout=WAIT_S) == b"whole"
         assert taken.empty()
-        inlet.close()
+        subscription.close()
     finally:
         links.close(client)
         links.close(router)

@@ -3,7 +3,7 @@
 import threading
 
 from swarmwire.agent.drivers.driver import STOP, Command
-from swarmwire.agent.drivers.ros2.driver import STOP_REPEATS, Commander
+from swarmwire.agent.drivers.ros2.driver import STOP_REPEATS, CommandPublisher
 
 DRIVE = Command(0.1, 0.5)
 
@@ -38,7 +38,7 @@ class StepClock:
 class SentPackets:
     def __init__(self) -> None:
         self.clock, self.commands = StepClock(), []
-        self.commander = Commander(self.commands.append, self.clock)
+        self.commander = CommandPublisher(self.commands.append, self.clock)
         self.clock.settle()
 
     def steps(self, count: int) -> list[Command]:
