@@ -80,7 +80,7 @@ class Simulation:
 
     Attributes:
         scenario: as checked.
-        world: every arena's bodies and senses; do not move it by hand.
+        world: every arena's bodies and sensors; do not move it by hand.
         metrics: what was measured up to the last tick, in `metrics.latest`.
         ticks: of the whole run.
         runners: processes that run the agents; 0: none, they are in this one.
@@ -343,7 +343,7 @@ class Simulation:
                 observer.begin(self.static)
 
     def _new_world(self, seed: int | None, seeds: SeedsGiven | None) -> World:
-        """Every arena at its start, with the senses that its agents need."""
+        """Every arena at its start, with the sensors that its agents need."""
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         needs = self._behind.sensors(needs, bodies_of(self.scenario, self.scenario.source))
         return World(self.scenario, choose_seeds(self.scenario, seed, seeds), needs)

@@ -8,19 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Command
-from swarmwire.comms.sensors import SENSOR_SPECS
 from tests.support.robots.made_up_readings import readings
 from tests.support.robots.rig import Rig
 from tests.support.robots.rigs import ON_ONE_RIG, RIGS
 
 
 def with_sensor(name: str) -> pytest.MarkDecorator:
-    """Only rigs that do not lack it."""
-    return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name not in kind.lacks], indirect=True)
+    """Only rigs that have it."""
+    return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name in kind.measures()], indirect=True)
 
 
-def test_a_driver_gives_all_senses_but_those_that_it_is_known_to_lack(connected: Rig) -> None:
-    assert connected.driver.measures == SENSOR_SPECS.keys() - connected.lacks
+def test_a_driver_measures_what_its_robot_and_gateway_have(connected: Rig) -> None:
+    assert connected.driver.measures == connected.measures()
     assert connected.driver.measures <= connected.body.sensors.keys()
     assert connected.driver.measures <= connected.gateway.sensors
 

@@ -1,4 +1,4 @@
-"""What hosts, backends and lockstep are fed with in tests: assignments, senses and received packets, all made up."""
+"""What hosts, backends and lockstep are fed with in tests: assignments, sensors and received packets, all made up."""
 
 from pathlib import Path
 from typing import Any

@@ -17,7 +17,7 @@ class Other(Message):
 
 
 class Chatter(Agent):
-    """Uses all that there is: senses, draws, packets of each kind, addresses, a command in some ticks only, LEDs."""
+    """Uses all that there is: sensors, draws, packets of each kind, addresses, a command in some ticks only, LEDs."""
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
     gain: float = 0.5

@@ -1,4 +1,4 @@
-"""Readings that a body's senses may tell, made up by hypothesis."""
+"""Readings that a body's sensors may tell, made up by hypothesis."""
 
 from collections.abc import Callable
 from math import inf, pi
@@ -17,7 +17,7 @@ _SHARE = st.floats(0.0, 1.0)
 
 
 def readings(body: Body, readings: frozenset[str]) -> st.SearchStrategy[Fields]:
-    """Fields of these senses, (1,) or (1, width) each; not of odometry, which cannot jump."""
+    """Fields of these sensors, (1,) or (1, width) each; not of odometry, which cannot jump."""
     made = [_OF[name](body) for name in sorted(readings) if name in _OF]
     return st.tuples(*made).map(lambda parts: {name: value for part in parts for name, value in part.items()})
 

@@ -1,7 +1,7 @@
 """A rig: a driver opened against its gateway, with readings of the test's choice, and what the gateway was told.
 
 What holds for every driver is tried on all rigs. To add a driver: a subclass of `Rig` that says what of the wire a test
-must know (how finely readings come back, within which limits), which senses the driver `lacks`, and its line in `RIGS`
+must know (which sensors it has, how finely their readings come back, within which limits), and its line in `RIGS`
 of `rigs.py`. Faults of the link are tried on each `OwnWireRig`, whose driver counts `garbage`, `silences`,
 `hung_up` and `late_answers`.
 """
@@ -19,7 +19,7 @@ from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.world.gateways.gateway import Gateway
 from tests.support.waiting import until
 
-Fields = dict[str, FloatArray]  # "sense.field" -> (1,) or (1, width): of the driver's robot
+Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width): of the driver's robot
 
 NEIGHBOUR = 1  # the other robot of the gateway's group, whose readings are others
 
@@ -36,20 +36,24 @@ class Rig(ABC):
     """A gateway of two robots and, once connected, the driver of the first.
 
     Attributes:
-        lacks: senses of sheets that the driver does not give; all others it must.
-        resolution: by "sense.field", how far from the published one a reading may be.
-        limits: by "sense.field", the least and the greatest that the wire can tell; others have none.
+        resolution: by "sensor.field" of all sensors that the driver measures, how far from the published one a
+            reading may be.
+        limits: by "sensor.field", the least and the greatest that the wire can tell; others have none.
         speed_resolution: the same of commands, in m/s and rad/s.
         farthest_m: how far a wheel may roll in a tick for the wire to tell it.
         silent_s: drivers that are made call a robot lost that is silent for so long; long, for machines are busy.
         connect_s: drivers that are made wait so long for their robot.
     """
 
-    lacks: ClassVar[frozenset[str]]
     resolution: ClassVar[dict[str, float]]
     limits: ClassVar[dict[str, tuple[float, float]]] = {}
     speed_resolution: ClassVar[tuple[float, float]]
     farthest_m: ClassVar[float] = 3.0
+
+    @classmethod
+    def measures(cls) -> set[str]:
+        """The sensors that the driver measures."""
+        return {name.partition(".")[0] for name in cls.resolution}
 
     def __init__(self) -> None:
         self.connect_s, self.silent_s = 10.0, 60.0

@@ -1,4 +1,4 @@
-"""Own senses and actuators for tests, good ones and bad ones."""
+"""Custom sensors and actuators for tests, good ones and bad ones."""
 
 from dataclasses import dataclass, field
 from typing import Any

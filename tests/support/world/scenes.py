@@ -1,4 +1,4 @@
-"""Scenes made by hand, and senses that look at them."""
+"""Scenes made by hand, and sensors that look at them."""
 
 from typing import Any
 

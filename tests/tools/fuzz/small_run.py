@@ -67,7 +67,7 @@ class SmallRun:
     Attributes:
         parts: the robots of each runner.
         layouts: of the memory of each group's robots.
-        senses: of the last tick; `received` and `tx_status` likewise.
+        readings: of the last tick; `received` and `tx_status` likewise.
         frames: to each runner, tick by tick; `answers`: from it.
         truths: what observers see.
     """

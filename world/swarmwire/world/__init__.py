@@ -1,1 +1,1 @@
-"""The world: scenario, placement, physics, sensors and the loop. It owns the truth and gives robots their senses."""
+"""The world: scenario, placement, physics, sensors and the loop. It owns the truth and gives robots their sensors."""

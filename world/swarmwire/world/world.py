@@ -73,7 +73,7 @@ class World:
     """
 
     def __init__(self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]]) -> None:
-        """An arena per seed; `needs` names, by group, the senses to compute (`radio.…` is not the world's affair).
+        """An arena per seed; `needs` names, by group, the sensors to compute (`radio.…` is not the world's affair).
 
         Raises BadInput if a body lacks a sense, or if something finds no room.
         """
@@ -127,7 +127,7 @@ class World:
         self.live(self.alive)
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
-        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, senses; all others do."""
+        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, sensors; all others do."""
         self.actuators.fail(failed)
         self._brake()
         shape = self.static.arenas, self.static.robots

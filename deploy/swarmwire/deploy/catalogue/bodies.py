@@ -40,7 +40,7 @@ def _body(body: Body, named: str) -> Entry:
     return Entry(
         kind="body",
         name=body.name,
-        help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; senses: {', '.join(body.sensors)}",
+        help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; sensors: {', '.join(body.sensors)}",
         facts=(
             ("in a scenario", f'body = "{named}" in [robots.GROUP]'),
             ("fastest ahead", f"{body.max_linear_mps:.4g} m/s"),

@@ -40,7 +40,10 @@ def _gateway(name: str) -> Entry:
         kind = gateway_kind(name, "")
     except BadInput as fault:
         return _missing("gateway", name, fault, GATEWAYS)
-    facts = (("in a run", f"swarmwire run --gateway {name}"), ("senses that it tells", ", ".join(sorted(kind.sensors))))
+    facts = (
+        ("in a run", f"swarmwire run --gateway {name}"),
+        ("sensors that it tells", ", ".join(sorted(kind.sensors))),
+    )
     return _entry("gateway", name, kind, facts)
 
 

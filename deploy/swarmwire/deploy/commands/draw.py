@@ -24,7 +24,7 @@ def draw_command(
     size: Annotated[int, typer.Option(help="Longer side in pixels.")] = USUAL_SIZE_PX,
     overrides: Overrides = None,
 ) -> None:
-    """Draw a scenario as it starts, or a body with its senses, without running anything.
+    """Draw a scenario as it starts, or a body with its sensors, without running anything.
 
     A scenario: arena, obstacles, lights, every robot where the seed puts it, and how far the radio reaches.
     A body: to scale and from above, with wheels, rays and photocells, its figures and their source.

@@ -12,7 +12,7 @@ from swarmwire.deploy.commands.options import AsJson
 
 def list_command(
     kind: Annotated[
-        str | None, typer.Argument(help="bodies, senses, behaviours, events, metrics, …; all kinds if left out.")
+        str | None, typer.Argument(help="bodies, sensors, behaviours, events, metrics, …; all kinds if left out.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -51,7 +51,7 @@ class Behind:
             raise BadInput("--runners", "", expected)
 
     def sensors(self, needs: Mapping[str, Sequence[str]], bodies: Mapping[str, Body]) -> dict[str, tuple[str, ...]]:
-        """The senses to compute, by group: what its agent needs and, behind a gateway, also all that this tells."""
+        """The sensors to compute, by group: what its agent needs and, behind a gateway, also all that this tells."""
         told = {group: self._chosen[group].sensors(bodies[group]) if group in self._chosen else () for group in needs}
         return {group: tuple(dict.fromkeys([*need, *told[group]])) for group, need in needs.items()}
 

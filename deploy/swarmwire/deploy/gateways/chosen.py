@@ -26,7 +26,7 @@ class Chosen:
     options: Any  # an instance of `made.options`
 
     def sensors(self, body: Body) -> tuple[str, ...]:
-        """The senses of this body that it tells."""
+        """The sensors of this body that it tells."""
         return tuple(name for name in body.sensors if name in self.made.sensors)
 
 

@@ -1,4 +1,4 @@
-"""How much of a run is shown: so many ticks a second of wall time, and of large swarms fewer links and senses.
+"""How much of a run is shown: so many ticks a second of wall time, and of large swarms fewer links and sensors.
 
 What adds up from tick to tick (counts of packets, contacts, events) is shown in full with the next tick that is; of the
 links that ended, those of that tick alone.
@@ -14,7 +14,7 @@ from swarmwire.comms.truth import Static, Truth
 FRAMES_PER_S = 30
 LINKS_PER_S = 5  # in large swarms, where links are most of a frame
 FEW = 200  # robots: up to so many, links come with every frame
-SMALL = 50  # robots: up to so many, everybody's senses are shown; of more, those of one
+SMALL = 50  # robots: up to so many, everybody's sensors are shown; of more, those of one
 MAX_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of more none
 
 
@@ -64,7 +64,7 @@ class Sampling:
     """Glimpses of one arena, out of the ticks of all."""
 
     def __init__(self, static: Static, arena: int, selected: str) -> None:
-        """Show this arena, and of a large swarm the senses of the robot `selected`."""
+        """Show this arena, and of a large swarm the sensors of the robot `selected`."""
         self._static, self._arena = static, arena
         self._serial = 0
         self._links = Rate(LINKS_PER_S)

@@ -2,7 +2,7 @@
 
     scenario.toml      overrides applied, the seed as run; what was left out stays left out
     files/<name>       agents, metrics, measured links, pictures of the arena, byte for byte; bodies of the user's own
-                       with the files of their senses and actuators, which lie beside them
+                       with the files of their sensors and actuators, which lie beside them
 
 Other bodies come with swarmwire and are covered by the digests of its parts. An agent file is loaded without its folder
 on `sys.path`, so there is nothing beside it that it could have imported; installed modules are not copied but named by

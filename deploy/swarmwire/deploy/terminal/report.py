@@ -46,7 +46,7 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
         elif value.mean is not None:
             table.add_row(name, _in_words(of[name], value))
     for body, sensors in result.global_sensors.items():
-        table.add_row("global senses", f"{body}: {', '.join(sensors)}")
+        table.add_row("global sensors", f"{body}: {', '.join(sensors)}")
     counts = [f"{name} {count}" for name, count in result.counts.items() if count]
     if counts:
         table.add_row("counts", ", ".join(counts))

@@ -20,7 +20,7 @@ _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
 
 
 def draw_parts(axes: Any, body: Body) -> None:
-    """Draw the senses that have a place on the body, and its LEDs, into axes whose limits are set."""
+    """Draw the sensors that have a place on the body, and its LEDs, into axes whose limits are set."""
     for sheet in body.sensors.values():
         match sheet:
             case ProximitySpec():

@@ -1,4 +1,4 @@
-"""A body on one sheet: from above and to scale, with its wheels and senses, its figures, and where they come from."""
+"""A body on one sheet: from above and to scale, with its wheels and sensors, its figures, and where they come from."""
 
 from pathlib import Path
 from textwrap import wrap

@@ -26,7 +26,7 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
 
 
 def _drawn(static: Static, selected: str) -> list[str]:
-    """What the selected robot's body lets the picture show of its senses."""
+    """What the selected robot's body lets the picture show of its sensors."""
     index = static.robot_names.index(selected)
     body = next(group.body for group in static.groups if group.start <= index < group.stop)
     rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []

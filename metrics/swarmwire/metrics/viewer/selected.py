@@ -22,7 +22,7 @@ _NOTHING, _THING, _ROBOT = range(3)  # what a ray meets
 _LIGHT_BAR = packed(LIGHT, 200)
 _RANGE_ALPHA, _RING_ALPHA = 45, 170
 _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
-_DRAWN = ("proximity.value", "light.value")  # senses
+_DRAWN = ("proximity.value", "light.value")  # sensors
 _RING_HEADINGS = 0.9  # radius of the ring in lengths of the heading's arrow
 _ORDER = 5.0
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 65)
@@ -54,7 +54,7 @@ class RerunSelected:
 
     Of the rays that see more than noise could feign, those on which a robot stands are red, the others white.
     Bars outwards from the rim tell how much light each photocell sees. Between a robot's turns these are what it
-    sensed last; senses that its agent does not use are not there.
+    sensed last; sensors that its agent does not use are not there.
     """
 
     def __init__(self, static: Static, arena: int, selected: str, radius_m: FloatArray, heading_m: FloatArray) -> None:

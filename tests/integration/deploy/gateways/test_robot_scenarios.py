@@ -7,7 +7,7 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import ROOT
 
 FOLDER = ROOT / "scenarios" / "robots"
-SENSOR_SPECS = {"turtlebot"}
+NOT_SCENARIOS = {"turtlebot"}
 BODIES = ("epuck2", "turtlebot")
 
 
@@ -22,7 +22,7 @@ def final(result: Result, metric: str) -> float:
 
 
 def test_all_of_them_are_tried_here_and_are_small_enough_for_a_desk() -> None:
-    names = {path.stem for path in FOLDER.glob("*.toml")} - SENSOR_SPECS
+    names = {path.stem for path in FOLDER.glob("*.toml")} - NOT_SCENARIOS
     assert names == {f"{behaviour}-{body}" for behaviour in ("avoidance", "flocking", "pso") for body in BODIES}
     for name in names:
         scenario = load_scenario(FOLDER / f"{name}.toml")

@@ -60,9 +60,7 @@ def test_rays_start_at_the_rim_and_end_at_their_range_with_the_front_up():
 
 
 @pytest.mark.parametrize(("range_m", "faint"), [(0.12, 1.0), (2.0, 0.1)])
-def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(
-    range_m, detection_threshold
-):
+def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells_their_range(range_m, faint):
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
@@ -70,7 +68,7 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
     axes = Figure().add_axes((0, 0, 1, 1))
     draw_from_above(axes, body_from({"like": "epuck", "name": "a", "sensors": readings}, "a.toml"))
     drawn = [artist for artist in axes.collections if isinstance(artist, LineCollection)][1:]
-    assert min(part.get_alpha() for part in drawn) == pytest.approx(detection_threshold)
+    assert min(part.get_alpha() for part in drawn) == pytest.approx(faint)
     legend = axes.get_legend()
     assert legend
     assert any(text.get_text().endswith(f" {range_m:g} m") for text in legend.get_texts())
@@ -186,12 +184,10 @@ def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, fault)
     assert not (tmp_path / "pdr.png").exists()
 
 
-@pytest.mark.parametrize(
-    ("module", "name"), [("matplotlib", "matplotlib"), ("imageio_ffmpeg", "imageio-ffmpeg"), ("jinja2", "jinja2")]
-)
-def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module, name):
+@pytest.mark.parametrize("module", ["matplotlib", "imageio_ffmpeg", "jinja2"])
+def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(BadInput, match=rf"^pictures: .*{name}.*swarmwire-metrics\[report\]"):
+    with pytest.raises(BadInput, match=rf"^pictures: .*{module}.*swarmwire-metrics\[report\]"):
         draw_body(load_body("epuck"), tmp_path / "a.png", 300)
     with pytest.raises(BadInput, check=lambda error: error.where == "films"):
         write_mp4(tmp_path / "a.mp4", iter(()), 10.0)

@@ -21,7 +21,6 @@ FASTEST_MPS = 1100 * STEP_M
 class Epuck2Rig(OwnWireRig):
     """Over TCP; the wire tells whole numbers of what the robot's converters have."""
 
-    lacks: ClassVar[frozenset[str]] = frozenset({"bumper", "positioning", "infrared", "camera"})
     resolution: ClassVar[dict[str, float]] = {
         "proximity.value": ROUNDED / 4095,
         "light.value": ROUNDED / 4000,

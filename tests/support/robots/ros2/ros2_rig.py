@@ -33,7 +33,6 @@ class Ros2Rig(Rig):
     A base tells all the time, so the driver has received of each sense once it is connected.
     """
 
-    lacks: ClassVar[frozenset[str]] = frozenset({"proximity", "bumper", "positioning", "infrared", "ground", "camera"})
     resolution: ClassVar[dict[str, float]] = {
         "scan.range_m": SINGLE,
         "light.value": DOUBLE,

@@ -101,11 +101,8 @@ class Offers(DocumentTarget):
         return [session_info.encode(), SessionInfo("run-2", "other", "", "0.1.0", 10, 2.5, ()).encode()]
 
     def feed(self, case: bytes) -> None:
-        session_info = SessionInfo.decode(case)
-        if (
-            SessionInfo.decode(session_info.encode()) != session_info
-            and session_info.real_time == session_info.real_time
-        ):
+        info = SessionInfo.decode(case)
+        if SessionInfo.decode(info.encode()) != info and info.real_time == info.real_time:
             raise AssertionError("a session info that is not what was read")
 
 

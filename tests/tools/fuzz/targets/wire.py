@@ -126,8 +126,8 @@ def _state(roster: Any) -> Any:
     ]
     if isinstance(roster, RealTime):
         arrays = (roster._pending_since_ns, roster._stopped, roster._drive, roster._command, roster.late)
-        kept = (roster._sent, roster._notes, roster._leds, roster._actuator_commands, roster._values)
-        return slots, [array.tobytes() for array in arrays], [len(one) for one in kept], dict(roster._numbers)
+        kept = len(roster._sent), len(roster._answers)
+        return slots, [array.tobytes() for array in arrays], kept, dict(roster._numbers)
     return slots, sorted(roster._by_runner), roster._tick
 
 

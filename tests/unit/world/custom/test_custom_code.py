@@ -1,4 +1,4 @@
-"""Own senses and actuators are refused at the door if they are wrong, and else like those that come along."""
+"""Custom sensors and actuators are refused at the door if they are wrong, and else like those that come along."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -60,7 +60,7 @@ def moved(of: World, tick: int) -> None:
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """What all senses read in each of 13 ticks, two arenas side by side."""
+    """What all sensors read in each of 13 ticks, two arenas side by side."""
     of, read = world(tmp_path_factory.mktemp("told"), (1, 2)), list[dict[str, Any]]()
     for tick in range(13):
         read.append(of.sense(tick)["a"].fields)

@@ -104,7 +104,7 @@ def test_shadows_are_those_of_a_search_among_all_robots(spread_m: float) -> None
     poses = random.uniform(-1, 1, (150, 3)) * [spread_m, spread_m, np.pi]
     lights = tuple(Light(*at, 20.0) for at in random.uniform(-2.5, 2.5, (6, 2)).tolist())
     lights = (*lights, Light(float(poses[0, 0]), -1.0, 20.0), Light(1.0, float(poses[1, 1]), 20.0))  # along the axes
-    tx_status = set[bool]()
+    lit = set[bool]()
     for light in lights:
         seen = values(scene(poses, EPUCK, size_m=5.0, boundary="open", lights=(light,))).any(axis=1)
         to = np.array([light.x_m, light.y_m]) - poses[:, :2]
@@ -113,8 +113,8 @@ def test_shadows_are_those_of_a_search_among_all_robots(spread_m: float) -> None
         share = np.clip((apart * to[:, None]).sum(2) / (length**2)[:, None], 0.0, 1.0)
         gap = np.hypot(*(apart - share[..., None] * to[:, None]).transpose(2, 0, 1)) + np.eye(len(poses))
         assert np.array_equal(seen, gap.min(axis=1) > EPUCK.radius_m)
-        tx_status |= set(seen.tolist())
-    assert tx_status == {True, False}
+        lit |= set(seen.tolist())
+    assert lit == {True, False}
 
 
 def test_light_noise_is_uniform_keyed_and_clipped() -> None:

@@ -23,7 +23,7 @@ from tests.support.world.scenes import scene
 assert FOOTBOT.proximity is not None
 RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
 RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": RESPONSE}
-SENSOR_SPECS: dict[str, Any] = {
+SEEING: dict[str, Any] = {
     "proximity": ProximitySpec(**RING),
     "infrared": InfraredSpec(**RING),
     "scan": ScanSpec(rays=45, range_m=1.0, at_m=0.02),
@@ -36,11 +36,11 @@ def seen(poses: Any, name: str, lamps: Any, size_m: float = 3.0) -> tuple[FloatA
     """What foot-bots at these poses sense of one another and of lamps, in the open."""
     lights = tuple(Lamp(x, y, 1.0) for x, y in lamps)
     looked_at = scene(poses, FOOTBOT, size_m=size_m, boundary="open", colour=0x00FF00, lights=lights)
-    sensor = sensor_of(name, SENSOR_SPECS[name], looked_at, Group("a", FOOTBOT, 0, len(poses)))
+    sensor = sensor_of(name, SEEING[name], looked_at, Group("a", FOOTBOT, 0, len(poses)))
     return tuple(field[0] for field in sensor.truth(0))
 
 
-@pytest.mark.parametrize("name", SENSOR_SPECS)
+@pytest.mark.parametrize("name", SEEING)
 @given(x=st.floats(-30, 30), y=st.floats(-30, 30), turn=st.floats(-20, 20), seed=st.integers(0, 5))
 def test_moving_and_turning_everything_changes_nothing(name: str, x: float, y: float, turn: float, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -60,7 +60,7 @@ def test_moving_and_turning_everything_changes_nothing(name: str, x: float, y: f
         assert np.allclose(one, other, atol=3e-6, equal_nan=True)
 
 
-@pytest.mark.parametrize("name", SENSOR_SPECS)
+@pytest.mark.parametrize("name", SEEING)
 @given(bearing=st.floats(0, 6.3), size_m=st.sampled_from([1.0, 3.0, 7.0]))
 def test_a_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: float) -> None:
     random = np.random.default_rng(3)
@@ -73,7 +73,7 @@ def test_a_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: 
 
 
 @pytest.mark.parametrize("running", [(True, True, True), (True, False, True)])
-@pytest.mark.parametrize("name", SENSOR_SPECS)
+@pytest.mark.parametrize("name", SEEING)
 def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tuple[bool, ...]) -> None:
     """Also beside an arena that is over, where nobody looks any more."""
     poses = np.random.default_rng(4).uniform(-1, 1, (3, 12, 3)) * [0.7, 0.7, np.pi]
@@ -91,10 +91,10 @@ def test_a_group_of_many_arenas_sees_what_it_sees_alone(name: str, running: tupl
         obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
     )
     group = Group("a", FOOTBOT, 3, 9)
-    together = sensor_of(name, SENSOR_SPECS[name], many, group).truth(0)
+    together = sensor_of(name, SEEING[name], many, group).truth(0)
     for arena in np.flatnonzero(running):
         alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
-        for one, other in zip(sensor_of(name, SENSOR_SPECS[name], alone, group).truth(0), together, strict=True):
+        for one, other in zip(sensor_of(name, SEEING[name], alone, group).truth(0), together, strict=True):
             assert np.array_equal(one[0], other[arena], equal_nan=True)
 
 
@@ -113,10 +113,10 @@ def test_an_obstacle_that_was_pushed_is_seen_where_it_is(name: str) -> None:
 
     group, pushed = Group("a", FOOTBOT, 0, 12), (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0))
     looked_at, expected = around(pillar, box, moves=True), around(*pushed)
-    sensor = sensor_of(name, SENSOR_SPECS[name], looked_at, group)
+    sensor = sensor_of(name, SEEING[name], looked_at, group)
     before = truth(sensor)
     for have, now in zip(looked_at.obstacles, expected.obstacles, strict=True):
         have[...] = now
     after = truth(sensor)
-    assert np.array_equal(after, truth(sensor_of(name, SENSOR_SPECS[name], expected, group)), equal_nan=True)
+    assert np.array_equal(after, truth(sensor_of(name, SEEING[name], expected, group)), equal_nan=True)
     assert not np.array_equal(before, after, equal_nan=True)

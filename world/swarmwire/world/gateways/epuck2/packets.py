@@ -120,7 +120,7 @@ class SensorPackets:
         return [data[start : start + size] for start in range(0, len(data), size)]
 
     def _at_rest(self) -> None:
-        """What a robot tells that has none of the senses, or was just switched on."""
+        """What a robot tells that has none of the sensors, or was just switched on."""
         rows = self._rows
         rows["acceleration"][:, 2] = rows["acceleration_size"] = readings.PER_G
         rows["ambient"], rows["distance_mm"] = readings.AMBIENT_DARK, readings.SEES_NOTHING_MM
