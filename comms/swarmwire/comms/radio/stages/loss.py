@@ -39,7 +39,7 @@ class LossModel(ABC):
     name: ClassVar[str]  # as in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
     kernel: ClassVar[Callable[..., Any]]  # (params, frame): RECEIVED, or the Fate of a lost frame
-    no_params: ClassVar[tuple[Any, ...]]  # of the type of `params`, for a radio without this loss
+    no_params: ClassVar[tuple[Any, ...]]  # for a radio without this loss; of the same numba type as `params`
     remembers: ClassVar[bool] = False  # whether links have state; frames of a link then come in the order of time
     varies: ClassVar[bool] = False  # whether `delivery` depends on the link
 
@@ -52,7 +52,8 @@ class LossModel(ABC):
     def params(self, pose: FloatArray, from_ns: int, links: int) -> tuple[Any, ...]:
         """A NamedTuple for the kernel, for frames at `from_ns` or later on at most so many links.
 
-        `pose` (rows, 3) holds at that time: x, y in m, heading in rad. A PHY takes the pose at the end of the frame.
+        `pose` (rows, 3): x, y in m, heading in rad; of the unit disk when the packet goes on air, of the PHY at the
+        frame's end. So a loss by position may differ between the two for a frame that spans two ticks.
         """
 
     @property
