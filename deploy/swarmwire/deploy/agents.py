@@ -49,4 +49,4 @@ def _untold(need: str, scenario: Scenario) -> str:
         return "only a radio that acknowledges tells: expected radio.access.method csma-802154 or dcf, acknowledged"
     if scenario.radio is None:
         return "only a radio tells: there is no [radio]"
-    return f"the radio does not tell: [radio] gives {', '.join(scenario.radio.measures.needs) or 'nothing'}"
+    return f"the radio does not measure: [radio.measures] has {', '.join(scenario.radio.measures.needs) or 'nothing'}"

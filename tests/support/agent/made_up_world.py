@@ -30,7 +30,7 @@ def given(**change: Any) -> bytes:
 
 
 class MadeUpWorld:
-    """Answers with the offer and the robots that it is told; None: it refuses. Frames follow once a runner is ready.
+    """Answers with session info and robots that it is told; None: it refuses. Frames follow once a runner is ready.
 
     Attributes:
         holds: whether it keeps those who ask for robots waiting, until `go_on`.
@@ -44,13 +44,13 @@ class MadeUpWorld:
         self.holds, self._held = False, list[zenoh.Query]()
         self._session, self._replies = session, {self.keys.any_session_info: session_info, self.keys.any_join: join}
         self._declared = (
-            session.declare_queryable(self.keys.any_session_info, Callback(self._offer, indirect=False)),
+            session.declare_queryable(self.keys.any_session_info, Callback(self._session_info, indirect=False)),
             session.declare_queryable(self.keys.any_join, Callback(self._join, indirect=False)),
             session.declare_subscriber(self.keys.any_answer, Callback(self._answer, indirect=False)),
             session.liveliness().declare_token(self.keys.world),
         )
 
-    def _offer(self, query: zenoh.Query) -> None:
+    def _session_info(self, query: zenoh.Query) -> None:
         self._reply(query, self.keys.any_session_info)
 
     def _join(self, query: zenoh.Query) -> None:

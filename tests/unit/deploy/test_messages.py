@@ -55,7 +55,8 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
     ),
     (
         "radio.measures={}",
-        "robots.flock.agent: Flocking needs 'radio.range', which the radio does not tell: [radio] gives nothing",
+        "robots.flock.agent: Flocking needs 'radio.range', which the radio does not measure: "
+        "[radio.measures] has nothing",
     ),
 ]
 OF_COMMANDS = [

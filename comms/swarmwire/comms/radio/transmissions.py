@@ -22,7 +22,7 @@ class Transmissions(NamedTuple):
     sequence: IntArray  # (k,) number of packets that the sender sent before, refused ones included
     intended: IntArray  # (k,) number of intended receivers
     epoch: IntArray  # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots alive then
-    tag: IntArray  # (k,) topic
+    tag: IntArray  # (k,) the message's class, as a tag on the wire
     sent_at_ns: IntArray  # (k,) arrival at the sender's radio
     on_air_at_ns: IntArray  # (k,) start of the first bit
     off_air_at_ns: IntArray  # (k,) end of the last bit

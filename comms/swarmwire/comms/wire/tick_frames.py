@@ -81,7 +81,7 @@ def decode_tick(
                 groups.setdefault(name, {})[sensor] = array
         readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in groups.items()}
         if not readings or not readings.keys() <= known:
-            raise BadFrame("malformed", "sense: expected groups of this runner")
+            raise BadFrame("malformed", "readings: expected groups of this runner")
         return readings, *results_of(frame, measures)
     except (KeyError, ValueError) as error:
         raise BadFrame("malformed", f"an array is missing or of the wrong shape: {error}") from error

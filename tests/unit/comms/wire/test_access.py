@@ -107,7 +107,7 @@ def test_a_runner_speaks_and_hears_for_itself_alone() -> None:
     access = agents_access(RUN_KEYS, ACCESS)
     assert keys_of(access, "a", "ingress", "put") == {RUN_KEYS.answer("a")}
     assert keys_of(access, "a", "egress", "put") == {RUN_KEYS.frame("a")}
-    assert keys_of(access, "a", "ingress", "query") == {RUN_KEYS.offer("a"), RUN_KEYS.join("a")}
+    assert keys_of(access, "a", "ingress", "query") == {RUN_KEYS.session_info("a"), RUN_KEYS.join("a")}
     assert keys_of(access, "a", "ingress", "liveliness_token") == {RUN_KEYS.alive("a")}
 
 
@@ -170,7 +170,7 @@ def test_names_that_are_none_or_stand_for_two_are_refused_everywhere(access: Run
 
 def test_a_key_of_a_runner_leads_back_to_it():
     keys = Keys("run-1")
-    of_runner = (keys.offer, keys.join, keys.alive, keys.frame, keys.answer)
+    of_runner = (keys.session_info, keys.join, keys.alive, keys.frame, keys.answer)
     assert {runner_of(key("flock-3")) for key in of_runner} == {"flock-3"}
 
 

@@ -80,13 +80,13 @@ def test_a_request_may_have_a_megabyte_and_no_more() -> None:
         versioned(msgpack.packb({"v": VERSION, "x": bytes(MAX_JOIN_BYTES - empty + 1)}))
 
 
-def test_an_offer_of_very_many_robots_comes_over_whole() -> None:
+def test_a_session_info_of_very_many_robots_comes_over_whole() -> None:
     free = tuple(f"flock-{at}" for at in range(100_000))
     group = GroupInfo("flock", "mine.py:Mine", "a" * 64, len(free), free)
-    offer = SessionInfo("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
-    data = offer.encode()
+    session_info = SessionInfo("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
+    data = session_info.encode()
     assert len(data) > MAX_JOIN_BYTES
-    assert SessionInfo.decode(data) == offer
+    assert SessionInfo.decode(data) == session_info
 
 
 GROUP = GroupInfo("flock", "mine.py:Mine", "a" * 64, 3, ("flock-0", "flock-2"))
@@ -94,13 +94,13 @@ OFFER = SessionInfo("RUN", "some", "d" * 64, "1.2.3", 10, None, (GROUP, replace(
 
 
 def told(**changed: Any) -> bytes:
-    """An offer with these values in place of its own; `...` takes them out."""
+    """A session info with these values in place of its own; `...` takes them out."""
     body = {"v": VERSION, **asdict(OFFER), **changed}
     return msgpack.packb({name: value for name, value in body.items() if value is not ...})
 
 
 @pytest.mark.parametrize("factor", [None, 1.0, 0.5, 2])
-def test_an_offer_comes_over_whole(factor: float | None) -> None:
+def test_a_session_info_comes_over_whole(factor: float | None) -> None:
     got = SessionInfo.decode(replace(OFFER, real_time=factor).encode())
     assert got == replace(OFFER, real_time=factor)
     assert factor is None or type(got.real_time) is float
@@ -136,13 +136,13 @@ def test_robots_become_free_by_group() -> None:
     ],
     ids=str,
 )
-def test_what_is_no_offer_is_refused(changed: dict[str, Any], named: str) -> None:
-    with pytest.raises(BadFrame, match=re.escape(f"offer{named}")) as caught:
+def test_what_is_no_session_info_is_refused(changed: dict[str, Any], named: str) -> None:
+    with pytest.raises(BadFrame, match=re.escape(f"session info{named}")) as caught:
         SessionInfo.decode(told(**changed))
     assert caught.value.fault == "malformed"
 
 
-def test_an_offer_of_another_version_is_named() -> None:
+def test_a_session_info_of_another_version_is_named() -> None:
     with pytest.raises(BadFrame, match="version") as caught:
         SessionInfo.decode(told(v=VERSION + 1))
     assert caught.value.fault == "version"
