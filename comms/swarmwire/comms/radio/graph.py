@@ -22,5 +22,5 @@ def edges(pair: IntArray, delivery: FloatArray | float, min_delivery: float) -> 
 
     The edges are in the order of the pairs: a < b in each, sorted.
     """
-    joined = np.broadcast_to(is_enough(delivery, min_delivery), len(pair))
-    return pair if joined.all() else pair[joined]
+    joined = is_enough(delivery, min_delivery)
+    return pair if joined.all() else pair[np.broadcast_to(joined, len(pair))]

@@ -84,7 +84,7 @@ def test_without_noise_the_target_is_the_command() -> None:
 def test_truth_keeps_the_command_and_the_robot_drifts(kind: str) -> None:
     world = World(posed([[0.0, 0.0, 0.0]]), [1], {})
     if kind == "noisy":
-        world.actuators._noise = noisy(robots=1, keys=world.keys, bias_std_mps=0.02)._noise
+        world.actuators = noisy(robots=1, keys=world.keys, bias_std_mps=0.02)
     for _ in range(20):
         world.move(commanded(world, 0.05, 0.0))
     assert world.command.tolist() == [[0.05, 0.0, 0.0]]

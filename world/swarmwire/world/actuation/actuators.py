@@ -276,8 +276,11 @@ class Actuators:
         commands = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
         clipped, not_finite = take_commands(self._limits, alive, *commands, self.command)
         self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
-        errors = self._limits.wheel_base_m, self._noise, self.failed
-        drive_target(self._keys, *errors, self._ticks, self.command, self.target)
+        if self._exact:
+            self.target[:] = self.command.reshape(self.target.shape)
+        else:
+            errors = self._limits.wheel_base_m, self._noise, self.failed
+            drive_target(self._keys, *errors, self._ticks, self.command, self.target)
         self.leds.take(actions.leds, alive)
         self._ticks += 1
 
@@ -286,6 +289,7 @@ class Actuators:
         none = np.zeros(self.target.shape[:2], np.bool_)
         parts = (failed[part].reshape(none.shape) if part in failed else none for part in (MOTORS, *WHEELS))
         self.failed = FailedParts(*parts)
+        self._exact = not (self._noise.noisy.any() or any(part.any() for part in self.failed))
 
     def stop(self, dead: BoolArray) -> None:
         """Stop these robots (rows,) and switch off their LEDs."""

@@ -3,6 +3,7 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ from swarmwire.comms.radio.stages.trace import TraceLoss
 # The order of the tests in a unit disk; a PHY tests those that remember last.
 LOSS_MODELS: tuple[type[LossModel], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
-
 NO_HOLD = -1
+NO_ORDER = np.empty(0, np.int64)
 
 
 class Losses(NamedTuple):
@@ -67,10 +68,16 @@ _fate_by = _dispatcher(LOSS_MODELS)
 
 
 class LossChain:
-    """The losses that a radio has: `models`, in the order of LOSS_MODELS."""
+    """The losses that a radio has.
+
+    Attributes:
+        models: in the order of LOSS_MODELS.
+        passing: long-run share of frames that pass all losses on every link; those that vary by link come on top.
+        varies: whether `delivery` depends on the link.
+    """
 
     def __init__(self, models: list[LossModel]) -> None:
-        self.models = models
+        self._use(models)
 
     @classmethod
     def of(cls, context: ChannelContext) -> "LossChain":
@@ -80,7 +87,8 @@ class LossChain:
 
     def tune(self, context: ChannelContext, at_ns: int) -> None:
         """Use the radio parameters of `context` from `at_ns` on; losses keep their state."""
-        previous, self.models = {type(model): model for model in self.models}, LossChain.of(context).models
+        previous = {type(model): model for model in self.models}
+        self._use(LossChain.of(context).models)
         for model in self.models:
             if type(model) in previous:
                 model.go_on_from(previous[type(model)], at_ns)
@@ -91,33 +99,22 @@ class LossChain:
         The robots have been at `pose` (rows, 3) since `hold_ns`. Losses that remember come last: they see no frame that
         another loss ends.
         """
-        models = sorted(self.models, key=lambda model: model.remembers)
-        return _losses_of(models, pose, hold_ns, from_ns, links)
+        return _losses_of(self._forgetful + self._remembering, pose, hold_ns, from_ns, links)
 
     def decide(self, links: Links, pose: FloatArray, keys: KeyArray, count_only: bool) -> None:
         """Set the fates of links of a unit disk that a loss ends; in place.
 
         With `count_only`, losses that remember are left out. `keys` (arenas,) are those of the arenas.
         """
-        models = [model for model in self.models if not (count_only and model.remembers)]
+        models = self._forgetful if count_only else self.models
         if not models or not len(links.fate):
             return
-        index = np.empty(0, np.int64)
-        if any(model.remembers for model in models):  # frames of a link are tested in the order of time
+        index = NO_ORDER
+        if self._remembering and not count_only:  # frames of a link are tested in the order of time
             index = np.argsort(links.final_at_ns, kind="stable")
         losses = _losses_of(models, pose, NO_HOLD, int(links.final_at_ns.min()), len(links.fate))
         columns = links.sender, links.receiver, links.sequence, links.final_at_ns, links.fate, links.in_range
         _decide(losses, keys, len(pose) // len(keys), index, *columns)
-
-    @property
-    def passing(self) -> float:
-        """Long-run share of frames that pass all losses on every link; those that vary by link come on top."""
-        return math.prod((model.passing for model in self.models), start=1.0)
-
-    @property
-    def varies(self) -> bool:
-        """Whether `delivery` depends on the link."""
-        return any(model.varies for model in self.models)
 
     def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray | float:
         """Probability that a frame passes beside `passing`, by link between robot rows, (k,)."""
@@ -126,11 +123,23 @@ class LossChain:
             share = share * model.delivery(sender, receiver, pose, at_ns)
         return share
 
+    def _use(self, models: list[LossModel]) -> None:
+        self.models = models
+        self._forgetful = [model for model in models if not model.remembers]
+        self._remembering = [model for model in models if model.remembers]
+        self.passing = math.prod((model.passing for model in models), start=1.0)
+        self.varies = any(model.varies for model in models)
+
 
 def _losses_of(models: list[LossModel], pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
     params = {type(model): model.params(pose, from_ns, links) for model in models}
-    order = np.array([LOSS_MODELS.index(kind) for kind in params], np.int64)
-    return Losses(order, hold_ns, tuple(params.get(kind, kind.no_params) for kind in LOSS_MODELS))
+    return Losses(_order_of(tuple(params)), hold_ns, tuple(params.get(kind, kind.no_params) for kind in LOSS_MODELS))
+
+
+@cache
+def _order_of(kinds: tuple[type[LossModel], ...]) -> IntArray:
+    """The places of these losses in LOSS_MODELS."""
+    return np.array([LOSS_MODELS.index(kind) for kind in kinds], np.int64)
 
 
 @kernel(from_python=True)
@@ -184,8 +193,9 @@ class LossStage(Stage):
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
         """The probability of the worse direction."""
-        losses, at_ns = self._losses, int(links.final_at_ns.max(initial=0))
+        losses = self._losses
         if not losses.varies:
             return losses.passing
+        at_ns = int(links.final_at_ns.max(initial=0))
         forward = losses.delivery(links.sender, links.receiver, pose, at_ns)
         return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, pose, at_ns))

@@ -83,9 +83,13 @@ def _list_pairs(robots, state, running, per_arena, cells, around, max_radius_m, 
         arena, x, y = row // per_arena, state[row, 0], state[row, 1]
         if not running[arena]:
             continue
-        begin = count
-        for at in range(cells_around(around, cells, arena, x, y)):
-            for k in range(cells.start[around[at]], cells.start[around[at] + 1]):
+        begin, at, around_it = count, 0, cells_around(around, cells, arena, x, y)
+        while at < around_it:
+            first = around[at]
+            while at + 1 < around_it and around[at + 1] == around[at] + 1:  # cells side by side are read at once
+                at += 1
+            at += 1
+            for k in range(cells.start[first], cells.start[around[at - 1] + 1]):
                 other = arena * per_arena + cells.item[k]
                 dx, dy = state[other, 0] - x, state[other, 1] - y
                 apart2 = dx * dx + dy * dy
