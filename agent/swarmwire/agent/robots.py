@@ -119,11 +119,17 @@ class Robots(RobotHandle[FloatArray]):
         Bodies with a holonomic drive can also move sideways, positive to the left.
         """
         context = self._context
-        moved = True if rows is None else context.mask(rows)
-        np.copyto(context.drive, True, where=moved)
-        np.copyto(context.linear_mps, linear_mps, where=moved)
-        np.copyto(context.angular_radps, angular_radps, where=moved)
-        np.copyto(context.lateral_mps, lateral_mps, where=moved)
+        mask = None if rows is None else context.mask(rows)
+        for column, speed in (
+            (context.drive, True),
+            (context.linear_mps, linear_mps),
+            (context.angular_radps, angular_radps),
+            (context.lateral_mps, lateral_mps),
+        ):
+            if mask is None:
+                column[...] = speed  # a third of the time of copyto
+            else:
+                np.copyto(column, speed, where=mask)
 
     def wheels(self, left_mps: ArrayLike, right_mps: ArrayLike, rows: BoolArray | None = None) -> None:
         """Command the speeds of two wheels, (n,) or one number; IncompatibleBody if the bodies have none."""
