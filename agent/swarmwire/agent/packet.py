@@ -3,6 +3,7 @@
 The measurements of the radio medium (range, bearing, RSSI) are read only if the agent's `needs` name them.
 """
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, cast
@@ -108,12 +109,11 @@ class Packets(Generic[M]):
 class ReceivedLists:
     """The packets of a tick as Python lists, for agents that read them number by number."""
 
-    __slots__ = ("_columns", "_data", "_first", "_needs", "_offset", "_payload", "_table")
+    __slots__ = ("_columns", "_data", "_needs", "_offset", "_payload", "_receiver", "_table")
 
-    def __init__(self, robots: int, table: ReceivedPackets, needs: tuple[str, ...]) -> None:
+    def __init__(self, table: ReceivedPackets, needs: tuple[str, ...]) -> None:
         self._table, self._needs = table, needs
-        # Of each of the robots, the place of its first packet in the table, and the end of the last one's.
-        self._first: list[int] = np.searchsorted(table.receiver, np.arange(robots + 1)).tolist()
+        self._receiver: list[int] = table.receiver.tolist()  # they rise
         self._payload: list[int] = table.payload.tolist()
         self._offset: list[int] = table.payloads.offset.tolist()
         self._data = table.payloads.data.tobytes()
@@ -126,7 +126,7 @@ class ReceivedLists:
         """
         data, offset = self._data, self._offset
         low, high = tag & 0xFF, tag >> 8
-        for at in range(self._first[row], self._first[row + 1]):
+        for at in range(bisect_left(self._receiver, row), bisect_right(self._receiver, row)):
             payload = self._payload[at]
             start, end = offset[payload], offset[payload + 1]
             size = end - start

@@ -91,7 +91,7 @@ class StepContext:
     def received_lists(self) -> ReceivedLists:
         """All packets that these robots received, for agents of one robot each."""
         if self._lists is None:
-            self._lists = ReceivedLists(self.n, self.received, self.needs)
+            self._lists = ReceivedLists(self.received, self.needs)
         return self._lists
 
     def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:

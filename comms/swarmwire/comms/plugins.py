@@ -13,14 +13,16 @@ from dataclasses import is_dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from traceback import extract_tb
 from types import CodeType
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
 
@@ -29,19 +31,21 @@ class NotLoaded(ValueError):
     """A text that names no object which can be loaded; the message gives the reason."""
 
 
-def entry_points_of(group: str) -> tuple[EntryPoint, ...]:
+def entry_points_of(group: str) -> "tuple[EntryPoint, ...]":
     """The entry points of a group, in no order; cached until `sys.path` changes."""
     return _entry_points_of(group, tuple(sys.path))
 
 
 @cache
-def _entry_points_of(group: str, _path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+def _entry_points_of(group: str, _path: tuple[str, ...]) -> "tuple[EntryPoint, ...]":
+    from importlib.metadata import entry_points  # 3 MB, which a runner does without
+
     return tuple(entry_points(group=group))
 
 
-def installed_points(group: str) -> dict[str, tuple[EntryPoint, ...]]:
+def installed_points(group: str) -> "dict[str, tuple[EntryPoint, ...]]":
     """The entry points of a group by name, names sorted; a name has several where several packages declare it."""
-    by_name: dict[str, tuple[EntryPoint, ...]] = {}
+    by_name: "dict[str, tuple[EntryPoint, ...]]" = {}
     for point in sorted(entry_points_of(group), key=lambda point: point.name):
         by_name[point.name] = (*by_name.get(point.name, ()), point)
     return by_name
@@ -72,11 +76,11 @@ def installed_class(group: str, name: str, base: type[T], what: str, where: str,
     return kind
 
 
-def _package(point: EntryPoint) -> str:
+def _package(point: "EntryPoint") -> str:
     return point.dist.name if point.dist else "an unknown package"
 
 
-def _remedy(point: EntryPoint, error: ImportError) -> str:
+def _remedy(point: "EntryPoint", error: ImportError) -> str:
     """The command that installs the missing package, if an extra has the name of the entry point."""
     extras = point.dist.metadata.get_all("Provides-Extra") or [] if point.dist else []
     missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
