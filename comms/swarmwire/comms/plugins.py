@@ -45,7 +45,7 @@ def _entry_points_of(group: str, _path: tuple[str, ...]) -> "tuple[EntryPoint, .
 
 def installed_points(group: str) -> "dict[str, tuple[EntryPoint, ...]]":
     """The entry points of a group by name, names sorted; a name has several where several packages declare it."""
-    by_name: "dict[str, tuple[EntryPoint, ...]]" = {}
+    by_name: dict[str, tuple[EntryPoint, ...]] = {}
     for point in sorted(entry_points_of(group), key=lambda point: point.name):
         by_name[point.name] = (*by_name.get(point.name, ()), point)
     return by_name
