@@ -17,7 +17,7 @@ import asyncssh
 
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.clock import WallClock, to_s
-from swarmwire.deploy.commands.robots.contents import contents_of
+from swarmwire.deploy.cli.robots.contents import contents_of
 from swarmwire.deploy.fleet.deploy import deploy
 from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
 from swarmwire.deploy.fleet.environment.target import Target

@@ -24,7 +24,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from tests.docs.pages import ROOT, blocks_of, files_of
 from tests.support.waiting import until
 

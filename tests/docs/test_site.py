@@ -24,7 +24,7 @@ from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
 from swarmwire.deploy import run
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.scenario_file import scenario_schema

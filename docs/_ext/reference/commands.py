@@ -6,7 +6,7 @@ from typing import Any
 from typer.main import get_command
 
 from reference.markdown import NOTHING, code, sentence, table, toml_code
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 
 
 def command_tables() -> str:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, run
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.verify import verify

@@ -14,7 +14,7 @@ from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.inputs import RecordedBackend
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun

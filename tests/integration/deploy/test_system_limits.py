@@ -30,7 +30,7 @@ def test_a_run_raises_its_limit_of_open_files_as_far_as_it_needs(few_files):
 
 def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
     few = "import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)); "
-    call = "from swarmwire.deploy.cli import main; sys.argv[0] = 'swarmwire'; main()"
+    call = "from swarmwire.deploy.cli.app import main; sys.argv[0] = 'swarmwire'; main()"
     command = [sys.executable, "-c", few + call, "run", LOSSY, "--runners", "per-robot", "--out", tmp_path / "run"]
     told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
     assert told.returncode == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.deploy.cli import main
+from swarmwire.deploy.cli.app import main
 
 ROOT = Path(__file__).parents[3]
 LOSSY = ROOT / "scenarios" / "flocking-lossy.toml"

@@ -9,7 +9,7 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
-from swarmwire.deploy.commands.view import view_command
+from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer_program
 from swarmwire.deploy.live.evened import Evened
 from swarmwire.deploy.live.sampling import Sampling, Since

@@ -5,7 +5,7 @@ import errno
 import numpy as np
 import pytest
 
-from swarmwire.deploy import cli
+from swarmwire.deploy.cli import app as cli
 from swarmwire.deploy.refusals import refusal
 from tests.support.deploy.commands import called
 

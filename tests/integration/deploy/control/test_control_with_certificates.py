@@ -14,7 +14,7 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observe
 from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.control import remote_control
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.control.remote_control import controlling, only_run_at

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live.live_file import read_live
 from swarmwire.metrics.record.names import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY, started

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from tests.support.deploy.commands import LOSSY, ROOT
 
 WALLED = ROOT / "scenarios" / "flocking-802154.toml"

@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.cli import app
-from swarmwire.deploy.commands.ctl.selection import selection_of
+from swarmwire.deploy.cli.app import app
+from swarmwire.deploy.cli.ctl.selection import selection_of
 from tests.support.deploy.control.going import going
 from tests.support.waiting import until
 

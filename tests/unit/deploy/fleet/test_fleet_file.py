@@ -41,7 +41,7 @@ def test_the_example_is_a_fleet():
 
 
 def test_the_examples_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.commands.robots.contents import contents_of
+    from swarmwire.deploy.cli.robots.contents import contents_of
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.errors import Interrupted
-from swarmwire.deploy.commands.robots.acting import act
+from swarmwire.deploy.cli.robots.acting import act
 from swarmwire.deploy.fleet.host_failed import HostFailed
 from swarmwire.deploy.fleet.progress import Nothing, result_lines, shown_on
 from swarmwire.deploy.fleet.result import Result

@@ -1,0 +1,134 @@
+"""`swarmwire world`."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from swarmwire.comms.extras import UI
+from swarmwire.deploy.cli.access_options import (
+    Ca,
+    Certificate,
+    Certs,
+    Insecure,
+    Key,
+    Name,
+    ObserverNames,
+    OperatorNames,
+    Revoked,
+    RouterNames,
+    RunnerNames,
+)
+from swarmwire.deploy.cli.exit_codes import INTERRUPTED
+from swarmwire.deploy.cli.options import Links, Overrides, Packets, Quiet, ScenarioFile, Seed
+from swarmwire.deploy.cli.run import Out, RealTime, Rrd, Seeds, Select, Subtick, Ui, View, run_shown
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.certificates.member import Member
+
+
+def world_command(
+    scenario: ScenarioFile,
+    listen: Annotated[
+        list[str],
+        typer.Option("--listen", help="Where runners call: tls/0.0.0.0:7447. Repeatable.", metavar="ENDPOINT"),
+    ],
+    observe: Annotated[
+        list[str] | None,
+        typer.Option("--observe", help="Where observers and operators call. Repeatable.", metavar="ENDPOINT"),
+    ] = None,
+    start_with: Annotated[
+        int | None,
+        typer.Option(
+            help="Begin once so many robots have an agent; the others do what run.on_runner_loss says, stand or coast. "
+            "Default: all.",
+            metavar="N",
+        ),
+    ] = None,
+    out: Out = None,
+    seed: Seed = None,
+    seeds: Seeds = None,
+    overrides: Overrides = None,
+    realtime: RealTime = None,
+    subtick: Subtick = None,
+    packets: Packets = "off",
+    links: Links = False,
+    rrd: Rrd = True,
+    select: Select = None,
+    view: View = False,
+    ui: Ui = False,
+    certs: Certs = None,
+    name: Name = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    runners: RunnerNames = None,
+    observers: ObserverNames = None,
+    operators: OperatorNames = None,
+    routers: RouterNames = None,
+    revoked: Revoked = None,
+    insecure: Insecure = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a scenario with agents from elsewhere: it waits for them, and says what to type there.
+
+    Each comes with swarmwire join, from another terminal or another machine, with the agent that is installed there,
+    and gets robots that are free. It may come late, leave, and come back, where run.on_runner_loss of the scenario is
+    wait, stand or coast. For example:
+
+      swarmwire world scenarios/flocking-lossy.toml --listen tls/0.0.0.0:7447 --certs lab-certs
+    """
+    # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.comms.wire.access_control import WORLD, RunAccess
+    from swarmwire.deploy.arguments import choose_seeds
+    from swarmwire.deploy.certificates.member import member
+    from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.listening import Listening
+    from swarmwire.deploy.record.new_folder import default_folder
+    from swarmwire.deploy.record.recording import Recording, packet_share
+    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.deploy.terminal.gathering import Gathering
+    from swarmwire.world.scenario_file import load_scenario
+
+    if ui:
+        UI.need("--ui")
+    checked = load_scenario(scenario, overrides or [])
+    of = member(
+        WORLD,
+        certs=certs,
+        name=name,
+        files=(ca, certificate, key),
+        access=RunAccess(
+            runners=tuple(runners or ()),
+            observers=tuple(observers or ()),
+            operators=tuple(operators or ()),
+            routers=tuple(routers or ()),
+        ),
+        revoked=revoked or (),
+        insecure=insecure,
+    )
+    _warn(of, [*listen, *(observe or ())])
+    chosen = choose_seeds(checked, seed, seeds)
+    folder = out or default_folder(scenario.stem, chosen)
+    console = Console(quiet=quiet, highlight=False)
+    robots = tuple(robot for _ in chosen for robot in checked.robot_names())
+    with Gathering(robots, start_with, of.network, console) as gathering, compiling_told(console):
+        simulation = Simulation(
+            checked,
+            seeds=chosen,
+            out=folder,
+            realtime=realtime,
+            subtick=subtick,
+            record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
+            listening=Listening(tuple(listen), tuple(observe or ()), of.network, of.access, start_with, told=gathering),
+        )
+        simulation.watch(gathering)
+        result = run_shown(simulation, folder, console, view=view, ui=ui)
+    if result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _warn(of: "Member", endpoints: list[str]) -> None:
+    warning = of.warning(endpoints)
+    if warning is not None:
+        typer.echo(f"warning: {warning}", err=True)
