@@ -10,18 +10,13 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.refusals import refusal
 
 
-class Guarded:
+class Guarded(Observer):
     """An observer whose errors end with it."""
 
     def __init__(self, observer: Observer, say: Callable[[str], None]) -> None:
         """`say` is told what failed."""
         self._observer, self._say = observer, say
-        self.failed = False
-
-    @property
-    def before_agents(self) -> bool:
-        """Whether it begins before the run's agents are there, where they come from elsewhere."""
-        return getattr(self._observer, "before_agents", False)
+        self.failed, self.before_agents = False, observer.before_agents
 
     @property
     def name(self) -> str:

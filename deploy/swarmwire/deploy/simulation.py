@@ -296,7 +296,7 @@ class Simulation:
     @property
     def _early(self) -> list[Observer]:
         """Those through which people see and control a run that still waits for its agents."""
-        return [of for of in self._watching if getattr(of, "before_agents", False)]
+        return [of for of in self._watching if of.before_agents]
 
     def _begin_record(self) -> Origin:
         """Write down what is about to run, before anything does."""

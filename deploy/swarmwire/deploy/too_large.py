@@ -1,15 +1,15 @@
 """A packet that can never be sent is the agent's mistake, and people are told of the first."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import Static, Truth
 
 
-class TooLarge:
+class TooLarge(Observer):
     """Observer that tells once of a packet above the medium's largest payload."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -29,7 +29,3 @@ class TooLarge:
             first = np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0]
             who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
             self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing for the summary, which counts the fate."""
-        return {}

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 
 
-class EventLog:
+class EventLog(Observer):
     """Observer that keeps what happened. Summary part: `events`, in order.
 
     Each: at_s (of the scenario; of what happens singly, the tick's start), tick (in which it took effect), do, part

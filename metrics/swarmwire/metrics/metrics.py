@@ -10,6 +10,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric
@@ -18,7 +19,7 @@ from swarmwire.metrics.plain import plain
 from swarmwire.metrics.registry import chosen
 
 
-class Metrics:
+class Metrics(Observer):
     """Observer that measures each tick. Summary part: `metrics`, per arena {name: {final, mean, min, max}}.
 
     mean, min and max are over ticks: of a level its value at each, of a count what each added, so a count's mean is

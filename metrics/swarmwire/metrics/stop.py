@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import to_ns, to_s
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metrics import Metrics
 
@@ -29,7 +30,7 @@ class Condition:
         return f"{self.metric} {self.comparison.replace('_', ' ')} {self.limit:g}{hold}"
 
 
-class StopConditions:
+class StopConditions(Observer):
     """Observer that finds arenas over.
 
     Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.

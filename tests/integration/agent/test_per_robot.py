@@ -3,6 +3,7 @@
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import run
 
 LANES = """
@@ -43,16 +44,11 @@ def scenario(tmp_path):
     return tmp_path / "lanes.toml"
 
 
-class Commands:
+class Commands(Observer):
     """Observer that keeps the last commands."""
-
-    def begin(self, static): ...
 
     def see(self, truth):
         self.last = truth.command.copy()
-
-    def end(self, last):
-        return {}
 
 
 def test_every_robot_gets_its_own_in_every_layout(scenario):

@@ -1,11 +1,10 @@
 """Frames that are not what they should be are counted and named in the summary, and the run goes on, unchanged."""
 
-from typing import Any
-
 import numpy as np
 import zenoh
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
@@ -15,14 +14,11 @@ from swarmwire.deploy.simulation import Simulation
 from tests.support.deploy.commands import LOSSY
 
 
-class Vandal:
+class Vandal(Observer):
     """An observer that speaks to the agents' endpoint as a stranger would, in the middle of a run."""
 
     def __init__(self, path: str) -> None:
         self._path, self.keys = path, Keys("unknown")
-
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
 
     def see(self, truth: Truth) -> None:
         """Every kind of bad frame, once."""
@@ -46,10 +42,6 @@ class Vandal:
                 session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
             # The loop, in whose thread this runs, can only answer afterwards.
             list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """No part of the summary."""
-        return {}
 
 
 def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):

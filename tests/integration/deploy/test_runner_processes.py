@@ -2,12 +2,12 @@
 
 import os
 import socket
-from typing import Any
 
 import psutil
 import pytest
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.deploy.commands import LOSSY
@@ -15,23 +15,16 @@ from tests.support.deploy.commands import LOSSY
 SHORT = ["duration_s=0.5", "robots.flock.count=3"]
 
 
-class Policies:
+class Policies(Observer):
     """Observer that asks how the system schedules each runner."""
 
     def __init__(self) -> None:
         self.found = list[int]()
 
-    def begin(self, static: Static) -> None:
-        """Nothing to do."""
-
     def see(self, truth: Truth) -> None:
         """Ask, in every tick."""
         agent_host = [child for child in psutil.Process().children() if "swarmwire.agent.agent_host" in child.cmdline()]
         self.found = [os.sched_getscheduler(runner.pid) for process in agent_host for runner in process.children()]
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """No part of the summary."""
-        return {}
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="the system has no scheduling in batches")

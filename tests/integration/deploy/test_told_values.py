@@ -1,13 +1,13 @@
 """Numbers that agents tell come to observers, records and metrics, the same however the agents are spread."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, repeat
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.run_folder import RunFolder
@@ -49,7 +49,7 @@ class Turning(VectorAgent):
 LEAN = Recording(rrd=False)
 
 
-class Kept:
+class Kept(Observer):
     """Observer that keeps the numbers of all ticks, and how far they are apart."""
 
     def __init__(self) -> None:
@@ -64,9 +64,6 @@ class Kept:
         self._metrics.see(truth)
         self.errors.append(float(self._metrics.latest["consensus_error"][-1]))
         self.values.append(truth.value)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 @pytest.fixture

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import run
 from tests.support.deploy.commands import ROOT
 
 SPEED_MPS, DURATION_S = 0.08, 60.0
 
 
-class Travel:
+class Travel(Observer):
     """Observer of how far each robot went, half by half of the run, in m."""
 
     def begin(self, static):
@@ -18,9 +19,6 @@ class Travel:
     def see(self, truth):
         half = int(truth.time_ns >= DURATION_S / 2 * 1e9)
         self.gone_m[half] += np.hypot(truth.velocity[:, 0], truth.velocity[:, 1]) / 10
-
-    def end(self, last):
-        return {}
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import run
 from tests.support.deploy.commands import ROOT
 
@@ -19,7 +20,7 @@ POSITIONED = [
 ]
 
 
-class Gathering:
+class Gathering(Observer):
     """Observer of the time in s at which each arena's robots first are near the light; inf if they never are."""
 
     def begin(self, static):
@@ -30,9 +31,6 @@ class Gathering:
         away_m = truth.pose[:, :2].reshape(len(self.light_m), -1, 2) - self.light_m
         near = np.mean(np.hypot(away_m[..., 0], away_m[..., 1]) <= NEAR_M, axis=1)
         self.first_s[(near >= SHARE) & np.isinf(self.first_s)] = truth.time_ns / 1e9
-
-    def end(self, last):
-        return {}
 
 
 def successes(seeds: range, *overrides: str, scenario: Path = PSO) -> int:

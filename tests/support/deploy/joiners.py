@@ -13,9 +13,10 @@ from typing import Any
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.deploy.listening import Listening
@@ -43,23 +44,17 @@ def moving(truth: Truth) -> list[int]:
     return [row for row, command in enumerate(truth.command) if command.any()]
 
 
-class Watcher:
+class Watcher(Observer):
     """An observer that goes from one act to the next as soon as what it waits for is true."""
 
     def __init__(self, *steps: tuple[Callable[[Truth], bool], Callable[[], object]]) -> None:
         self.steps = list(steps)
         self.truths: list[Truth] = []
 
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Truth) -> None:
         self.truths.append(truth)
         if self.steps and self.steps[0][0](truth):
             self.steps.pop(0)[1]()
-
-    def end(self, last: PacketCounts | None) -> dict[str, object]:
-        return {}
 
 
 class Joiners:

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.record import chunk_limit, table_writer
 from swarmwire.metrics.record.part_files import join_parts
@@ -33,7 +34,7 @@ def hastily() -> Generator[None]:
         yield
 
 
-class Saying:
+class Saying(Observer):
     """An observer that prints a line per tick."""
 
     def begin(self, static) -> None:
@@ -41,9 +42,6 @@ class Saying:
 
     def see(self, truth) -> None:
         print(truth.tick, flush=True)
-
-    def end(self, last):
-        return {}
 
 
 def record_run(folder: Path, scenario=LOSSY, packets=1.0, *, rrd=False, **options):

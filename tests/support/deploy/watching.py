@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.interfaces import Observer
+
 WATCHER = """
 import sys
 from pathlib import Path
@@ -38,20 +40,13 @@ def watcher(folder: Path) -> Generator[subprocess.Popen[str]]:
             process.kill()
 
 
-class At:
+class At(Observer):
     """Observer that does something at a tick."""
 
     def __init__(self, tick: int, do: Callable[[], object]) -> None:
         self._tick, self._do = tick, do
 
-    def begin(self, static: Any) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Any) -> None:
         """Do it."""
         if truth.tick == self._tick:
             self._do()
-
-    def end(self, last: Any) -> dict[str, Any]:
-        """No part of the summary."""
-        return {}

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
@@ -20,7 +21,7 @@ OVERRIDES = [f"robots.flock.count={ROBOTS}", "time.rate_hz=10", "physics.engine=
 
 
 @dataclass
-class Played:
+class Played(Observer):
     """An observer of the run, who is told of its runners, too: lets one join after the other, and looks at counts."""
 
     says: Says = honestly
@@ -54,13 +55,7 @@ class Played:
     def refused(self, runner: str, why: str) -> None:
         self.refusals.append(why)
 
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Truth) -> None:
         backend = self.simulation._backend
         assert backend is not None
         self.counted.append(Counter(backend.counts()))
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}

@@ -3,6 +3,7 @@
 import pytest
 
 from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import backends, run
 from tests.support.deploy.commands import LOSSY
 from tests.support.encoded_backend import EncodedBackend
@@ -89,7 +90,7 @@ def test_packets_without_a_radio_are_counted(agent, tmp_path):
     assert result.counts["packets_without_radio"] == 20 * 5
 
 
-class Broken:
+class Broken(Observer):
     """An observer with a fault."""
 
     def begin(self, static):
@@ -99,9 +100,6 @@ class Broken:
         self.ticks.append(truth.tick)
         if truth.tick == 2:
             raise OSError("the disk is full")
-
-    def end(self, last):
-        return {}
 
 
 def test_an_observer_that_fails_is_left_out_and_counted(capfd):

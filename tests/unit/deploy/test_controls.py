@@ -7,7 +7,8 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.controls import LOOK_NS, Controls
@@ -215,14 +216,11 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatc
     assert (result.radio, result.metrics) == (free.radio, free.metrics)
 
 
-class Asker:
+class Asker(Observer):
     """An observer that asks for one thing after each tick, and while the run is held."""
 
     def __init__(self, plan: list[Callable[[], None]]) -> None:
         self.plan = plan
-
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
 
     def see(self, truth: Truth) -> None:
         self.ask()
@@ -230,9 +228,6 @@ class Asker:
     def ask(self) -> None:
         if self.plan:
             self.plan.pop(0)()
-
-    def end(self, last: PacketCounts | None) -> dict[str, object]:
-        return {}
 
 
 def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
 from tests.support.deploy.commands import ROOT
 from tests.support.deploy.layouts import PER_ROBOT, run_spread
@@ -93,7 +94,7 @@ events = [{ at_s = 0.5, do = "kill", robots = { names = ["a-0"] }, for_s = 0.3 }
 """
 
 
-class Speeds:
+class Speeds(Observer):
     """Keeps the speeds asked for, in mm/s."""
 
     def begin(self, static):
@@ -101,9 +102,6 @@ class Speeds:
 
     def see(self, truth):
         self.seen.append((truth.command[:, 0] * 1000).round().tolist())
-
-    def end(self, last):
-        return {}
 
 
 @pytest.mark.parametrize("runners", [None, PER_ROBOT])

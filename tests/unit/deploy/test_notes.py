@@ -2,29 +2,24 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from tests.support.deploy.layouts import run_spread
 
 PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
 
 
-class StatesSeen:
+class StatesSeen(Observer):
     """Observer that keeps the states of all ticks."""
 
     def __init__(self) -> None:
         self.ticks: list[list[str]] = []
 
-    def begin(self, static: Static) -> None: ...
-
     def see(self, truth: Truth) -> None:
         self.ticks.append([truth.states[code] for code in truth.state])
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:

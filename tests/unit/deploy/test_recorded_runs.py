@@ -4,6 +4,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.metrics import Metrics
@@ -38,7 +39,7 @@ class Stating(Agent):
 """
 
 
-class Keeper:
+class Keeper(Observer):
     """Keeps every truth."""
 
     def __init__(self):
@@ -51,9 +52,6 @@ class Keeper:
         self._metrics.see(truth)
         self.seen.append(truth)
         self.metrics.append({name: values.copy() for name, values in self._metrics.latest.items()})
-
-    def end(self, last):
-        return {}
 
 
 def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp_path):

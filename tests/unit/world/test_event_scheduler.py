@@ -8,10 +8,11 @@ import pytest
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import Truth
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.loop import Loop
@@ -19,19 +20,14 @@ from swarmwire.world.world import World
 from tests.support.world.samples import commanded, posed
 
 
-class Watch:
+class Watch(Observer):
     """Keeps every truth."""
 
     def __init__(self) -> None:
         self.seen: list[Truth] = []
 
-    def begin(self, static: Static) -> None: ...
-
     def see(self, truth: Truth) -> None:
         self.seen.append(truth)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 class Ahead:

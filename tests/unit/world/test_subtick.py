@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
+from swarmwire.comms.interfaces import Observer, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.results import Results
@@ -163,23 +163,17 @@ class Sender:
         """Nothing."""
 
 
-class Tallies:
+class Tallies(Observer):
     """An observer that adds up what it is told."""
 
     def __init__(self) -> None:
         self.tallies: list[PacketCounts] = []
-
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
 
     def see(self, truth: Truth) -> None:
         assert truth.tally
         assert truth.finished
         self.tallies.append(truth.tally)
         assert truth.tally.fates[:, truth.finished.fate].any() or not len(truth.finished.fate)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody():

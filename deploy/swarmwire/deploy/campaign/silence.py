@@ -4,10 +4,10 @@ An agent that waits for ever, or a process that was frozen, would otherwise hold
 """
 
 from collections.abc import Callable
-from typing import Any
 
 from swarmwire.comms.clock import Clock, WallClock, to_ns
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 
 SAY_S = 5.0  # between two words of a worker whose ticks go on
 MAX_S = 300.0  # without one; no tick takes so long, nor does what comes before the first and after the last
@@ -42,15 +42,12 @@ class Silence:
         return f"the worker stood still for {self.most_s:g} s"
 
 
-class Alive:
+class Alive(Observer):
     """Observer of a worker's runs that says so while its ticks go on."""
 
     def __init__(self, say: Callable[[], None], clock: Clock | None = None) -> None:
         self._say, self._clock = say, clock or WallClock()
         self._due_ns = self._clock.now_ns()
-
-    def begin(self, static: Static) -> None:
-        """The run is about to start."""
 
     def see(self, truth: Truth) -> None:
         """Say so, unless it was said a moment ago."""
@@ -58,7 +55,3 @@ class Alive:
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + to_ns(SAY_S)
             self._say()
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing for the summary."""
-        return {}

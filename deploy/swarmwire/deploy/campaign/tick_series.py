@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.part_files import PARQUET
 
 Values = NDArray[np.float32]
 
 
-class TickSeries:
+class TickSeries(Observer):
     """Observer that keeps the metrics' values of each tick, 4 bytes per metric and arena."""
 
     def __init__(self, metrics: Metrics) -> None:
@@ -29,10 +30,6 @@ class TickSeries:
     def see(self, truth: Truth) -> None:
         """Keep this tick."""
         self._ticks.append(self._metrics.values.astype(np.float32))
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing for the summary."""
-        return {}
 
     def parquet(self, runs: Sequence[int], ticks: Sequence[int]) -> bytes:
         """The file: `run`, `tick`, a float32 column per metric (NaN: no value); of each arena as many ticks as given.

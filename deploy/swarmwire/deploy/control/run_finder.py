@@ -14,7 +14,8 @@ from typing import Any
 
 from swarmwire.comms.config import did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import PacketCounts, Static
 from swarmwire.deploy.live.live_file import goes_on, read_live
 from swarmwire.metrics.whole_file import write_whole
 
@@ -32,7 +33,7 @@ class FoundRun:
     folder: str  # the run folder
 
 
-class Announced:
+class Announced(Observer):
     """Observer that makes a run one that `swarmwire ctl` finds; it must be published in its folder before it begins."""
 
     before_agents = True  # it begins before the run's agents are there
@@ -49,9 +50,6 @@ class Announced:
         found = FoundRun(live.run, live.endpoint, live.pid, static.name, str(self._folder.absolute()))
         self._path = runs_folder() / f"{live.run}.json"
         write_whole(self._path, json.dumps(asdict(found)))
-
-    def see(self, truth: Truth) -> None:
-        """All is said."""
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """It is over."""

@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_s
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import numbers_of
 from swarmwire.comms.truth import PacketCounts, Static, Truth
@@ -18,7 +19,7 @@ WAITS_S = 1.0  # for runners: a run that has waited so long is said to wait
 SMOOTHING = 0.1  # weight of the newest tick in the mean time of a tick
 
 
-class Status:
+class Status(Observer):
     """Observer that keeps the newest tick, which costs next to nothing; all else is worked out when somebody asks.
 
     Of several arenas it tells of one, as what is published does, but for counts, which are of all.

@@ -5,23 +5,21 @@ from shlex import quote
 from typing import Any
 
 from swarmwire.comms.clock import to_s
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import PacketCounts, Truth
 from swarmwire.deploy.gateways.served import Served, ServedRobot
 
 GRACE_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
 NAMED = 6  # robots, at most
 
 
-class Undriven:
+class Undriven(Observer):
     """Observer that tells people which robots no program has told how to move: a run in which they stand still."""
 
     def __init__(self, served: Served, pace: float, say: Callable[[str], None]) -> None:
         """`pace` is of the run, in simulated seconds per second of wall time."""
         self._served, self._pace, self._say = served, pace, say
         self._told = False
-
-    def begin(self, static: Static) -> None:
-        """Nobody can have driven one so far."""
 
     def see(self, truth: Truth) -> None:
         """Tell of them once, when they could be driven."""

@@ -9,14 +9,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static
 
 LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
 
 
-class LiveView:
+class LiveView(Observer):
     """Observer that opens a view of the run in this folder, which must be published before it begins.
 
     As a context manager it ends the viewing process and all that this started. Nothing here raises into a run: a view
@@ -83,13 +83,6 @@ class LiveView:
         process.wait()
         if self._closed:
             self._closed()
-
-    def see(self, truth: Truth) -> None:
-        """Nothing: what is seen is published."""
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Leave the view open; it adds nothing to the summary."""
-        return {}
 
     def wait(self) -> None:
         """Return when the person has closed the view, at once if there is none; Ctrl-C ends the wait and the view."""

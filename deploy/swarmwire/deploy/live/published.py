@@ -17,6 +17,7 @@ import zenoh
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.keys import ObserverKeys
@@ -32,7 +33,7 @@ from swarmwire.world.backends.join_policy import ListenSettings
 LEAVE_S = 2.0  # how long the last frame may take
 
 
-class Published:
+class Published(Observer):
     """Observer that publishes one arena of a run on an endpoint of its own, as `live.json` in the run folder tells.
 
     At most 30 ticks per second of wall time are published; nothing is encoded, nor even counted, while nobody looks on.

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
 
 Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
 
 
-class TrajectoryLog:
+class TrajectoryLog(Observer):
     """Observer that writes the digest of each tick into the run folder, at once."""
 
     def __init__(self, folder: Path, hashes: Hashes) -> None:
@@ -39,7 +40,7 @@ class TrajectoryLog:
         return {}
 
 
-class TrajectoryCheck:
+class TrajectoryCheck(Observer):
     """Observer that compares each tick with that of another run, as far as that logged it.
 
     Attributes:
@@ -52,9 +53,6 @@ class TrajectoryCheck:
         self.compared = 0
         self.first_difference: int | None = None
 
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Truth) -> None:
         """Compare this tick."""
         start = truth.tick * DIGEST_BYTES
@@ -64,10 +62,6 @@ class TrajectoryCheck:
         self.compared += 1
         if self.first_difference is None and _digest(self._hashes) != expected:
             self.first_difference = truth.tick
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing for the summary."""
-        return {}
 
 
 def _digest(hashes: Hashes) -> bytes:

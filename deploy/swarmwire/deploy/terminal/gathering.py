@@ -1,19 +1,20 @@
 """How a world that waits for its runners is shown: what to type elsewhere, who came, and who is missing."""
 
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from rich.console import Console
 from rich.markup import escape
 from rich.status import Status
 
 from swarmwire.comms.assignment import robots_text
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.network import Network, is_local
 from swarmwire.world.backends.registry import RunnerEvent
 
 
-class Gathering:
+class Gathering(Observer):
     """Told of runners that come and go, and an observer, since the waiting is over when a run begins.
 
     Who came or went and who was refused is said by the run itself; here it is what is still missing.
@@ -51,13 +52,6 @@ class Gathering:
     def begin(self, static: Static) -> None:
         """Nobody is waited for any more."""
         self._stop()
-
-    def see(self, truth: Truth) -> None:
-        """All is said."""
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """All is said."""
-        return {}
 
     def _tell(self, free: tuple[str, ...]) -> None:
         played = len(self._robots) - len(free)

@@ -8,6 +8,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.live import Live
 
 from swarmwire.comms.clock import Clock, to_ns
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.bindings import press
@@ -21,7 +22,7 @@ REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures,
 COST = 250  # a picture that took so long is followed by so many times as long without one: below 1 % of a run
 
 
-class Panel:
+class Panel(Observer):
     """Observer that shows how a run is doing, and hands the keys that people type to its controls."""
 
     def __init__(

@@ -1,19 +1,19 @@
 """The progress of a run in plain lines, for what is no terminal."""
 
 import math
-from typing import Any
 
 from rich.console import Console
 
 from swarmwire.comms.clock import Clock, to_s
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.metrics.metrics import Metrics
 
 SHARE = 0.25  # a line each time that so much more is done
 
 
-class ProgressLines:
+class ProgressLines(Observer):
     """Observer that prints a few lines: how far a run is, how fast, and how the swarm and its radio are doing."""
 
     def __init__(self, ticks: int, metrics: Metrics, clock: Clock, console: Console) -> None:
@@ -42,10 +42,6 @@ class ProgressLines:
             self._print(
                 f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"
             )
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing is left to say."""
-        return {}
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)

@@ -1,17 +1,17 @@
 """Robots that answer as real ones, told before the first tick: where they answer, and what drives them."""
 
 from shlex import quote
-from typing import Any
 
 from rich.console import Console
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static
 from swarmwire.deploy.gateways.served import ServedRobot
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.rows import aligned
 
 
-class RobotsTold:
+class RobotsTold(Observer):
     """Observer that prints a line for each such robot, to be copied into a shell; nothing where there are none."""
 
     def __init__(self, simulation: Simulation, console: Console) -> None:
@@ -26,13 +26,6 @@ class RobotsTold:
         for line in aligned(rows):
             self._print(line)
         self._print(f"network of swarm {served.swarm!r}: {' '.join(served.endpoints)}")
-
-    def see(self, truth: Truth) -> None:
-        """All is said."""
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """All is said."""
-        return {}
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.log_histogram import LogHistogram
@@ -14,7 +15,7 @@ from swarmwire.metrics.plain import plain
 PERCENTS = (50.0, 90.0, 99.0)
 
 
-class RadioTally:
+class RadioTally(Observer):
     """Observer that adds up the radio's tallies. Summary part: `radio`, per arena; nothing without a radio.
 
     sent (packets), intended and in_range (receivers), fates {name: receivers}, pdr = received / intended, link_pdr =

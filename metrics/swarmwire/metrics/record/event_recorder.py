@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.clock import to_s
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-class EventRecorder:
+class EventRecorder(Observer):
     """Observer that writes `events.parquet`; what happens in a tick is on disk soon after.
 
     Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took

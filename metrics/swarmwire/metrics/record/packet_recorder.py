@@ -7,6 +7,7 @@ from typing import Any
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.network.geometry_tick import POSES_KEPT_S
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
@@ -16,7 +17,7 @@ from swarmwire.metrics.record.table_writer import Chunk, TableWriter
 CHUNK_ROWS = 100_000
 
 
-class PacketRecorder:
+class PacketRecorder(Observer):
     """Observer that writes `packets.parquet`, a row per (packet, receiver it might have reached).
 
     Receivers out of range are counted in `ticks` and the summary alone, and what is in flight at the end has no row.

@@ -1,14 +1,14 @@
 """`static.json`: arena, bodies, groups and names of a run, written as it begins."""
 
 from pathlib import Path
-from typing import Any
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static
 from swarmwire.metrics.record.names import STATIC
 from swarmwire.metrics.record.static_file import write_static
 
 
-class StaticRecorder:
+class StaticRecorder(Observer):
     """Observer that writes `static.json`, before the first tick. No summary part."""
 
     def __init__(self, folder: Path) -> None:
@@ -17,10 +17,3 @@ class StaticRecorder:
     def begin(self, static: Static) -> None:
         """Write it."""
         write_static(static, self._folder / STATIC)
-
-    def see(self, truth: Truth) -> None:
-        """Nothing: what is static does not change."""
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing to add."""
-        return {}

@@ -5,6 +5,7 @@ from typing import Any
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
@@ -24,7 +25,7 @@ CHUNK_BYTES = 4_000_000
 MAX_TICKS = 4096  # in a chunk, however small the swarm
 
 
-class TickRecorder:
+class TickRecorder(Observer):
     """Observer that writes `ticks.parquet`, a row per tick and arena, without holding the loop up for the disk.
 
     An arena that has left has no more rows.

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swarmwire.comms.errors import RecordFailed
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.record.part_files import table_file, write_file
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-class TotalsRecorder(ABC):
+class TotalsRecorder(Observer, ABC):
     """Observer that writes a table about the radio as the run ends; without a radio nothing. A killed run leaves none.
 
     Summary part: `record_NAME`: rows written, rows dropped (0: no disk is in the way of adding up). `end` raises

@@ -6,6 +6,7 @@ from typing import Any
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
@@ -23,7 +24,7 @@ SEND_BYTES = 1_000_000
 SEND_SHARE = 0.01  # of the time so far: where ticks are slow, a block every 2 s takes 70 MB an hour
 
 
-class RerunRecording:
+class RerunRecording(Observer):
     """Observer that writes one arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
     Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see

@@ -1,11 +1,10 @@
 """What a run comes to, for comparing runs: by name, one number each."""
 
-from typing import Any
-
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import ArenaResult
 
 METRICS = {
@@ -21,7 +20,7 @@ METRICS = {
 COUNTS = ("collisions", "wall_contacts")
 
 
-class Speeds:
+class Speeds(Observer):
     """Observer that knows how fast robots were on average, and how fast they turned."""
 
     def begin(self, static: Static) -> None:
@@ -32,9 +31,6 @@ class Speeds:
         of = truth.velocity.reshape(self.static.arenas, -1, 3)
         self.moved += np.stack([np.hypot(of[..., 0], of[..., 1]).mean(1), np.abs(of[..., 2]).mean(1)])
         self.ticks += 1
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
     def of(self, arena: int) -> dict[str, float]:
         """Mean speed in m/s and mean turn rate in rad/s of the robots of an arena."""

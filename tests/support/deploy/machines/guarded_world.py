@@ -5,14 +5,14 @@ import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import zenoh
 
 from swarmwire.agent import runner
 from swarmwire.agent.runner_protocol import JoinOptions
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, open_runner
@@ -38,7 +38,7 @@ def authority(folder: Path) -> Path:
     return folder
 
 
-class GuardedWorld:
+class GuardedWorld(Observer):
     """Told where the world listens, it brings the honest runners; an observer, it disturbs the run once.
 
     Attributes:
@@ -90,9 +90,6 @@ class GuardedWorld:
     def refused(self, name: str, why: str) -> None:
         """It is counted, too."""
 
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Truth) -> None:
         if truth.tick != AT_TICK - 1:
             return
@@ -100,9 +97,6 @@ class GuardedWorld:
             self._disturb(self)
         except BaseException as error:  # noqa: BLE001 - an observer that fails is left out, but this one is the test
             self._fault = error
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
         options = JoinOptions(JoinRequest(names=robots))

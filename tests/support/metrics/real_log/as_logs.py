@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.clock import to_s
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import Static, Truth
 
 BEGAN_S = 1_767_225_600.0
 TICKS = "tick,t_s,late,x_m,y_m,heading_rad,drive,linear_mps,angular_radps,state,value,charge"
@@ -17,7 +18,7 @@ RECEIVED = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given"
 SENT = "t_s,tx,seq,to,size_bytes,tag,fate"
 
 
-class Watched:
+class Watched(Observer):
     """Observer that keeps all truths of a run of one arena."""
 
     def begin(self, static: Static) -> None:
@@ -25,9 +26,6 @@ class Watched:
 
     def see(self, truth: Truth) -> None:
         self.truths.append(truth)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 def as_logs(

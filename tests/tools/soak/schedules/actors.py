@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.interfaces import Observer
 from swarmwire.world.backends.registry import RunnerEvent
 from tests.support.deploy.watching import WATCHER
 from tests.tools.soak.agenda import Agenda, Steps
@@ -20,7 +21,7 @@ AGAIN_S = 0.3
 ENDS = {0, 1, 130, -signal.SIGKILL, -signal.SIGINT}  # 1: it was told why; SIGINT: while Python was still starting
 
 
-class Actors(threading.Thread):
+class Actors(threading.Thread, Observer):
     """Runners, router and observers of a schedule. They are told of the world as its onlookers are.
 
     Attributes:
@@ -70,10 +71,6 @@ class Actors(threading.Thread):
     def see(self, truth) -> None:
         """A tick is over."""
         self.tick = truth.tick
-
-    def end(self, last: object) -> dict[str, object]:
-        """Nothing for the summary."""
-        return {}
 
     def run(self) -> None:
         """Keep them until `close`."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import run
 from tests.integration.metrics.viewer.test_rerun_recording import class_names, column, series
@@ -13,20 +14,14 @@ pytest.importorskip("rerun", reason="needs the extra [view]")
 DURATION_S, RATE_HZ = 8, 10
 
 
-class Seen:
+class Seen(Observer):
     """Observer that keeps every tick."""
 
     def __init__(self):
         self.ticks = []
 
-    def begin(self, static):
-        pass
-
     def see(self, truth):
         self.ticks.append(truth)
-
-    def end(self, last):
-        return {}
 
 
 @pytest.fixture(scope="module")
