@@ -9,7 +9,7 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from

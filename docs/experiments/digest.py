@@ -8,8 +8,8 @@ from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.atomic import output_file
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.whole_file import chosen_file
 
 if TYPE_CHECKING:
     import polars as pl
@@ -31,7 +31,7 @@ def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ())
         frame = digest_of(experiment, folder)
         places.data.mkdir(parents=True, exist_ok=True)
         written.append(places.data / f"{campaign}.parquet")
-        with chosen_file(written[-1]) as aside:
+        with output_file(written[-1]) as aside:
             frame.write_parquet(aside, compression="zstd", compression_level=9, statistics=False)
     size = sum(file.stat().st_size for file in _files(experiment, places) if file.exists())
     if size > MAX_BYTES:

@@ -6,8 +6,8 @@ from docs.experiments.digest import digests
 from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.drawing.canvas import save
-from swarmwire.metrics.whole_file import write_whole
 
 BEGIN, END = "<!-- numbers -->", "<!-- /numbers -->"
 
@@ -23,7 +23,7 @@ def draw(experiment: Experiment, places: Places) -> str:
     text = with_numbers(page, told) if page.exists() else None
     save(experiment.draw(runs), places.figure_of(experiment.name))
     if text is not None:
-        write_whole(page, text)
+        write_text(page, text)
     return told
 
 

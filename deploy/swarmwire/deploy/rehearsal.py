@@ -11,8 +11,8 @@ from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, Receive
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World

@@ -8,8 +8,8 @@ from typing import Any
 from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.live_events import LiveEventsRecord
 from swarmwire.deploy.record.scenario_copy import CopiedFile
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.record.formats import SUMMARY_FORMAT
-from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.registry import RunnerEvent
 
@@ -179,7 +179,7 @@ class Result:
 
     def write(self, path: Path) -> None:
         """Write `summary.json`."""
-        write_whole(path, json.dumps(self.summary(), indent=2) + "\n")
+        write_text(path, json.dumps(self.summary(), indent=2) + "\n")
 
 
 def arena_result(

@@ -49,7 +49,7 @@ from swarmwire.deploy.result import Result
 from swarmwire.deploy.system_limits import need_open_files, need_threads
 from swarmwire.deploy.too_large import TooLarge
 from swarmwire.metrics.event_log import EventLog
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.stop import StopConditions as MetricStopConditions
 from swarmwire.world.backends.pacing import Pace

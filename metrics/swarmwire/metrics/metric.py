@@ -2,14 +2,19 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import to_ns
+from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.tick_view import TickView
 
 Kind = Literal["level", "count", "time"]
-Measure = Callable[[Moment], FloatArray | float]  # to (arenas,), or one number for all; NaN: nothing to measure
+Measure = Callable[[TickView], FloatArray | float]  # to (arenas,), or one number for all; NaN: nothing to measure
 
 
 class Metric(ABC):
@@ -32,3 +37,32 @@ class Metric(ABC):
     @abstractmethod
     def begin(self, static: Static) -> Measure:
         """A fresh measure for a run; it is called once per tick, in order."""
+
+
+@dataclass(frozen=True)
+class Sampled(Metric):
+    """A metric that is measured at the start, then in the first tick at or after each multiple of `every_s`.
+
+    In between it has the value of the last sample, whoever has died since; 0 samples every tick.
+    """
+
+    every_s: float = parameter(1.0, help="from one sample to the next; 0: every tick", unit="s", at_least=0.0)
+
+    @abstractmethod
+    def sample(self, static: Static) -> Measure:
+        """A fresh measure for a run; it is called for the ticks that are sampled, in order."""
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which holds what was sampled last."""
+        sample, every_ns = self.sample(static), max(to_ns(self.every_s), 1)
+        held: FloatArray | float = np.nan
+        next_ns = 0
+
+        def measure(view: TickView) -> FloatArray | float:
+            nonlocal held, next_ns
+            now_ns = view.truth.time_ns
+            if now_ns >= next_ns:
+                held, next_ns = sample(view), (now_ns // every_ns + 1) * every_ns
+            return held
+
+        return measure

@@ -5,41 +5,18 @@ from collections.abc import Sequence
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.age_of_information import AgeOfInformation
-from swarmwire.metrics.network.airtime import Airtime
-from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity
-from swarmwire.metrics.network.articulation import Articulation
-from swarmwire.metrics.network.components import ComponentCount
-from swarmwire.metrics.network.fragmentation_count import Fragmentations
-from swarmwire.metrics.network.fragmented import Fragmented
-from swarmwire.metrics.network.largest_component import LargestComponent
+from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent
+from swarmwire.metrics.network.delivery import Airtime, LinkPacketDeliveryRatio, PacketDeliveryRatio, Throughput
+from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
-from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio, PacketDeliveryRatio
-from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
-from swarmwire.metrics.network.throughput import Throughput
-from swarmwire.metrics.network.unrejoined import Unrejoined
-from swarmwire.metrics.swarm.aggregation import Aggregation
-from swarmwire.metrics.swarm.aggregation_hop import AggregationHop
-from swarmwire.metrics.swarm.aggregation_time import AggregationTime
-from swarmwire.metrics.swarm.cohesion import Cohesion
-from swarmwire.metrics.swarm.collision_rate import CollisionRate
-from swarmwire.metrics.swarm.contacts import Collisions, WallContacts
-from swarmwire.metrics.swarm.deadlocked import Deadlocked
-from swarmwire.metrics.swarm.dispersion import Dispersion
-from swarmwire.metrics.swarm.min_gap import MinGap
-from swarmwire.metrics.swarm.nearest_neighbour import NearestNeighbour
-from swarmwire.metrics.swarm.order import Order
-from swarmwire.metrics.swarm.order_local import OrderLocal
-from swarmwire.metrics.swarm.order_velocity import OrderVelocity
-from swarmwire.metrics.swarm.oscillation import Oscillation
-from swarmwire.metrics.swarm.path_efficiency import PathEfficiency
-from swarmwire.metrics.swarm.rotation import Rotation
-from swarmwire.metrics.swarm.speed import Speed
-from swarmwire.metrics.task.consensus_bias import ConsensusBias
-from swarmwire.metrics.task.consensus_error import ConsensusError
-from swarmwire.metrics.task.coverage import Coverage
-from swarmwire.metrics.task.coverage_time import CoverageTime
-from swarmwire.metrics.task.find_time import FindTime
-from swarmwire.metrics.task.target_distance import TargetBest, TargetMean
+from swarmwire.metrics.swarm.aggregation import Aggregation, AggregationHop, AggregationTime
+from swarmwire.metrics.swarm.contacts import CollisionRate, Collisions, MinGap, WallContacts
+from swarmwire.metrics.swarm.motion import Deadlocked, Oscillation, PathEfficiency
+from swarmwire.metrics.swarm.order import Order, OrderLocal, OrderVelocity, Speed
+from swarmwire.metrics.swarm.spread import Cohesion, Dispersion, NearestNeighbour, Rotation
+from swarmwire.metrics.task.consensus import ConsensusBias, ConsensusError
+from swarmwire.metrics.task.coverage import Coverage, CoverageTime
+from swarmwire.metrics.task.target import FindTime, TargetBest, TargetMean
 
 LINK_PDR = LinkPacketDeliveryRatio.name  # drawn of every run with a radio: if not measured, over the last second
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeGuard, cast
 from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.distance_totals import distance_totals_schema
 from swarmwire.metrics.record.event_recorder import event_schema
 from swarmwire.metrics.record.formats import RUN_FORMAT, SUMMARY_FORMAT, TABLES_FORMAT
@@ -22,6 +21,7 @@ from swarmwire.metrics.record.part_files import parts_of, scan_files, table_file
 from swarmwire.metrics.record.robot_totals import robot_totals_schema
 from swarmwire.metrics.record.static_file import read_static
 from swarmwire.metrics.record.tick_columns import VALUE, movable_columns, robot_columns
+from swarmwire.metrics.table_file import corruption_errors
 
 if TYPE_CHECKING:
     import polars as pl
@@ -251,7 +251,7 @@ class RunFolder:
                 return lazy.drop(*left_out, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
-            except damage() as error:
+            except corruption_errors() as error:
                 reason = str(error).splitlines()[0]
                 expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
                 raise BadInput(self.where(name), "", expected) from error

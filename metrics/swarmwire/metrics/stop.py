@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import to_ns, to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 
 Comparison = Literal["at_least", "at_most", "above", "below"]
 

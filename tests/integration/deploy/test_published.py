@@ -21,7 +21,7 @@ from swarmwire.deploy.live import published
 from swarmwire.deploy.live.following import RunGone, following
 from swarmwire.deploy.live.live_file import Live, read_live
 from swarmwire.deploy.live.published import Published
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from tests.support.clocks import StillClock
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.watching import At, watcher

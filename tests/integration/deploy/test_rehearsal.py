@@ -9,8 +9,8 @@ from swarmwire.deploy import Simulation
 from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.new_medium import new_medium
 from swarmwire.deploy.rehearsal import rehearse
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.swarm.speed import Speed
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.swarm.order import Speed
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 

@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, repeat
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.verify.verify import verify
 from tests.support.deploy.commands import LOSSY

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record.recorders import record_summary, recorders
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch

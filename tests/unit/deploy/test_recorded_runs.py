@@ -7,7 +7,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, run
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record import table_writer
 from swarmwire.metrics.record.part_files import write_file
 from swarmwire.metrics.record.tick_recorder import TickRecorder

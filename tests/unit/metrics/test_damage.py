@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.damage import read_whole, refuse_damaged
 from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.table_file import read_parquet, refuse_corrupt
 from tests.support.damaged import damaged
 
 FRAME = pl.DataFrame({"run": [0, 0, 1, 1], "order": [0.5, None, 0.25, 1.0], "ended": ["stopped", "failed", "", "é"]})
@@ -25,7 +25,7 @@ def parquet(frame: pl.DataFrame) -> bytes:
 def refusal(file: Path) -> str | None:
     """What is said of the file; None: it can be read."""
     try:
-        read_whole(file, cure="take it away")
+        read_parquet(file, cure="take it away")
     except BadInput as told:
         return str(told)
     return None
@@ -55,12 +55,12 @@ def test_a_panic_of_polars_is_such_a_line_too(file, monkeypatch):
 
     monkeypatch.setattr(pl, "read_parquet", panics)
     with pytest.raises(BadInput, check=lambda error: error.where == str(file)):
-        read_whole(file)
+        read_parquet(file)
 
 
 def test_a_file_that_is_not_there_is_such_a_line_too(tmp_path):
     with pytest.raises(BadInput, match="none.parquet: .*No such file"):
-        read_whole(tmp_path / "none.parquet")
+        read_parquet(tmp_path / "none.parquet")
 
 
 @given(place=st.integers(0, 2), how=st.sampled_from([parquet(FRAME)[:-1], parquet(FRAME.cast({"order": pl.String}))]))
@@ -68,9 +68,9 @@ def test_of_several_files_the_damaged_one_is_named_or_that_of_other_types(file, 
     files = [file.with_name(f"{number}.parquet") for number in range(3)]
     for each in files:
         each.write_bytes(parquet(FRAME))
-    refuse_damaged(files)
+    refuse_corrupt(files)
     files[place].write_bytes(how)
     with pytest.raises(BadInput) as told:
-        refuse_damaged(files)
+        refuse_corrupt(files)
     # Where the first is of other types than the rest, it is the second that differs from what came before.
     assert told.value.where == str(files[place] if place or how.endswith(b"PAR") else files[1])

@@ -10,8 +10,8 @@ import pytest
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.custom_metrics import own_kind
 from swarmwire.metrics.listed import Item, listed
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.plug_ins import GROUP, PlugIn, plug_ins
 from swarmwire.metrics.registry import METRICS, standard
 from tests.support.metrics.packages import CODE, install

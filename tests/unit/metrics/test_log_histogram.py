@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.metrics.log_histogram import LARGEST_NS, RELATIVE_ERROR, LogHistogram
+from swarmwire.metrics.network.latency import LARGEST_NS, RELATIVE_ERROR, LogHistogram
 
 PERCENTS = (0.0, 50.0, 90.0, 99.0, 100.0)
 

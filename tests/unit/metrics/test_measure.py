@@ -8,12 +8,11 @@ import pytest
 
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.moment import Components, Moment, agreement
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.metric import Metric, Sampled
 from swarmwire.metrics.registry import METRICS, register
-from swarmwire.metrics.sampled import Sampled
 from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.tick_view import Components, TickView, agreement
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
 
 
@@ -28,7 +27,7 @@ class Turned(Metric):
     bounds = (0.0, None)
 
     def begin(self, static):
-        return lambda moment: np.count_nonzero(moment.heading_rad > self.above_rad, axis=1).astype(np.float64)
+        return lambda view: np.count_nonzero(view.heading_rad > self.above_rad, axis=1).astype(np.float64)
 
 
 def seen(metrics, of, *ticks):
@@ -114,18 +113,18 @@ def test_rows_are_folded_by_arena():
     of = static(3, arenas=2)
     pose, velocity = np.arange(36.0).reshape(2, 6, 3)
     alive = np.array([True, True, False, True, False, False])
-    moment = Moment(of, truth(of, pose=pose, velocity=velocity, alive=alive))
-    assert (moment.position_m[1, 2] == pose[5, :2]).all()
-    assert (moment.velocity[1, 2, :2] == velocity[5, :2]).all()
-    assert moment.heading_rad[0, 1] == pose[1, 2]
-    assert moment.robots_alive.tolist() == moment.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
-    assert moment.components is None
+    view = TickView(of, truth(of, pose=pose, velocity=velocity, alive=alive))
+    assert (view.position_m[1, 2] == pose[5, :2]).all()
+    assert (view.velocity[1, 2, :2] == velocity[5, :2]).all()
+    assert view.heading_rad[0, 1] == pose[1, 2]
+    assert view.robots_alive.tolist() == view.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
+    assert view.components is None
 
 
 def test_components_are_those_of_the_robots_alive():
     of = static(3, arenas=2)
     alive = np.array([True, True, True, True, True, False])
-    found = Moment(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
+    found = TickView(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
     assert isinstance(found, Components)
     assert found.pieces.tolist() == [1, 2]
     assert found.largest.tolist() == [3, 1]
@@ -142,9 +141,9 @@ def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
 
 def test_directions_are_the_cosines_and_sines_of_headings():
     of = static(3, arenas=2)
-    moment = Moment(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
-    np.testing.assert_allclose(moment.direction[0], np.cos(moment.heading_rad))
-    np.testing.assert_allclose(moment.direction[1], np.sin(moment.heading_rad))
+    view = TickView(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
+    np.testing.assert_allclose(view.direction[0], np.cos(view.heading_rad))
+    np.testing.assert_allclose(view.direction[1], np.sin(view.heading_rad))
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ class Ticks(Sampled):
     bounds = (0.0, None)
 
     def sample(self, static):
-        return lambda moment: np.full(static.arenas, float(moment.truth.tick))
+        return lambda view: np.full(static.arenas, float(view.truth.tick))
 
 
 def sampled_in(every_s, ticks=12):

@@ -5,11 +5,11 @@ import errno
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.whole_file import chosen_file
+from swarmwire.metrics.atomic import output_file
 
 
 def full(to):
-    with chosen_file(to) as aside:
+    with output_file(to) as aside:
         aside.write_text("half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -24,6 +24,6 @@ def test_a_disk_that_is_full_half_way_is_one_line_and_leaves_what_was_there(tmp_
 
 
 def test_what_else_the_block_raises_is_passed_on(tmp_path):
-    with pytest.raises(FileNotFoundError), chosen_file(tmp_path / "page.html"):
+    with pytest.raises(FileNotFoundError), output_file(tmp_path / "page.html"):
         (tmp_path / "missing").read_text()
     assert list(tmp_path.iterdir()) == []

@@ -12,10 +12,10 @@ from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.design import Point
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.about import read_about
 from swarmwire.metrics.campaign.formats import ABOUT, CAMPAIGN_FORMAT
 from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.whole_file import write_whole
 
 SCENARIO_FOLDER = "scenario"
 
@@ -65,7 +65,7 @@ class Campaign:
 
     def write(self, folder: Path) -> None:
         """Write `campaign.json`; OSError if the disk will not."""
-        write_whole(folder / ABOUT, json.dumps({"format": CAMPAIGN_FORMAT, **asdict(self)}, indent=1) + "\n")
+        write_text(folder / ABOUT, json.dumps({"format": CAMPAIGN_FORMAT, **asdict(self)}, indent=1) + "\n")
 
 
 def read_campaign(folder: Path) -> Campaign:

@@ -23,11 +23,11 @@ from swarmwire.deploy.campaign.series_files import join_series, series_part, sor
 from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import Row, TaskResult
+from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.campaign.formats import FAILED, PARTS, SERIES, SUMMARY
-from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.record.part_files import PARQUET
-from swarmwire.metrics.whole_file import written_aside
+from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 if TYPE_CHECKING:
     import polars as pl
@@ -89,8 +89,8 @@ class CampaignFolder:
         tables = [_table(file, none.schema, self.campaign.runs) for file in files]
         try:
             return self._columns.joined([none, *tables])
-        except damage():
-            refuse_damaged(files, MEND)
+        except corruption_errors():
+            refuse_corrupt(files, MEND)
             raise
 
     def ended(self) -> dict[int, str]:
@@ -122,7 +122,7 @@ class CampaignFolder:
 def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
     import polars as pl
 
-    frame = read_whole(file, cure=MEND)
+    frame = read_parquet(file, cure=MEND)
     counts = dict.fromkeys((name for name in frame.columns if name.startswith(COUNTS)), pl.Int64())
     for name, kind in {**schema, **counts}.items():
         if frame.schema.get(name) != kind:
@@ -143,5 +143,5 @@ def _parquet(frame: "pl.DataFrame") -> bytes:
 
 def _write(path: Path, data: bytes) -> None:
     path.parent.mkdir(exist_ok=True)
-    with written_aside(path) as aside:
+    with atomic_write(path) as aside:
         aside.write_bytes(data)

@@ -3,9 +3,9 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
+from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.record.part_files import PARQUET
-from swarmwire.metrics.whole_file import written_aside
+from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 MEND = "without the file its runs stay in the table, but not their series"
 
@@ -37,11 +37,11 @@ def join_series(folder: Path, files: int) -> None:
     first, count = len(list(folder.glob("worker-*.parquet"))), min(files, len(parts))
     for number in range(count):
         share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
-        with written_aside(folder / f"worker-{first + number}.parquet") as aside:
+        with atomic_write(folder / f"worker-{first + number}.parquet") as aside:
             try:
                 pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
-            except damage():
-                refuse_damaged(share, MEND)
+            except corruption_errors():
+                refuse_corrupt(share, MEND)
                 raise
         for part in share:
             part.unlink()
@@ -49,7 +49,7 @@ def join_series(folder: Path, files: int) -> None:
 
 def _runs(file: Path) -> set[int]:
     """Whose series it holds; BadInput if it is damaged."""
-    return set(read_whole(file, ["run"], MEND)["run"])
+    return set(read_parquet(file, ["run"], MEND)["run"])
 
 
 def _parts(folder: Path) -> list[Path]:

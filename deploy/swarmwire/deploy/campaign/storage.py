@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.metrics.damage import damage
+from swarmwire.metrics.table_file import corruption_errors
 
 
 class StorageFailed(SwarmwireError):
@@ -17,7 +17,7 @@ def storing(folder: Path, command: str = "sweep") -> Generator[None]:
     """Turn what a disk refuses in the block into StorageFailed; `command` is what goes on with the folder."""
     try:
         yield
-    except (OSError, *damage()) as error:
+    except (OSError, *corruption_errors()) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire {command} --resume {folder}"
         raise StorageFailed(text) from error

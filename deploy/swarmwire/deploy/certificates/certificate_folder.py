@@ -30,7 +30,7 @@ from swarmwire.deploy.certificates.files import (
 )
 from swarmwire.deploy.certificates.register import Issued, Register
 from swarmwire.deploy.certificates.wanted import Wanted
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 
 
 def begin_authority(folder: Path, clock: DatedClock) -> None:
@@ -40,7 +40,7 @@ def begin_authority(folder: Path, clock: DatedClock) -> None:
     with _written(folder):
         authority = Authority.new(now)
         write_key(key_path(folder, AUTHORITY), key_pem(authority.key))
-        write_whole(certificate_path(folder, AUTHORITY), certificate_pem(authority.certificate))
+        write_text(certificate_path(folder, AUTHORITY), certificate_pem(authority.certificate))
         register = Register(_entry(AUTHORITY, "CA", (), authority.certificate))
         _write_revoked(folder, authority, register, now)
         register.write(folder)
@@ -120,7 +120,7 @@ def _issue(folder: Path, authority: Authority, of: Wanted, last: Issued | None, 
     put_aside(folder, of.name)
     certificate, key = authority.issue(of.name, hosts, days, now)
     write_key(key_path(folder, of.name), key_pem(key))
-    write_whole(certificate_path(folder, of.name), certificate_pem(certificate))
+    write_text(certificate_path(folder, of.name), certificate_pem(certificate))
     return _entry(of.name, purpose, hosts, certificate)
 
 
@@ -132,7 +132,7 @@ def _entry(name: str, purpose: str, hosts: tuple[str, ...], certificate: x509.Ce
 def _write_revoked(folder: Path, authority: Authority, register: Register, now: datetime) -> None:
     """Write the list that other programs read, whole from the register."""
     revoked = [(int(of.serial, 16), date_of(of.revoked)) for of in register.certificates if of.revoked is not None]
-    write_whole(folder / REVOKED, authority.revocation_list(revoked, now).decode())
+    write_text(folder / REVOKED, authority.revocation_list(revoked, now).decode())
 
 
 @contextmanager

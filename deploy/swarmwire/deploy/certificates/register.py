@@ -11,7 +11,7 @@ from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.certificates.dates import DAY, date_of, text_of
 from swarmwire.deploy.certificates.files import REGISTER
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 
 FORMAT = 1
 SOON = 30 * DAY  # before its end a certificate is renewed, at most a third of its life
@@ -76,7 +76,7 @@ class Register:
             "authority": asdict(self.authority),
             "certificates": [asdict(issued) for issued in self.certificates],
         }
-        write_whole(folder / REGISTER, json.dumps(content, indent=2) + "\n")
+        write_text(folder / REGISTER, json.dumps(content, indent=2) + "\n")
 
     def last(self, name: str) -> Issued | None:
         """The last certificate of that name, which took the place of those before."""

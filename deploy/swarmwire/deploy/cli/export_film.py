@@ -37,14 +37,14 @@ def export_film(
     console: Console,
 ) -> None:
     """Draw the arena, and metrics beside it, as a film; the console is told how it goes."""
+    from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.drawing.footage import footage
     from swarmwire.metrics.run_folder import RunFolder
-    from swarmwire.metrics.whole_file import check_path
 
     film = film_of(RunFolder(run), arena, str(run))
-    check_path(to, (f".{kind}",))
+    check_output_path(to, (f".{kind}",))
     figure = FilmFigure(film, size_px, metrics)
     times = cut.from_s, cut.until_s, cut.frames_per_s, cut.speed
     shown = footage(film.time_s, film.static.rate_hz, *times, USUAL_FRAMES_PER_S[kind])
@@ -52,15 +52,15 @@ def export_film(
 
 
 def _write(figure: "FilmFigure", shown: "Footage", kind: FilmKind, to: Path, console: Console) -> None:
+    from swarmwire.metrics.atomic import output_file
     from swarmwire.metrics.drawing.gif import write_gif
     from swarmwire.metrics.drawing.mp4 import write_mp4
-    from swarmwire.metrics.whole_file import chosen_file
 
     count = len(shown.ticks)
     console.print(f"{count} frames, {shown.frames_per_s:g} a second, {shown.speed:g} x real time")
     ticks = track(shown.ticks, "drawing", console=console, transient=True, disable=not console.is_terminal)
     frames = (figure.frame(int(tick)) for tick in ticks)
-    with chosen_file(to) as part:
+    with output_file(to) as part:
         if kind == "mp4":
             write_mp4(part, frames, shown.frames_per_s)
         else:

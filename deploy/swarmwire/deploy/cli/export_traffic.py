@@ -20,13 +20,13 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     BadInput for a folder without recorded packets, or of a run without a radio.
     """
     from swarmwire.comms.clock import to_ns
+    from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.capture.frames_on_air import frames_on_air
     from swarmwire.metrics.capture.write_capture import write_capture
     from swarmwire.metrics.run_folder import RunFolder
     from swarmwire.metrics.verify.sound_table import sound_table
-    from swarmwire.metrics.whole_file import check_path
 
-    check_path(to, (SUFFIX,))
+    check_output_path(to, (SUFFIX,))
     _check_times(from_s, until_s)
     folder = RunFolder(run)
     if not 0 <= arena < folder.static.arenas:

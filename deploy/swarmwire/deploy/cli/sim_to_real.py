@@ -37,15 +37,15 @@ def sim_to_real_command(
     from swarmwire.deploy.sim_to_real.emulation import read_emulation
     from swarmwire.deploy.sim_to_real.settings import differing_settings
     from swarmwire.deploy.terminal.sim_to_real_table import print_sim_to_real
+    from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.real_log.measured_log import measured_log
     from swarmwire.metrics.real_log.real_logs import read_real_logs
     from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
     from swarmwire.metrics.sim_to_real.sim_to_real_csv import write_sim_to_real
-    from swarmwire.metrics.whole_file import check_path
 
     for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
         if path is not None:
-            check_path(path, suffixes)
+            check_output_path(path, suffixes)
     logs, emulation = read_real_logs(log), read_emulation(emulated)
     shortest_s = min(run.duration_s for run in emulation.runs.runs)
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)

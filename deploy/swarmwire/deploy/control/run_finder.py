@@ -17,7 +17,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static
 from swarmwire.deploy.live.live_file import goes_on, read_live
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 
 OF_OTHERS = 0o077  # bits of a folder's mode that let others than its owner at it
 
@@ -49,7 +49,7 @@ class Announced(Observer):
             return
         found = FoundRun(live.run, live.endpoint, live.pid, static.name, str(self._folder.absolute()))
         self._path = runs_folder() / f"{live.run}.json"
-        write_whole(self._path, json.dumps(asdict(found)))
+        write_text(self._path, json.dumps(asdict(found)))
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """It is over."""

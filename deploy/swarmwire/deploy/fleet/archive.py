@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.metrics.whole_file import written_aside
+from swarmwire.metrics.atomic import atomic_write
 
 LEVEL = 6  # of compression: the next ones cost twice the time for a hundredth of the size
 
@@ -59,7 +59,7 @@ def write_archive(entries: Iterable[Entry], path: Path, name: str | None = None)
             tar.addfile(member, io.BytesIO(entry.data))
     data = made.getvalue()
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_aside(path) as aside:
+    with atomic_write(path) as aside:
         aside.chmod(0o600)  # it may hold keys
         aside.write_bytes(data)
     unpacked = sum(len(entry.data) for entry in ordered)

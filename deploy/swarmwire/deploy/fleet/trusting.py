@@ -9,7 +9,7 @@ import asyncssh
 
 from swarmwire.deploy.fleet.connecting import CONNECT_S, is_known, keys_in
 from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.metrics.whole_file import chosen_file
+from swarmwire.metrics.atomic import output_file
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ async def _asked(host: Host) -> NewHost:
 
 
 def _append(file: Path, lines: Sequence[str]) -> None:
-    with chosen_file(file) as aside:
+    with output_file(file) as aside:
         text = file.read_text(encoding="utf-8") if file.exists() else ""
         whole = text + ("\n" if text and not text.endswith("\n") else "") + "\n".join(lines) + "\n"
         aside.write_text(whole, encoding="utf-8")

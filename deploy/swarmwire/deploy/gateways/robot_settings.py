@@ -14,7 +14,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.gateways.chosen import Chosen
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
 
@@ -86,7 +86,7 @@ def write_settings(folder: Path, settings: Mapping[str, Any]) -> Path:
     """Write a robot's settings into the run folder; where they are."""
     path = folder / ROBOTS / f"{settings['name']}.toml"
     path.parent.mkdir(exist_ok=True)
-    write_whole(path, tomli_w.dumps(settings))
+    write_text(path, tomli_w.dumps(settings))
     return path
 
 

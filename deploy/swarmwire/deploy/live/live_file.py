@@ -9,7 +9,7 @@ from typing import Any
 
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 
 LIVE = "live.json"
 
@@ -24,7 +24,7 @@ class Live:
 
     def write(self, folder: Path) -> None:
         """Tell of it in the run folder; whoever reads the file finds all of it or none."""
-        write_whole(folder / LIVE, json.dumps(asdict(self)))
+        write_text(folder / LIVE, json.dumps(asdict(self)))
 
 
 def read_live(folder: Path) -> Live | None:

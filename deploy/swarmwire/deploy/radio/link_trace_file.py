@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
-from swarmwire.metrics.measured_table import MeasuredTable
+from swarmwire.metrics.table_file import MeasuredTable
 from swarmwire.world.scenario.scenario import Scenario
 
 MAX_S = 1e9  # whose nanoseconds fit an integer

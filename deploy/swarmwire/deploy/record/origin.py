@@ -15,11 +15,11 @@ from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.record.formats import RUN_FORMAT
 from swarmwire.metrics.record.metric_facts import MetricFacts, facts_in, facts_of
 from swarmwire.metrics.record.names import RUN_JSON
-from swarmwire.metrics.whole_file import write_whole
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -82,7 +82,7 @@ def origin_of(
         subtick_s=subtick_s,
     )
     if folder:
-        write_whole(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
+        write_text(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(origin)}, indent=2) + "\n")
     return origin
 
 

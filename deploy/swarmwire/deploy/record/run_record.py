@@ -21,7 +21,7 @@ from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.record.trajectory_log import TrajectoryLog
 from swarmwire.deploy.refusals import refusal
 from swarmwire.deploy.result import Result
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record.names import RECORDING, SUMMARY
 from swarmwire.metrics.record.recorders import recorders
 from swarmwire.metrics.record.run_log import RunLog

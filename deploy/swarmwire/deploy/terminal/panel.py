@@ -15,7 +15,7 @@ from swarmwire.deploy.terminal.bindings import press
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.keys import Keys
 from swarmwire.deploy.terminal.panel_view import panel_view
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.world.backends.registry import RunnerHealth
 
 REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures, at least and at most

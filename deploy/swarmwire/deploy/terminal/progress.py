@@ -8,7 +8,7 @@ from swarmwire.comms.clock import Clock, to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 
 SHARE = 0.25  # a line each time that so much more is done
 

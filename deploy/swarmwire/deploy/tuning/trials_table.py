@@ -8,8 +8,8 @@ from swarmwire.deploy.campaign.storage import storing
 from swarmwire.deploy.tuning.search import Search
 from swarmwire.deploy.tuning.trial import Trial
 from swarmwire.deploy.tuning.tuning import Tuning
+from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.record.part_files import PARQUET
-from swarmwire.metrics.whole_file import written_aside
 
 FILE = "trials.parquet"
 
@@ -43,7 +43,7 @@ def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
     types = {"whole": pl.Int64(), "text": pl.String(), "number": pl.Float64()}
     file = BytesIO()  # in memory first: what a full disk then says is an OSError
     pl.DataFrame(rows, {name: types[kind] for name, kind in kinds.items()}).write_parquet(file, **PARQUET)
-    with storing(folder, "tune"), written_aside(folder / FILE) as aside:
+    with storing(folder, "tune"), atomic_write(folder / FILE) as aside:
         aside.write_bytes(file.getvalue())
 
 

@@ -13,9 +13,9 @@ from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.whole_file import write_whole
 
 ABOUT = "tuning.json"
 FORMAT = 1
@@ -49,7 +49,7 @@ class Tuning:
 
     def write(self, folder: Path) -> None:
         """Write `tuning.json`; OSError if the disk will not."""
-        write_whole(folder / ABOUT, json.dumps({"format": FORMAT, **asdict(self)}, indent=1) + "\n")
+        write_text(folder / ABOUT, json.dumps({"format": FORMAT, **asdict(self)}, indent=1) + "\n")
 
 
 def scenario_file(folder: Path) -> Path:

@@ -15,8 +15,8 @@ from swarmwire.metrics.campaign.about import About, Point, read_about
 from swarmwire.metrics.campaign.formats import ABOUT, FAILED, PARTS, SUMMARY
 from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.campaign.statistic import Statistic, find_response, find_statistic
-from swarmwire.metrics.damage import damage, read_whole, refuse_damaged
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
+from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 if TYPE_CHECKING:
     import polars as pl
@@ -68,7 +68,7 @@ class CampaignFolder:
         for _ in range(CHANGES_UNDERFOOT):
             files = self._files()
             try:
-                frames = [read_whole(file) for file in files]
+                frames = [read_parquet(file) for file in files]
             except BadInput:
                 if all(file.exists() for file in files):
                     raise
@@ -79,8 +79,8 @@ class CampaignFolder:
                 return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
             try:
                 return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
-            except damage():
-                refuse_damaged(files)
+            except corruption_errors():
+                refuse_corrupt(files)
                 raise
         raise BadInput(str(self.path), PARTS, "expected files that stay while they are read")
 

@@ -4,10 +4,10 @@ import csv
 import math
 from pathlib import Path
 
+from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.campaign.comparison import Comparison, Row
 from swarmwire.metrics.campaign.point_values import value_text
 from swarmwire.metrics.statistics.summary import Summary
-from swarmwire.metrics.whole_file import check_path, chosen_file
 
 SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean", "limit")
 
@@ -19,9 +19,9 @@ def write_comparison(comparison: Comparison, to: Path) -> None:
     q50, q75, mean, limit; pairs, median_difference with _low and _high, mean_difference with _low and _high, horizon,
     cliffs_delta, hedges_g, p, test. Empty: unknown; inf: open.
     """
-    check_path(to, (".csv",))
+    check_output_path(to, (".csv",))
     rows = [_cells(row) for row in comparison.rows]
-    with chosen_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+    with output_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

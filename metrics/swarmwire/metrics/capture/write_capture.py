@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from swarmwire.metrics.atomic import output_file
 from swarmwire.metrics.capture import pcapng
 from swarmwire.metrics.capture.frame import Frame
 from swarmwire.metrics.capture.link_headers import Link
-from swarmwire.metrics.whole_file import chosen_file
 
 APPLICATION = "swarmwire"
 
@@ -18,7 +18,7 @@ def write_capture(to: Path, link: Link, name: str, description: str, frames: Ite
     counts in the frame's length.
     """
     count = 0
-    with chosen_file(to) as part, part.open("wb") as file:
+    with output_file(to) as part, part.open("wb") as file:
         file.write(pcapng.section(APPLICATION) + pcapng.interface(link.link_type, name, description))
         for frame in frames:
             header = link.header(frame)

@@ -6,8 +6,8 @@ from typing import Any, cast
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
+from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
-from swarmwire.metrics.whole_file import check_path, chosen_file
 
 MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
 
@@ -40,7 +40,7 @@ def pixels(figure: Any) -> ByteArray:
 
 def check_picture(to: Path) -> None:
     """Return if a picture may be written there, of the kind that the file's name says; else BadInput."""
-    check_path(to, (".png", ".svg", ".pdf"))
+    check_output_path(to, (".png", ".svg", ".pdf"))
 
 
 def save(figure: Any, to: Path) -> None:
@@ -52,5 +52,5 @@ def save(figure: Any, to: Path) -> None:
     check_picture(to)
     # Equal pictures are equal bytes: no date, and names within an SVG that do not change.
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
-    with chosen_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
+    with output_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
         figure.savefig(part, dpi=figure.dpi, metadata=undated)

@@ -8,9 +8,8 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
-from swarmwire.metrics.log_histogram import LogHistogram
-from swarmwire.metrics.network.latencies import Latencies
-from swarmwire.metrics.plain import plain
+from swarmwire.metrics.measure import json_number
+from swarmwire.metrics.network.latency import Latencies, LogHistogram
 
 PERCENTS = (50.0, 90.0, 99.0)
 
@@ -78,4 +77,4 @@ class RadioTally(Observer):
 
 def _percentiles_s(histogram: LogHistogram, arena: int) -> dict[str, float | None]:
     found_ns = histogram.percentiles_ns(arena, PERCENTS)
-    return {f"p{percent:g}": plain(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}
+    return {f"p{percent:g}": json_number(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.metrics.measured_table import MeasuredTable
 from swarmwire.metrics.radio_fit.radio_log import RadioLog
+from swarmwire.metrics.table_file import MeasuredTable
 
 NEEDED = ("t_s", "tx", "rx", "seq", "rssi_dbm")
 ENDS = ("tx_x_m", "tx_y_m", "rx_x_m", "rx_y_m")

@@ -9,8 +9,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.damage import damage
-from swarmwire.metrics.measured_table import MeasuredTable
+from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
 if TYPE_CHECKING:
     import polars as pl
@@ -34,7 +33,7 @@ class LogTable(MeasuredTable):
         self.half_line = half
         try:
             self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
-        except damage() as error:
+        except corruption_errors() as error:
             raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
         self.need(columns)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.real_log.not_in_log import WORLD, why_not
 from swarmwire.metrics.real_log.real_logs import RealLogs

@@ -8,7 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.metrics.whole_file import written_aside
+from swarmwire.metrics.atomic import atomic_write
 
 if TYPE_CHECKING:
     import polars as pl
@@ -55,7 +55,7 @@ def write_file(frame: "pl.DataFrame", path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
     data = BytesIO()  # in memory first: what a full disk then says is an OSError
     frame.write_parquet(data, **PARQUET)
-    with written_aside(path) as aside:
+    with atomic_write(path) as aside:
         aside.write_bytes(data.getbuffer())
 
 
@@ -65,7 +65,7 @@ def join_parts(folder: Path, name: str) -> None:
     if len(parts) == 1:
         parts[0].replace(whole)
     else:
-        with written_aside(whole) as aside:
+        with atomic_write(whole) as aside:
             scan_files(parts).sink_parquet(aside, **PARQUET)
         for part in parts:
             part.unlink()

@@ -6,7 +6,7 @@ from typing import Any
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.interfaces import Observer
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record.distance_totals import DistanceTotals
 from swarmwire.metrics.record.event_recorder import EventRecorder
 from swarmwire.metrics.record.link_totals import LinkTotals

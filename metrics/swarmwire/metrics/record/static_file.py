@@ -12,13 +12,13 @@ from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
+from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.record.formats import TABLES_FORMAT
-from swarmwire.metrics.whole_file import write_whole
 
 
 def write_static(static: Static, path: Path) -> None:
     """Write it aside, then rename, so that no half of it is ever seen."""
-    write_whole(path, json.dumps({"format": TABLES_FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
+    write_text(path, json.dumps({"format": TABLES_FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
 
 
 def read_static(path: Path) -> Static:

@@ -7,7 +7,7 @@ from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
 from swarmwire.metrics.record.table_writer import Chunk, TableWriter
 from swarmwire.metrics.record.tick_columns import (

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.report.lanes import Lane, lanes_of
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.table_file import corruption_errors
 from swarmwire.metrics.verify.sound_table import sound_table
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class RunData:
         try:
             own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
-        except (OSError, *damage()) as error:
+        except (OSError, *corruption_errors()) as error:
             return (
                 f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
             )

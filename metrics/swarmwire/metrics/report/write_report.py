@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.report.page import page
 from swarmwire.metrics.report.section import Report
-from swarmwire.metrics.whole_file import check_path, chosen_file
 
 PAGE = "report.html"  # in the folder that it is of
 FIGURES = "figures"
@@ -18,14 +18,14 @@ def write_report(report: Report, to: Path) -> list[Path]:
     Those of `report.html` go to `figures/`, those of `NAME.html` to `NAME-figures/`.
     BadInput for a path that cannot be.
     """
-    check_path(to, (".html", ".htm"))
+    check_output_path(to, (".html", ".htm"))
     text = page(report)
     folder = to.parent / (FIGURES if to.name == PAGE else f"{to.stem}-{FIGURES}")
     files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n" for figure in report.figures}
     if files:
         _make(folder)
     for path, content in (files | {to: text}).items():
-        with chosen_file(path) as aside:
+        with output_file(path) as aside:
             aside.write_text(content, encoding="utf-8")
     return [to, *files]
 

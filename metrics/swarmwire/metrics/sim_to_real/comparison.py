@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio
+from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns
 from swarmwire.metrics.sim_to_real.radio_values import RadioValue, radio_values, why_no_radio

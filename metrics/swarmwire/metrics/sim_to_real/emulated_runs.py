@@ -11,8 +11,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.formats import SERIES
 from swarmwire.metrics.campaign.selection import Selection
-from swarmwire.metrics.damage import damage, refuse_damaged
 from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
 
 if TYPE_CHECKING:
     import polars as pl
@@ -74,8 +74,8 @@ def runs_of_campaign(of: Selection, metrics: tuple[str, ...], rate_hz: int, robo
     try:
         table = pl.concat([pl.scan_parquet(file) for file in files], how="diagonal")
         table = table.filter(pl.col("run").is_in(wanted)).collect()
-    except (OSError, *damage()) as error:
-        refuse_damaged(files)
+    except (OSError, *corruption_errors()) as error:
+        refuse_corrupt(files)
         raise BadInput(of.text, SERIES, f"expected whole Parquet files: {str(error).splitlines()[0]}") from None
     by_run = {int(key[0]): ticks for key, ticks in table.partition_by("run", as_dict=True).items()}
     runs = tuple(

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.metrics.log_histogram import RELATIVE_ERROR
+from swarmwire.metrics.network.latency import RELATIVE_ERROR
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns
 from swarmwire.metrics.statistics.texts import number_text

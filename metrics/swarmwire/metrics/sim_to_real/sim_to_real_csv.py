@@ -4,8 +4,8 @@ import csv
 import math
 from pathlib import Path
 
+from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.sim_to_real.comparison import SimToReal
-from swarmwire.metrics.whole_file import check_path, chosen_file
 
 COLUMNS = (
     "name",
@@ -31,8 +31,8 @@ def write_sim_to_real(of: SimToReal, to: Path) -> None:
 
     Empty: unknown. `what` is metric or radio; of what was not in the log or not compared, all numbers are empty.
     """
-    check_path(to, (".csv",))
-    with chosen_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+    check_output_path(to, (".csv",))
+    with output_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
         writer: csv.DictWriter[str] = csv.DictWriter(file, list(COLUMNS), restval="")
         writer.writeheader()
         writer.writerows(_rows(of))

@@ -4,8 +4,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.part_files import part_file, parts_of, table_file
+from swarmwire.metrics.table_file import corruption_errors
 from swarmwire.metrics.verify.finding import State
 
 
@@ -52,6 +52,6 @@ def _fault(file: Path, columns: Collection[str]) -> str | None:
             return f"no column {missing[0]}"
         for column in there:
             pl.read_parquet(file, columns=[column])
-    except (OSError, *damage()) as error:
+    except (OSError, *corruption_errors()) as error:
         return str(error).splitlines()[0]
     return None

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.damage import damage
 from swarmwire.metrics.record.names import DIGESTS, INPUTS, LOG, RECORDING, RUN_JSON, STATIC, SUMMARY
 from swarmwire.metrics.record.part_files import scan_files
 from swarmwire.metrics.record.tick_columns import ROBOT_COLUMNS
 from swarmwire.metrics.run_folder import SCHEMAS, RunFolder
+from swarmwire.metrics.table_file import corruption_errors
 from swarmwire.metrics.verify.agreement import Verdict, events_agree, packets_agree, ticks_agree
 from swarmwire.metrics.verify.finding import Finding, State
 from swarmwire.metrics.verify.origin_check import check_digests, check_inputs, check_run_json
@@ -59,7 +59,7 @@ def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
         reason = " ".join(repr(error)[:60].split())
         return [Finding(name, State.DIFFERS, f"{SUMMARY} does not say what a run says there ({reason})")]
-    except damage() as error:
+    except corruption_errors() as error:
         return [Finding(name, State.DAMAGED, str(error).splitlines()[0])]
 
 
@@ -113,7 +113,7 @@ def _fault(folder: RunFolder, name: str, files: list[Path]) -> str | None:
         static = None
     try:
         return table_fault(name, scan_files(files), static)
-    except damage() as error:  # parts of different types
+    except corruption_errors() as error:  # parts of different types
         return str(error).splitlines()[0]
 
 

@@ -21,7 +21,7 @@ from swarmwire.deploy.control.remote_control import controlling, only_run_at
 from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.live.following import RunGone
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from tests.support.metrics.truths import static
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.real_log.measured_log import measured_log
 from swarmwire.metrics.real_log.not_in_log import LACKING, WITHOUT_POSES, why_not

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.packets import Fate
-from swarmwire.metrics.network.latencies import Latencies
+from swarmwire.metrics.network.latency import Latencies
 from swarmwire.metrics.report.lanes import Lane, Span, lanes_of
 from swarmwire.metrics.report.run_figures.delivery_by_distance import delivery_by_distance
 from swarmwire.metrics.report.run_figures.latency_histogram import latency_histogram, percentiles

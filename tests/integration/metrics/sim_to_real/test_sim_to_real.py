@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.real_log.measured_log import measured_log
 from swarmwire.metrics.real_log.real_logs import read_real_logs

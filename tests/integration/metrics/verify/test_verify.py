@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.event_log import EventLog
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.record import table_writer, tick_recorder
 from swarmwire.metrics.record.run_log import RunLog

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.picture import NoGraphics, render_png
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock

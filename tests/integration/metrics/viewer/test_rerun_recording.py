@@ -8,7 +8,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.recording_check import check_recording
 from swarmwire.metrics.viewer.colors import DEAD, FATES, packed

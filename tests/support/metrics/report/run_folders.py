@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.metrics.event_log import EventLog
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
 from tests.support.metrics.recorded import record
 from tests.support.metrics.summaries import made_up_summary

@@ -15,7 +15,7 @@ from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.panel_view import panel_view
 from swarmwire.deploy.terminal.sparkline import sparkline
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.registry import RunnerHealth
 from tests.support.clocks import MS, FakeClock

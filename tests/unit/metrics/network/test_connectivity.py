@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.network.algebraic_connectivity import AlgebraicConnectivity, second_eigenvalue
-from swarmwire.metrics.network.articulation import cut_vertices
+from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, cut_vertices, second_eigenvalue
 from tests.support.metrics.truths import edges, in_each_tick, measured, static, truth
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network import link_counts
 from swarmwire.metrics.network.link_counts import LinkCounts
 from swarmwire.metrics.network.radio_tally import RadioTally

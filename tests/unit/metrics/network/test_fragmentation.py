@@ -7,11 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.network.fragmentation_count import Fragmentations
-from swarmwire.metrics.network.fragmented import Fragmented
-from swarmwire.metrics.network.rejoin import RejoinMedian, RejoinWorst
-from swarmwire.metrics.network.unrejoined import Unrejoined
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
 from tests.support.metrics.truths import edges, in_each_tick, static, truth, watch
 
 NAMES = ("fragmentations", "rejoin_median", "rejoin_worst", "unrejoined")

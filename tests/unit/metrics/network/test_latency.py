@@ -11,9 +11,8 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information
+from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
-from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio, PacketDeliveryRatio
-from swarmwire.metrics.network.windowed import Window
 from tests.support.comms.radio.runs import make_medium, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links

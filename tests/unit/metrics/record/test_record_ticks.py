@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.record import tick_recorder
 from swarmwire.metrics.record.part_files import parts_of
 from swarmwire.metrics.record.tick_recorder import TickRecorder

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.deadlocked import Deadlocked
+from swarmwire.metrics.swarm.motion import Deadlocked
 from tests.support.metrics.swarm.swarms import rolled, stand, told
 from tests.support.metrics.truths import static, truth
 

@@ -8,16 +8,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.moment import Moment
-from swarmwire.metrics.swarm.min_gap import smallest_gap_m
-from swarmwire.metrics.swarm.near_pairs import NearPairs
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.swarm.contacts import smallest_gap_m
+from swarmwire.metrics.swarm.pairs import NearPairs
+from swarmwire.metrics.tick_view import TickView
 from tests.support.metrics.swarm.swarms import Swarm, rolled, said, stand, swarms
 from tests.support.metrics.truths import measured, static, truth
 
 
 def pairs_found(swarm: Swarm, reach_m, finder=None):
-    pairs = (finder or NearPairs(swarm.of, reach_m)).of(Moment(swarm.of, swarm.seen()))
+    pairs = (finder or NearPairs(swarm.of, reach_m)).of(TickView(swarm.of, swarm.seen()))
     return sorted(tuple(sorted(pair)) for pair in pairs.tolist())
 
 
@@ -65,10 +65,10 @@ def test_robots_far_outside_an_open_arena_are_found():
 def test_they_are_found_once_a_tick_for_all_who_ask_by_the_same_reaches_alone():
     swarm = stand((0.0, 0.0), (1.0, 0.0))
     wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
-    moment = Moment(swarm.of, swarm.seen())
-    assert as_wide.of(moment) is wide.of(moment)
-    assert (len(wide.of(moment)), len(narrow.of(moment))) == (1, 0)
-    assert wide.of(Moment(swarm.of, swarm.seen(1))) is not wide.of(moment)
+    view = TickView(swarm.of, swarm.seen())
+    assert as_wide.of(view) is wide.of(view)
+    assert (len(wide.of(view)), len(narrow.of(view))) == (1, 0)
+    assert wide.of(TickView(swarm.of, swarm.seen(1))) is not wide.of(view)
 
 
 def mean_nearest_m(swarm):

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.task.coverage import Coverage
-from swarmwire.metrics.task.coverage_time import CoverageTime
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.task.coverage import Coverage, CoverageTime
 from tests.support.metrics.truths import in_each_tick, static, truth
 
 BOX = Obstacle("box", 1.0, 0.5, 0.3, size_m=(1.5, 0.7))

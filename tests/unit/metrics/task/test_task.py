@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.truth import Light
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.task.find_time import FindTime
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.task.target import FindTime
 from tests.support.metrics.truths import in_each_tick, measured, static, truth
 
 numbers = st.floats(-1e6, 1e6) | st.just(np.nan)

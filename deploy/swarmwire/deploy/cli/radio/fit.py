@@ -47,11 +47,11 @@ def fit_command(
 
     from swarmwire.deploy.radio.fit_report import print_fit
     from swarmwire.deploy.radio.fit_toml import radio_fit_toml
+    from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.canvas import check_picture
-    from swarmwire.metrics.whole_file import check_path
 
     if write is not None:
-        check_path(write, (".toml",))
+        check_output_path(write, (".toml",))
     if to is not None:
         check_picture(to)
     if not file.exists():
@@ -139,11 +139,11 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
 
 
 def _write(text: str, to: Path | None) -> None:
-    from swarmwire.metrics.whole_file import chosen_file
+    from swarmwire.metrics.atomic import output_file
 
     if to is None:
         typer.echo(text, nl=False)
         return
-    with chosen_file(to) as part:
+    with output_file(to) as part:
         part.write_text(text, encoding="utf-8")
     typer.echo(f"written: {to}")

@@ -14,7 +14,7 @@ from swarmwire.deploy.fleet.environment.own_packages import own_entries
 from swarmwire.deploy.fleet.environment.pins import Pin, pins
 from swarmwire.deploy.fleet.environment.target import Target
 from swarmwire.deploy.fleet.environment.wheels import download, entries_of
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.metrics.atomic import write_text
 
 FORMAT = 1  # of what is made of wheels
 
@@ -54,8 +54,8 @@ class LockedEnvironments:
             sums = {wheel.name: hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in wheels}
             name = _digest([f"{name} {digest}" for name, digest in sums.items()])
             archive = self._kept(name) or self._keep(write_archive(entries_of(wheels), self._path(name), name))
-        write_whole(self._cache / f"{name}.wheels.json", json.dumps(sums, indent=2))
-        write_whole(asked, name)
+        write_text(self._cache / f"{name}.wheels.json", json.dumps(sums, indent=2))
+        write_text(asked, name)
         return archive
 
     def _path(self, name: str) -> Path:
@@ -72,7 +72,7 @@ class LockedEnvironments:
         return archive if archive.path.is_file() and archive.path.stat().st_size == archive.size else None
 
     def _keep(self, archive: Archive) -> Archive:
-        write_whole(self._cache / f"{archive.name}.json", json.dumps({**asdict(archive), "path": ""}))
+        write_text(self._cache / f"{archive.name}.json", json.dumps({**asdict(archive), "path": ""}))
         return archive
 
 

@@ -1,6 +1,6 @@
-"""Measured tables, CSV or Parquet: read, and refused in one line that names file, row, column and what was expected."""
+"""Tables in files, CSV or Parquet: what is damaged or does not fit is refused in one line."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,12 +8,46 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.damage import damage
 
 if TYPE_CHECKING:
     import polars as pl
 
 SUFFIXES = (".csv", ".parquet")
+
+
+def corruption_errors() -> tuple[type[BaseException], ...]:
+    """Its errors, and its panics: a damaged Parquet file may break what its own code takes for granted.
+
+    A panic is no Exception. polars tells of it on stderr, and goes on.
+    """
+    import polars as pl
+
+    return (pl.exceptions.PolarsError, pl.exceptions.PanicException)
+
+
+def read_parquet(file: Path, columns: list[str] | None = None, cure: str = "") -> "pl.DataFrame":
+    """What a Parquet file holds; BadInput names it if it is damaged or cannot be read, with what can be done."""
+    import polars as pl
+
+    try:
+        return pl.read_parquet(file, columns=columns)
+    except (OSError, *corruption_errors()) as error:
+        panic = isinstance(error, pl.exceptions.PanicException)
+        why = "polars gave up on it" if panic else str(error).partition("\n")[0]
+        raise BadInput(str(file), "", f"expected a whole Parquet file: {why}{cure and '; '}{cure}") from None
+
+
+def refuse_corrupt(files: Iterable[Path], cure: str = "") -> None:
+    """BadInput for the first of these Parquet files that is damaged, or has a column of another type than one before.
+
+    For where reading them together failed, which does not tell of which it did.
+    """
+    kinds: dict[str, pl.DataType] = {}
+    for file in files:
+        for name, kind in read_parquet(file, cure=cure).schema.items():
+            if kinds.setdefault(name, kind) != kind:
+                expected = f"expected {kinds[name]} as in the files before it, got {kind}"
+                raise BadInput(str(file), name, f"{expected}{cure and '; '}{cure}")
 
 
 class MeasuredTable:
@@ -78,5 +112,5 @@ def _read(path: Path) -> "pl.DataFrame":
             return pl.read_csv(file, infer_schema_length=None, null_values=["", "nan", "NaN", "null"])
     except OSError as error:
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
-    except damage() as error:
+    except corruption_errors() as error:
         raise BadInput(str(path), "", f"expected a table: {str(error).splitlines()[0]}") from None

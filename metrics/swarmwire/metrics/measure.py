@@ -2,6 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+import math
 import traceback
 from collections.abc import Sequence
 from typing import Any
@@ -14,9 +15,14 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
-from swarmwire.metrics.plain import plain
 from swarmwire.metrics.registry import chosen
+from swarmwire.metrics.tick_view import TickView
+
+
+def json_number(number: float) -> float | None:
+    """A Python float, or None for what is not a number: undefined, or nothing to measure."""
+    value = float(number)
+    return None if math.isnan(value) else value
 
 
 class Metrics(Observer):
@@ -46,11 +52,11 @@ class Metrics(Observer):
 
     def see(self, truth: Truth) -> None:
         """Measure a tick; CustomCodeFailed names a metric that raises, or has no value per arena."""
-        moment = Moment(self._static, truth)
+        view = TickView(self._static, truth)
         value = np.empty_like(self._sum)
         for row, (metric, measure) in enumerate(zip(self.metrics, self._measures, strict=True)):
             try:
-                value[row] = measure(moment)
+                value[row] = measure(view)
             except (Exception, SystemExit) as error:
                 raise _failed(metric) from error
         _add(value, self._latest, truth.running, self._counts, self._seen, self._sum, self._min, self._max)
@@ -81,7 +87,7 @@ class Metrics(Observer):
         return {
             "metrics": [
                 {
-                    metric.name: {name: plain(column[row, arena]) for name, column in columns.items()}
+                    metric.name: {name: json_number(column[row, arena]) for name, column in columns.items()}
                     for row, metric in enumerate(self.metrics)
                 }
                 for arena in range(self._static.arenas)

@@ -14,7 +14,7 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
-def written_aside(to: Path) -> Generator[Path]:
+def atomic_write(to: Path) -> Generator[Path]:
     """A path to write to; when the block ends well that file takes its place, which it may replace, else it is gone.
 
     OSError if nothing can be written there.
@@ -28,18 +28,18 @@ def written_aside(to: Path) -> Generator[Path]:
         aside.unlink(missing_ok=True)
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
     """Write a text file so that no half of it is ever seen; OSError if the disk will not."""
-    with written_aside(path) as aside:
+    with atomic_write(path) as aside:
         aside.write_text(text, encoding="utf-8")
 
 
 @contextmanager
-def chosen_file(to: Path) -> Generator[Path]:
-    """As `written_aside`, for a path that a person chose: BadInput if nothing can be written there, or not so much."""
+def output_file(to: Path) -> Generator[Path]:
+    """As `atomic_write`, for a path that a person chose: BadInput if nothing can be written there, or not so much."""
     with ExitStack() as stack:
         try:
-            aside = stack.enter_context(written_aside(to))
+            aside = stack.enter_context(atomic_write(to))
         except OSError as error:
             raise _not_written(to, error) from None
         try:
@@ -54,7 +54,7 @@ def _not_written(to: Path, error: OSError) -> BadInput:
     return BadInput(str(to), "", f"expected a file that can be written: {error.strerror}")
 
 
-def check_path(to: Path, suffixes: tuple[str, ...]) -> None:
+def check_output_path(to: Path, suffixes: tuple[str, ...]) -> None:
     """Return if a person may have a file of one of these kinds there; else BadInput."""
     if to.suffix.lower() not in suffixes:
         raise BadInput(str(to), "", f"expected a file name that ends in {' or '.join(suffixes)}")

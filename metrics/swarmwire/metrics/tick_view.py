@@ -12,6 +12,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static, Truth
+from swarmwire.metrics.graph import components_of
 
 T = TypeVar("T")
 
@@ -26,7 +27,7 @@ class Components:
     largest: IntArray  # (arenas,) robots alive in the one that holds most; 0 without a component
 
 
-class Moment:
+class TickView:
     """The truth of one tick with its rows folded to (arenas, robots).
 
     Attributes:
@@ -138,33 +139,3 @@ def _count(alive):
             divisor[arena] = count[arena]
         everyone = everyone and count[arena] == robots
     return count, divisor, everyone
-
-
-@njit()
-def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray]:
-    """How many components each arena has that hold a robot alive, and the most of them that one holds, (arenas,) each.
-
-    Union-find over the `edges` (e, 2) between robot rows; `alive` is (arenas, robots).
-    """
-    arenas, robots = alive.shape
-    parent, size = np.arange(arenas * robots), np.zeros(arenas * robots, np.int64)
-    for e in range(len(edges)):
-        a, b = _root(parent, edges[e, 0]), _root(parent, edges[e, 1])
-        parent[max(a, b)] = min(a, b)
-    pieces, largest = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
-    for arena in range(arenas):
-        for i in range(robots):
-            if alive[arena, i]:
-                root = _root(parent, arena * robots + i)
-                pieces[arena] += size[root] == 0
-                size[root] += 1
-                largest[arena] = max(largest[arena], size[root])
-    return pieces, largest
-
-
-@njit()
-def _root(parent, row):
-    while parent[row] != row:
-        parent[row] = parent[parent[row]]  # halves the way for those to come
-        row = parent[row]
-    return row
