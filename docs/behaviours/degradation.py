@@ -14,8 +14,7 @@ from docs.experiments.places import Places
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.report.figures.column_axes import plain_legend
 from swarmwire.metrics.report.figures.response_curve import MedianLine, response_curve
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.summary import summary
 
 LOSS, LATENCY = "loss", "latency_s"

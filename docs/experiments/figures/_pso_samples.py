@@ -9,8 +9,7 @@ import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.difference import difference
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample, time_sample
+from swarmwire.metrics.statistics.sample import Interval, Sample, time_sample
 from swarmwire.metrics.statistics.summary import Summary, summary
 
 FIRST, HALF = "first_time_s", "find_time_s"  # to the first robot within NEAR_M of the light, to half of them

@@ -7,8 +7,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.metrics.statistics.sample import number_sample
-from swarmwire.metrics.statistics.summary import Summary, summary
-from swarmwire.metrics.statistics.texts import interval_text, number_text
+from swarmwire.metrics.statistics.summary import Summary, interval_text, number_text, summary
 
 LOSS, LATENCY = "radio.loss", "radio.latency_s"
 CAMPAIGNS = ("lennard-jones",)

@@ -13,11 +13,9 @@ import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
-from swarmwire.metrics.statistics.summary import summary
-from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text
+from swarmwire.metrics.statistics.summary import interval_text, number_text, quartiles_text, summary
+from swarmwire.metrics.statistics.survival import kaplan_meier, resampled_quantiles
 
 COUNT = "robots.swarm.count"
 SEPARATION, LATERAL, REAR = (f"robots.swarm.params.{name}_diameters" for name in ("separation", "lateral", "rear"))

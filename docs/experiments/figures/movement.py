@@ -13,8 +13,7 @@ from swarmwire.metrics.drawing.looks import ACCENT, SMALL_PT, SOFT, TEXT_PT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
 from swarmwire.metrics.report.svg import blank_figure
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import number_sample
+from swarmwire.metrics.statistics.sample import Interval, number_sample
 from swarmwire.metrics.statistics.summary import Summary, summary
 
 CAMPAIGNS = ("movement",)

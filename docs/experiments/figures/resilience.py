@@ -15,10 +15,10 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.report.svg import blank_figure
-from swarmwire.metrics.statistics.degradation import Degradation, Fit, degradation, relative_to_unharmed
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import number_sample
 from swarmwire.metrics.statistics.summary import summary
+from swarmwire.metrics.statistics.trends import Degradation, Fit, degradation, relative_to_unharmed
 
 COVERAGE, SEARCH = "resilience-coverage", "resilience-search"
 CAMPAIGNS = (COVERAGE, SEARCH)

@@ -21,8 +21,7 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     """
     from swarmwire.comms.clock import to_ns
     from swarmwire.metrics.atomic import check_output_path
-    from swarmwire.metrics.capture.frames_on_air import frames_on_air
-    from swarmwire.metrics.capture.write_capture import write_capture
+    from swarmwire.metrics.capture.pcapng import frames_on_air, write_capture
     from swarmwire.metrics.run_folder import RunFolder
     from swarmwire.metrics.verify.sound_table import sound_table
 

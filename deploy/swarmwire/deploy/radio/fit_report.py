@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
-from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+from swarmwire.metrics.radio_fit.fit import RadioFit
+from swarmwire.metrics.radio_fit.losses import LossFit
+from swarmwire.metrics.radio_fit.tables import Row, parameter_rows, residual_rows
 
 
 def print_fit(fit: RadioFit, title: str, console: Console) -> None:

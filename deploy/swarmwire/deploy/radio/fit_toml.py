@@ -7,8 +7,7 @@ from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.metrics.radio_fit.network_fit import NetworkFit
-    from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+    from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 
 DISK = {"range_m": 1.0}  # what a table without path loss is put into
 
@@ -20,8 +19,7 @@ def radio_fit_toml(fit: "RadioFit", antenna: "Antenna", file: Path) -> str:
     """
     import tomli_w
 
-    from swarmwire.metrics.radio_fit.fit_rows import parameter_rows
-    from swarmwire.metrics.radio_fit.radio_table import radio_table
+    from swarmwire.metrics.radio_fit.tables import parameter_rows, radio_table
 
     table = radio_table(fit, antenna)
     left_out = [f"{row.parameter}: {row.left_out}" for row in parameter_rows(fit) if row.estimate is None]
@@ -38,8 +36,7 @@ def network_fit_toml(fit: "NetworkFit", file: Path) -> str:
     """The table `[radio]` of a network's fit, with what was left out as comments; BadInput as `radio_fit_toml`."""
     import tomli_w
 
-    from swarmwire.metrics.radio_fit.network_rows import network_rows
-    from swarmwire.metrics.radio_fit.network_table import network_comments, network_table
+    from swarmwire.metrics.radio_fit.tables import network_comments, network_rows, network_table
 
     table = network_table(fit)
     left_out = [f"{row.parameter}: {row.left_out}" for row in network_rows(fit) if row.estimate is None]

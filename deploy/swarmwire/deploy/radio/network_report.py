@@ -3,9 +3,9 @@
 from rich.console import Console
 
 from swarmwire.deploy.radio.fit_report import print_models, print_parameters, titled_table
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
-from swarmwire.metrics.radio_fit.network_fit import NetworkFit
-from swarmwire.metrics.radio_fit.network_rows import network_rows
+from swarmwire.metrics.radio_fit.fit import NetworkFit
+from swarmwire.metrics.radio_fit.losses import LossFit
+from swarmwire.metrics.radio_fit.tables import network_rows
 
 MAX_LINKS = 30  # that are told one by one: the worst
 

@@ -6,12 +6,10 @@ import numpy as np
 
 from swarmwire.deploy.tuning.goal import SHARES, Goal
 from swarmwire.deploy.tuning.trial import Trial
-from swarmwire.metrics.statistics.binomial import binomial_interval
-from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.sample import Sample
-from swarmwire.metrics.statistics.summary import summary
-from swarmwire.metrics.statistics.texts import UNKNOWN_TEXT, interval_text, number_text, quantile_text
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
+from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
+from swarmwire.metrics.statistics.summary import UNKNOWN_TEXT, interval_text, number_text, quantile_text, summary
+from swarmwire.metrics.statistics.survival import kaplan_meier
 
 
 def statistic_text(trial: Trial, goal: Goal) -> str:

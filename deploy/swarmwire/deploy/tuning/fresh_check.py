@@ -20,8 +20,7 @@ from swarmwire.deploy.tuning.tuning import Tuning, scenario_file
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.formats import ABOUT
 from swarmwire.metrics.statistics.difference import difference
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample, number_sample
+from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 
 CHECK = "check"
 BASELINE = "baseline"

@@ -16,8 +16,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.task import Row
 from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.campaign.statistic import Stat, find_statistic
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
 from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.survival import kaplan_meier
 
 Direction = Literal["min", "max"]
 SHARES: dict[Stat, float] = {"q25": 0.25, "q50": 0.5, "q75": 0.75}

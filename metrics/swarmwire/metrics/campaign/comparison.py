@@ -11,7 +11,7 @@ from swarmwire.metrics.campaign.response import Response
 from swarmwire.metrics.campaign.selection import Selection
 from swarmwire.metrics.campaign.statistic import find_response
 from swarmwire.metrics.statistics.difference import Difference, difference
-from swarmwire.metrics.statistics.interval import LEVEL
+from swarmwire.metrics.statistics.sample import LEVEL
 from swarmwire.metrics.statistics.summary import Summary, summary
 
 

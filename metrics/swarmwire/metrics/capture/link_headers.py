@@ -11,6 +11,7 @@ Robots' addresses are their indices. No frame has a checksum at its end.
 
 import struct
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -18,7 +19,6 @@ import numpy as np
 
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
-from swarmwire.metrics.capture.frame import Frame
 
 IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 283, 127, 147
 
@@ -39,6 +39,20 @@ DATA_FRAME = 0x0008  # frame control: data between stations of an ad hoc network
 NETWORK = bytes.fromhex("025357000000")  # the BSSID, and the first bytes of stations
 LLC_IPV4 = bytes.fromhex("aaaa030000000800")
 UDP, UDP_PORT = 17, 49_152  # the first port that belongs to nobody
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A packet that was on air, once for all of its receivers; of one that was sent again, the last time."""
+
+    on_air_at_ns: int  # since the start of the run
+    sender: int  # index in the arena
+    to: int | None  # index of the one that it is addressed to; None: a broadcast
+    sequence: int  # packets that the sender had sent before
+    size_bytes: int  # payload
+    payload: bytes = b""  # as far as it is known
+    rssi_dbm: float | None = None  # at the receiver where it was strongest; None: unknown
+    comments: tuple[str, ...] = ()  # what it is, and what became of it where
 
 
 class Link(NamedTuple):

@@ -1,23 +1,93 @@
-"""Blocks of pcapng (IETF draft-ietf-opsawg-pcapng): a section, its interface, its packets; little-endian throughout.
-
-Every block is type, total length, body, options, total length again; bodies and options are padded to 4 bytes.
-"""
+"""The frames of a run as a capture in pcapng, which Wireshark reads."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.metrics.atomic import output_file
+from swarmwire.metrics.capture.link_headers import Frame, Link
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+APPLICATION = "swarmwire"
 SECTION, INTERFACE, PACKET = 0x0A0D0D0A, 1, 6
 BYTE_ORDER = 0x1A2B3C4D
 UNKNOWN_LENGTH = -1  # of the section: a reader goes from block to block
-COMMENT, APPLICATION, NAME, DESCRIPTION, RESOLUTION = 1, 4, 2, 3, 9  # options, of the block that each stands in
+# Options: SHB_USERAPPL of the section, the others of the block that they stand in.
+COMMENT, USER_APPLICATION, NAME, DESCRIPTION, RESOLUTION = 1, 4, 2, 3, 9
 NANOSECONDS = b"\x09"  # 10^-9 s
 MAX_OPTION = 65_535  # bytes
+
+
+def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[Frame]) -> int:
+    """Write the frames, and say how many; BadInput if nothing can be written there.
+
+    Times are since the run's start, which a reader takes for 1970. A payload that is not known is not captured, but
+    counts in the frame's length.
+    """
+    count = 0
+    with output_file(to) as part, part.open("wb") as file:
+        file.write(section(APPLICATION) + interface(link.link_type, name, description))
+        for frame in frames:
+            header = link.header(frame)
+            length = len(header) + frame.size_bytes
+            file.write(packet(frame.on_air_at_ns, header + frame.payload, length, frame.comments))
+            count += 1
+    return count
+
+
+def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
+    """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
+
+    A frame that nobody was within reach of has no row, and is not among them; nor is what never went on air.
+    """
+    import polars as pl
+
+    once = ("on_air_at_ns", "to", "size_bytes", "topic", "payload")
+    each = packets.filter(pl.col("receiver").is_not_null()).sort("receiver")
+    frames = each.group_by("sender", "sequence").agg(
+        *(pl.col(name).first() for name in once),
+        pl.col("rssi_dbm").max().alias("strongest_dbm"),
+        "receiver",
+        "fate",
+        "rssi_dbm",
+    )
+    for row in frames.sort("on_air_at_ns", "sender", "sequence").iter_rows(named=True):
+        yield _frame(row, names)
+
+
+def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
+    to, sender = row["to"], names[row["sender"]]
+    told = f"{sender} to {'all' if to is None else names[to]}: {row['topic']}, packet {row['sequence']}"
+    return Frame(
+        on_air_at_ns=row["on_air_at_ns"],
+        sender=row["sender"],
+        to=to,
+        sequence=row["sequence"],
+        size_bytes=row["size_bytes"],
+        payload=row["payload"] or b"",
+        rssi_dbm=row["strongest_dbm"],
+        comments=(told, *_fates(row, names)),
+    )
+
+
+def _fates(row: dict[str, Any], names: Sequence[str]) -> list[str]:
+    """A comment per fate: `received: flock-1 -61.5 dBm, flock-2 -70.1 dBm`."""
+    of_fate: dict[str, list[str]] = {}
+    for receiver, fate, rssi_dbm in zip(row["receiver"], row["fate"], row["rssi_dbm"], strict=True):
+        strength = "" if rssi_dbm is None else f" {rssi_dbm:.1f} dBm"
+        of_fate.setdefault(fate, []).append(f"{names[receiver]}{strength}")
+    return [f"{fate}: {', '.join(of_fate[fate])}" for fate in FATE_NAMES if fate in of_fate]
 
 
 def section(application: str) -> bytes:
     """The block that a file starts with: who wrote it."""
     body = struct.pack("<IHHq", BYTE_ORDER, 1, 0, UNKNOWN_LENGTH)
-    return _block(SECTION, body, [(APPLICATION, _text(application))])
+    return _block(SECTION, body, [(USER_APPLICATION, _text(application))])
 
 
 def interface(link_type: int, name: str, description: str) -> bytes:

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.looks import CURVE, LINK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.statistics.binomial import binomial_interval
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
 
 if TYPE_CHECKING:
     import polars as pl

@@ -9,10 +9,9 @@ from swarmwire.metrics.drawing.canvas import new_figure, save
 from swarmwire.metrics.drawing.looks import CURVE, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TITLE_PT
 from swarmwire.metrics.drawing.plain_axes import plain_axes
 from swarmwire.metrics.drawing.radio_fit_sheet import RUNS_TITLE, draw_bursts, say
-from swarmwire.metrics.radio_fit.latency_fit import LatencyFit
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
-from swarmwire.metrics.radio_fit.network_fit import NetworkFit, delivery_over_distance
-from swarmwire.metrics.radio_fit.range_fit import RangeFit
+from swarmwire.metrics.radio_fit.delay import LatencyFit
+from swarmwire.metrics.radio_fit.fit import NetworkFit, RangeFit, delivery_over_distance
+from swarmwire.metrics.radio_fit.losses import LossFit
 
 _HEIGHT_IN = 4.6
 _BINS, _LATENCY_BINS = 30, 60

@@ -20,14 +20,10 @@ from swarmwire.metrics.drawing.looks import (
     Look,
 )
 from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.radio_fit.correlogram import correlogram
-from swarmwire.metrics.radio_fit.expected_runs import expected_runs
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
-from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
-from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
-from swarmwire.metrics.radio_fit.places import places_of
-from swarmwire.metrics.radio_fit.radio_fit import RadioFit
-from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
+from swarmwire.metrics.radio_fit.fit import RadioFit
+from swarmwire.metrics.radio_fit.losses import LossFit, LossSequences, expected_runs
+from swarmwire.metrics.radio_fit.path_loss import PathLossFit
+from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, correlogram, places_of
 
 RUNS_TITLE = "runs of lost packets by length"
 _HEIGHT_IN = 4.6

@@ -16,9 +16,9 @@ from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns
 from swarmwire.metrics.sim_to_real.radio_values import RadioValue, radio_values, why_no_radio
-from swarmwire.metrics.statistics.block_bootstrap import mean_difference_interval
-from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
-from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
+from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
+from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1
+from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
 
 MIN_RUNS = 3  # that have a spread
 SPREAD = (0.05, 0.5, 0.95)

@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.metrics.network.latency import RELATIVE_ERROR
 from swarmwire.metrics.real_log.measured_log import MeasuredLog
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns
-from swarmwire.metrics.statistics.texts import number_text
+from swarmwire.metrics.statistics.summary import number_text
 
 Radio = Mapping[str, Any]
 

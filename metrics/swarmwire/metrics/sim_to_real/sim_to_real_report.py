@@ -16,7 +16,7 @@ from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.statistics.texts import number_text
+from swarmwire.metrics.statistics.summary import number_text
 
 
 def sim_to_real_report(of: SimToReal, title: str, told: Sequence[str]) -> Report:

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
-from swarmwire.metrics.statistics.texts import interval_text, number_text
+from swarmwire.metrics.statistics.summary import interval_text, number_text
 
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
 RADIO_COLUMNS = ("radio", "emulated", "log", "within")  # and of that of the radio

@@ -1,8 +1,9 @@
-"""A sample: what the runs of one design point gave, each with its seed."""
+"""Samples of the results of runs, right-censored where a run ended first, and intervals of confidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -48,3 +49,29 @@ def number_sample(value: FloatArray, seed: IntArray | None = None) -> Sample:
 def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = None) -> Sample:
     """A sample of finite times (n,), right-censored where not observed; seeds are 0, 1, … unless told."""
     return Sample(value, observed, np.arange(len(value)) if seed is None else seed, "time")
+
+
+def by_seed(samples: Sequence[Sample]) -> FloatArray:
+    """The values of points and seeds, (points, seeds), seeds rising; NaN where a run has none.
+
+    Of a time that was censored it is the time up to which it had not happened: where all runs may take equally long,
+    means of these are restricted means.
+    """
+    seeds = np.unique(np.concatenate([sample.seed for sample in samples]))
+    table = np.full((len(samples), len(seeds)), np.nan)
+    for row, sample in zip(table, samples, strict=True):
+        row[np.searchsorted(seeds, sample.seed)] = sample.value
+    return table
+
+
+LEVEL = 0.95  # how sure, unless told
+
+
+class Interval(NamedTuple):
+    """From low to high. NaN: the data do not tell; infinite: open on that side, as where times are censored."""
+
+    low: float
+    high: float
+
+
+UNKNOWN = Interval(float("nan"), float("nan"))  # of too few runs

@@ -22,7 +22,7 @@ from swarmwire.metrics.report.run_sections.links import of_links
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.report.thinned import thinned
 from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.statistics.binomial import binomial_interval
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from tests.support.metrics.films import two_groups
 from tests.support.metrics.radio_runs import RADIOS, ticks
 from tests.support.metrics.recorded import record

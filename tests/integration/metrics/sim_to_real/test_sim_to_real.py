@@ -29,7 +29,7 @@ from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.statistics.interval import UNKNOWN
+from swarmwire.metrics.statistics.sample import UNKNOWN
 from tests.support.metrics.real_log.as_logs import BEGAN_S, Watched, as_logs
 from tests.support.metrics.real_log.emulated import watched
 

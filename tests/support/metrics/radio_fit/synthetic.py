@@ -9,7 +9,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
+from swarmwire.metrics.radio_fit.losses import LossSequences
 from tests.support.comms.radio.bursts import BurstLinks
 
 EXPONENT, RSSI_AT_1_M_DBM = 2.7, -40.0

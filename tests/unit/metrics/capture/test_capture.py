@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import pcapng
-from swarmwire.metrics.capture.frame import Frame
-from swarmwire.metrics.capture.frames_on_air import frames_on_air
 from swarmwire.metrics.capture.link_headers import link_of
+from swarmwire.metrics.capture.pcapng import Frame, frames_on_air
 from swarmwire.metrics.record.packet_columns import packet_schema
 from tests.support.metrics.capture.reading import Captured, read
 from tests.unit.world.scenario.test_radio_tables import radio_of

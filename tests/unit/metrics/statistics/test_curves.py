@@ -8,12 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.statistics.by_seed import by_seed
-from swarmwire.metrics.statistics.change_point import change_point
-from swarmwire.metrics.statistics.degradation import Fit, degradation, relative_to_unharmed
-from swarmwire.metrics.statistics.interval import UNKNOWN
-from swarmwire.metrics.statistics.point_sums import point_sums, resampled_sums
-from swarmwire.metrics.statistics.scaling import scaling
+from swarmwire.metrics.statistics.change_point import change_point, point_sums, resampled_sums
+from swarmwire.metrics.statistics.sample import UNKNOWN, by_seed
+from swarmwire.metrics.statistics.trends import Fit, degradation, relative_to_unharmed, scaling
 from tests.support.metrics.statistics.samples import numbers, times
 
 LOSS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])

@@ -13,9 +13,8 @@ from swarmwire.metrics.statistics.bootstrap import (
     resampled_means,
     resampled_medians,
 )
-from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
-from swarmwire.metrics.statistics.summary import summary
-from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text
+from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
+from swarmwire.metrics.statistics.summary import interval_text, number_text, quartiles_text, summary
 from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, times, treated
 
 

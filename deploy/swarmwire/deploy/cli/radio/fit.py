@@ -10,8 +10,7 @@ from swarmwire.deploy.cli.options import USUAL_SIZE_PX
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.metrics.radio_fit.network_fit import NetworkFit
-    from swarmwire.metrics.radio_fit.radio_fit import RadioFit
+    from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 
 
 def fit_command(
@@ -73,8 +72,8 @@ def fit_command(
 
 
 def _fit(file: Path, within_m: float | None) -> "RadioFit":
-    from swarmwire.metrics.radio_fit.radio_fit import fit_radio
-    from swarmwire.metrics.radio_fit.read_log import read_log
+    from swarmwire.metrics.radio_fit.fit import fit_radio
+    from swarmwire.metrics.radio_fit.logs import read_log
 
     log = read_log(file)
     if within_m is not None:
@@ -86,8 +85,8 @@ def _fit(file: Path, within_m: float | None) -> "RadioFit":
 
 def _network(path: Path, within_m: float | None) -> "NetworkFit | None":
     """The fit of robots' logs; None: it is a table with strengths."""
-    from swarmwire.metrics.radio_fit.network_fit import fit_network
-    from swarmwire.metrics.radio_fit.network_log import (
+    from swarmwire.metrics.radio_fit.fit import fit_network
+    from swarmwire.metrics.radio_fit.logs import (
         is_network_table,
         network_log_of_robots,
         network_log_of_table,

@@ -14,7 +14,7 @@ from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
-from swarmwire.metrics.statistics.degradation import (
+from swarmwire.metrics.statistics.trends import (
     MIN_STRESSES,
     Degradation,
     Fit,

@@ -9,10 +9,9 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.statistics.by_seed import by_seed
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import Sample, by_seed
 from swarmwire.metrics.statistics.summary import Summary, summary
+from swarmwire.metrics.statistics.survival import kaplan_meier
 
 _NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 

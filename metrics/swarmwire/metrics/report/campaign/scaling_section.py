@@ -13,7 +13,7 @@ from swarmwire.metrics.report.campaign.words import response_title
 from swarmwire.metrics.report.figures.scaling_curve import scaling_curve
 from swarmwire.metrics.report.section import Figure, Section, Table
 from swarmwire.metrics.report.svg import as_svg
-from swarmwire.metrics.statistics.scaling import Scaling, scaling
+from swarmwire.metrics.statistics.trends import Scaling, scaling
 
 _COUNT = re.compile(r"robots\.[^.]+\.count")
 

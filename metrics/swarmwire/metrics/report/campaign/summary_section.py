@@ -11,8 +11,7 @@ from swarmwire.metrics.report.campaign.rounding import Rounding, rounding_of
 from swarmwire.metrics.report.campaign.samples import Samples
 from swarmwire.metrics.report.campaign.words import listed, response_title, sentence, short_value
 from swarmwire.metrics.report.section import Section, Table
-from swarmwire.metrics.statistics.summary import Summary
-from swarmwire.metrics.statistics.texts import number_text
+from swarmwire.metrics.statistics.summary import Summary, number_text
 
 MAX_POINTS = 60  # beyond which tables are by the values of each parameter
 _MAX_OPEN_ROWS = 20  # of tables after the first that are not folded

@@ -8,7 +8,7 @@ from swarmwire.metrics.report.campaign.words import response_title, sentence
 from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
 from swarmwire.metrics.report.section import Figure, Section
 from swarmwire.metrics.report.svg import as_svg
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
+from swarmwire.metrics.statistics.survival import kaplan_meier
 
 MAX_CURVES = 6
 _MAX_PARAMETERS = 2

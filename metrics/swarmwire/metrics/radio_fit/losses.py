@@ -1,4 +1,4 @@
-"""Losses: single ones with one probability, or bursts; by maximum likelihood, and which of them the data speak for."""
+"""Single losses and loss bursts fitted to sequences of received and lost packets."""
 
 import math
 from collections.abc import Callable
@@ -8,13 +8,117 @@ from typing import Any, cast
 import numpy as np
 from scipy import optimize, special
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.metrics.radio_fit.curvature import standard_errors
-from swarmwire.metrics.radio_fit.estimate import Estimate
-from swarmwire.metrics.radio_fit.loss_sequences import LossSequences
-from swarmwire.metrics.radio_fit.runs_test import runs_z
-from swarmwire.metrics.radio_fit.two_states import log_likelihood
+from swarmwire.metrics.radio_fit.path_loss import Estimate, standard_errors
+
+STRETCH = 1000
+
+
+@dataclass(frozen=True)
+class LossSequences:
+    """A row per packet, link after link, in the order of time within each."""
+
+    link: IntArray  # (n,)
+    since_s: FloatArray  # (n,) time since the link's packet before; inf for its first, before which all is forgotten
+    lost: BoolArray  # (n,)
+
+    @property
+    def interval_s(self) -> float:
+        """The usual time between two packets of a link: the median; NaN if no link has two."""
+        known = self.since_s[np.isfinite(self.since_s)]
+        return float(np.median(known)) if len(known) else float("nan")
+
+    @property
+    def burst_lengths(self) -> IntArray:
+        """How many packets in a row were lost, for every run of losses; a link's end ends a run, too."""
+        begins = self.lost & ~(np.append(False, self.lost[:-1]) & np.isfinite(self.since_s))
+        run = np.cumsum(begins)[self.lost]
+        return np.bincount(run)[1:] if len(run) else np.zeros(0, np.int64)
+
+    def thinned(self, most: int) -> "LossSequences":
+        """So many packets or less: stretches of a thousand, evenly chosen, each of which starts without a past."""
+        every = -(-len(self.lost) // most)
+        if every <= 1:
+            return self
+        row = np.arange(len(self.lost))
+        kept = (row // STRETCH) % every == 0
+        since_s = np.where(row % STRETCH == 0, np.inf, self.since_s)
+        return LossSequences(self.link[kept], since_s[kept], self.lost[kept])
+
+
+def log_likelihood(sequences: LossSequences, bursts: Bursts) -> float:
+    """The logarithm of the probability of these losses, all links together, each from its long-run state."""
+    steps, total = _steps(sequences, bursts), 0.0
+    while len(steps[0]) > 1:
+        even = len(steps[0]) // 2 * 2
+        pairs = _after([column[:even:2] for column in steps], [column[1:even:2] for column in steps])
+        steps = [np.append(pair, column[even:]) for pair, column in zip(pairs, steps, strict=True)]
+        largest = np.max(steps, axis=0)
+        if not (largest > 0.0).all():
+            return -math.inf
+        total += float(np.log(largest).sum())
+        steps = [column / largest for column in steps]
+    gg, bg, gb, bb = (float(column[0]) for column in steps)
+    whole = (gg + gb) * (1.0 - bursts.bad_share) + (bg + bb) * bursts.bad_share
+    return total + math.log(whole) if whole > 0.0 else -math.inf
+
+
+def _steps(sequences: LossSequences, bursts: Bursts) -> list[FloatArray]:
+    """Each packet's matrix. A link's first packet comes from the long run, whatever was before."""
+    share = bursts.bad_share
+    kept = np.exp(-sequences.since_s * (1.0 / bursts.bad_s + 1.0 / bursts.good_s))  # 0 for inf
+    bad_from_good, bad_from_bad = share * (1.0 - kept), share + (1.0 - share) * kept
+    if_good = np.where(sequences.lost, bursts.loss_good, 1.0 - bursts.loss_good)
+    if_bad = np.where(sequences.lost, bursts.loss_bad, 1.0 - bursts.loss_bad)
+    return [
+        if_good * (1.0 - bad_from_good),
+        if_good * (1.0 - bad_from_bad),
+        if_bad * bad_from_good,
+        if_bad * bad_from_bad,
+    ]
+
+
+def _after(first: list[FloatArray], then: list[FloatArray]) -> list[FloatArray]:
+    """The products of matrices: `then` after `first`."""
+    gg, bg, gb, bb = first
+    to_gg, to_bg, to_gb, to_bb = then
+    return [to_gg * gg + to_bg * gb, to_gg * bg + to_bg * bb, to_gb * gg + to_bb * gb, to_gb * bg + to_bb * bb]
+
+
+def expected_runs(bursts: Bursts, interval_s: float, longest: int) -> FloatArray:
+    """The shares (longest,) of runs of 1, 2, … packets; those of longer runs are missing from their sum of 1."""
+    share = bursts.bad_share
+    kept = math.exp(-interval_s * (1.0 / bursts.bad_s + 1.0 / bursts.good_s))
+    long_run = np.array([1.0 - share, share])
+    step = (1.0 - kept) * long_run[:, None] + kept * np.eye(2)  # to good and bad, from good and bad
+    loss = np.array([bursts.loss_good, bursts.loss_bad])
+    state = loss * (step @ ((1.0 - loss) * long_run))  # received, then lost
+    state = state / state.sum()
+    shares = np.empty(longest)
+    for i in range(longest):
+        shares[i] = ((1.0 - loss) * (step @ state)).sum()
+        state = loss * (step @ state)
+    return shares
+
+
+def runs_z(sequences: LossSequences) -> float:
+    """Standard normal if the losses of each link come in any order; negative where they come in bursts.
+
+    Given how many packets of a link were lost, so that links may differ in that. NaN if none can tell.
+    """
+    links = int(sequences.link.max()) + 1
+    packets = np.bincount(sequences.link, minlength=links).astype(np.float64)
+    lost = np.bincount(sequences.link, sequences.lost, minlength=links)
+    changes = np.diff(sequences.lost, prepend=False) | np.isinf(sequences.since_s)
+    runs = np.bincount(sequences.link, changes, minlength=links)
+    both = 2.0 * lost * (packets - lost)
+    tells = both > 0.0
+    both, packets, runs = both[tells], packets[tells], runs[tells]
+    variance = both * (both - packets) / (packets**2 * np.maximum(packets - 1.0, 1.0))
+    total = float(variance.sum())
+    return float((runs - both / packets - 1.0).sum()) / math.sqrt(total) if total > 0.0 else math.nan
+
 
 MIN_PACKETS, MIN_LOST = 100, 10
 MAX_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds

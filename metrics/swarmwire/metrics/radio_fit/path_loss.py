@@ -1,11 +1,41 @@
-"""Path loss by least squares: received power over the logarithm of distance is a straight line."""
+"""Path loss fitted to RSSI over distance: reference loss and exponent, with their standard errors."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.metrics.radio_fit.estimate import Estimate
+
+
+class Estimate(NamedTuple):
+    """A value and its standard error, in the unit that its name tells."""
+
+    value: float
+    standard_error: float  # NaN: the data do not tell
+
+
+CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+
+
+def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: float) -> FloatArray:
+    """Standard errors (n,) of parameters where `cost`, the negative log likelihood, is least; by differences of `step`.
+
+    NaN where the cost does not rise around the place: the data do not tell.
+    """
+    count = len(at)
+    move = np.eye(count) * step
+    bend = np.empty((count, count))
+    for i in range(count):
+        for j in range(i + 1):
+            corners = sum(sign * cost(at + a * move[i] + b * move[j]) for a, b, sign in CORNERS)
+            bend[i, j] = bend[j, i] = corners / (4.0 * step * step)
+    if not np.isfinite(bend).all() or np.linalg.matrix_rank(bend) < count:
+        return np.full(count, np.nan)
+    variance = np.diag(np.linalg.inv(bend))
+    return np.where(variance > 0.0, np.sqrt(np.abs(variance)), np.nan)
+
 
 MIN_PACKETS = 10
 MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise

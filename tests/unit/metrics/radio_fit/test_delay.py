@@ -6,8 +6,7 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.radio.config.impairments import Delays
 from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
-from swarmwire.metrics.radio_fit.delay_fit import fit_delays
-from swarmwire.metrics.radio_fit.latency_fit import LatencyFit, fit_latency
+from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_delays, fit_latency
 
 PACKETS = 20_000
 

@@ -5,8 +5,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
-from swarmwire.metrics.radio_fit.read_log import read_log
+from swarmwire.metrics.radio_fit.logs import loss_sequences, read_log
 
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m"
 POSITIONS = "t_s,tx,rx,seq,rssi_dbm,tx_x_m,tx_y_m,rx_x_m,rx_y_m"

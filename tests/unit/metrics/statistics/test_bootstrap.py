@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.stats import binomtest
 
-from swarmwire.metrics.statistics.binomial import binomial_interval
-from swarmwire.metrics.statistics.block_bootstrap import block_means, mean_difference_interval
+from swarmwire.metrics.statistics.bootstrap import binomial_interval, block_means, mean_difference_interval
 
 
 def test_intervals_are_those_of_scipy():

@@ -11,9 +11,13 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from swarmwire.metrics.statistics.bootstrap import drawn
-from swarmwire.metrics.statistics.gehan import paired_p, surely_greater, surely_less
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
+from swarmwire.metrics.statistics.survival import (
+    kaplan_meier,
+    paired_p,
+    resampled_quantiles,
+    surely_greater,
+    surely_less,
+)
 from tests.support.metrics.statistics.samples import placebo, time_samples, times, treated
 
 shares = st.floats(0.01, 0.99)

@@ -1,18 +1,21 @@
-"""Survival with right-censoring: the estimate of Kaplan and Meier (J. Am. Stat. Assoc. 53, 1958).
+"""Times with right-censoring: the Kaplan-Meier estimate, the log-rank test, and Gehan's order of censored times.
 
 S(t) = product over event times t_i <= t of (1 - d_i / n_i), of d_i events among the n_i runs that had neither had
-theirs nor ended before t_i. Who ends at the very time of an event still counts among them.
+theirs nor ended before t_i (Kaplan and Meier, J. Am. Stat. Assoc. 53, 1958). A run that ends at the time of an event
+still counts among them.
 """
 
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import stats
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.metrics.statistics.bootstrap import Counts
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
 
 ROUNDING = 1e-9  # a product of fractions that should be one half may come out a little above
 
@@ -98,3 +101,70 @@ def _steps(variance: FloatArray) -> FloatArray:
     """What each time adds to Greenwood's sum, (k,): 0 from where S is 0, since no area is left there."""
     finite = np.where(np.isfinite(variance), variance, 0.0)
     return np.where(np.isfinite(variance), np.diff(finite, prepend=0.0), 0.0)
+
+
+def resampled_quantiles(sample: Sample, drawn: Counts, share: float) -> FloatArray:
+    """Kaplan and Meier's quantile of each resample, (resamples,); inf where it lies beyond what was watched.
+
+    `drawn` (resamples, n) tells how often each value of the sample was drawn.
+    """
+    order = np.lexsort((~sample.observed, sample.value))  # at the same time events come before ends
+    counts = drawn[:, order].astype(np.float64)
+    at_risk = np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]
+    events = counts * sample.observed[order]
+    survival = np.cumprod(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
+    reached = survival <= 1.0 - share + ROUNDING
+    return np.where(reached.any(axis=1), sample.value[order][np.argmax(reached, axis=1)], np.inf)
+
+
+class LogRank(NamedTuple):
+    """The test's result; NaN if nothing tells the two apart: nothing happened, or not to both."""
+
+    z: float  # standard normal if both are alike; positive: it happens sooner in the first
+    p: float  # two-sided
+
+
+def log_rank(first: Sample, second: Sample) -> LogRank:
+    """The test of two samples that are not paired, by scipy."""
+    if not (len(first) and len(second)):
+        return LogRank(math.nan, math.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):  # nothing happened while both had runs that waited
+        found: Any = stats.logrank(_censored(first), _censored(second))
+    return LogRank(float(found.statistic), float(found.pvalue))
+
+
+def _censored(sample: Sample) -> Any:
+    censored_data: Any = stats.CensoredData
+    return censored_data.right_censored(sample.value, np.logical_not(sample.observed))
+
+
+def surely_less(one: Sample, other: Sample) -> IntArray:
+    """For each value of one (n,) how many of the other are surely less. Of numbers this is certain for all."""
+    known = np.sort(other.value[other.observed])
+    below = np.searchsorted(known, one.value, side="left")
+    return np.where(one.observed, below, np.searchsorted(known, one.value, side="right")).astype(np.int64)
+
+
+def surely_greater(one: Sample, other: Sample) -> IntArray:
+    """For each value of one (n,) how many of the other are surely greater; none where it is censored itself."""
+    known, waited = np.sort(other.value[other.observed]), np.sort(other.value[~other.observed])
+    above = len(known) - np.searchsorted(known, one.value, side="right")
+    after = len(waited) - np.searchsorted(waited, one.value, side="left")
+    return np.where(one.observed, above + after, 0).astype(np.int64)
+
+
+def paired_p(first: Sample, second: Sample) -> float:
+    """The two-sided p-value of the paired Wilcoxon test for censored times (O'Brien and Fleming, Biometrics 43, 1987).
+
+    Every time has a score, how many of all 2 n are surely less minus how many are surely greater. If the two of a pair
+    were alike, the sum of differences d of their scores were normal with variance sum d². NaN if no order is known.
+    """
+    one, other = (_scores(of, first, second) for of in (first, second))
+    change = other - one
+    squares = float(np.sum(change**2))
+    return 2.0 * NormalDist().cdf(-abs(float(change.sum())) / math.sqrt(squares)) if squares > 0.0 else math.nan
+
+
+def _scores(of: Sample, first: Sample, second: Sample) -> FloatArray:
+    less, greater = (count(of, first) + count(of, second) for count in (surely_less, surely_greater))
+    return (less - greater).astype(np.float64)
