@@ -10,7 +10,7 @@ from docs.behaviours.picture import draw_picture
 from docs.behaviours.places import HERE, names
 from docs.behaviours.shown import find_shown
 from docs.experiments.command import run_app
-from swarmwire.deploy.cli.help_text import flowing
+from swarmwire.deploy.catalogue.docstrings import flowing
 
 ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
 

@@ -9,7 +9,7 @@ from rich.console import Console
 from docs.experiments.command import run_app
 from docs.experiments.experiment import find_experiment, names
 from docs.experiments.places import HERE
-from swarmwire.deploy.cli.help_text import flowing
+from swarmwire.deploy.catalogue.docstrings import flowing
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
 

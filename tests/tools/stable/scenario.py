@@ -6,9 +6,8 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.sensors import SENSOR_SPECS
-from swarmwire.deploy.catalogue.entry import Parameter
-from swarmwire.deploy.catalogue.scenario_keys import all_keys
-from swarmwire.deploy.catalogue.schema_parameters import parameters_of_dataclass
+from swarmwire.deploy.catalogue.scenario import all_keys
+from swarmwire.deploy.catalogue.schema import Parameter, parameters_of_dataclass
 
 
 def text() -> str:

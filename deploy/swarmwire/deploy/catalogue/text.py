@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.deploy.catalogue.entry import Entry, Parameter, ParameterTable
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
+from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable
 from swarmwire.deploy.terminal.rows import aligned
 
 WIDEST_VALUE = 28  # columns of a terminal
@@ -52,14 +53,17 @@ def _told(entry: Entry) -> list[str]:
 def _row(key: Parameter, table: ParameterTable) -> tuple[str, str, str, str]:
     """The cells of a parameter; a figure of a data sheet is within its bounds, which so are not of interest."""
     expected = "" if table.value_is == "value" or key.expected in SAID_BY_VALUE else key.expected
-    return key.name, key.unit, _value(key), "\n".join(part for part in (key.help, expected) if part)
+    return (
+        key.name,
+        key.unit,
+        "required" if key.required else toml(key.value),
+        "\n".join(part for part in (key.help, expected) if part),
+    )
 
 
-def _value(key: Parameter) -> str:
-    """As TOML says it."""
-    if key.required:
-        return "required"
-    return "" if key.value is None else json.dumps(key.value, ensure_ascii=False)
+def toml(value: Any) -> str:
+    """A number, a text or a list of them as TOML; nothing for None."""
+    return "" if value is None else json.dumps(value, ensure_ascii=False, default=str)
 
 
 def _print_rows(console: Console, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -32,7 +32,7 @@ def describe_command(
       swarmwire describe mine.toml
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.find import find
+    from swarmwire.deploy.catalogue.kinds import find
     from swarmwire.deploy.catalogue.text import print_entry
 
     entry = find(name)

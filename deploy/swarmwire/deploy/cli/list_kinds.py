@@ -25,8 +25,7 @@ def list_command(
       swarmwire describe kill
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.find import kind_named
-    from swarmwire.deploy.catalogue.kinds import KINDS
+    from swarmwire.deploy.catalogue.kinds import KINDS, kind_named
     from swarmwire.deploy.catalogue.text import print_kinds, print_list
 
     console = Console(highlight=False)

@@ -6,6 +6,7 @@ import typer
 from typer.core import TyperGroup
 
 from swarmwire.comms.config import did_you_mean
+from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.access_options import Ca, Certificate, Certs, Insecure, Key, Name
 from swarmwire.deploy.cli.ctl.chosen_run import Chosen, Endpoint
 from swarmwire.deploy.cli.ctl.given import end_command, event_command, events_command
@@ -19,7 +20,6 @@ from swarmwire.deploy.cli.ctl.pace import (
 from swarmwire.deploy.cli.ctl.radio import jam_command, partition_command, set_command
 from swarmwire.deploy.cli.ctl.robots import impulse_command, kill_command, revive_command
 from swarmwire.deploy.cli.ctl.status import status_command
-from swarmwire.deploy.cli.help_text import flowing
 
 HELP = flowing("""Runs that go on: how they do, pause, step, speed, and what happens to their robots and radios.
 

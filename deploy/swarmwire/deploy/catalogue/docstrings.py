@@ -1,4 +1,4 @@
-"""Docstrings, and comments behind attributes, as texts."""
+"""Docstrings, and comments behind attributes, as texts. Light to import: the command line's help uses it."""
 
 import ast
 import inspect
@@ -10,21 +10,30 @@ from functools import cache
 from typing import Any
 
 
-def paragraphs(docstring: str | None) -> str:
-    """A docstring with the lines of each paragraph joined; one that is indented (a formula, a table) stays as it is."""
-    blocks = inspect.cleandoc(docstring or "").split("\n\n")
-    return "\n\n".join(block if "\n " in f"\n{block}" else " ".join(block.split("\n")) for block in blocks)
+def flowing(text: str | None) -> str:
+    r"""A docstring with the lines of each paragraph joined; formulas, tables and lists keep their lines.
+
+    >>> flowing("One\nline.\n\n  as it\n  stands")
+    'One line.\n\n  as it\n  stands'
+    """
+    return "\n\n".join(map(_joined, inspect.cleandoc(text or "").split("\n\n")))
+
+
+def _joined(paragraph: str) -> str:
+    lines = paragraph.split("\n")
+    kept = any(line.startswith((" ", "- ", "* ", "\b")) for line in lines)
+    return paragraph if kept else " ".join(lines)
 
 
 def first_line(docstring: str | None) -> str:
     """The first paragraph of a docstring as one line, without the full stop at its end."""
-    return paragraphs(docstring).partition("\n\n")[0].strip().removesuffix(".")
+    return flowing(docstring).partition("\n\n")[0].strip().removesuffix(".")
 
 
 def texts_of(kind: type, bases: tuple[Any, ...]) -> str:
     """The docstrings of a class and of what it inherits from, without those of `bases`."""
     of = [base for base in kind.__mro__ if base not in bases]
-    return "\n\n".join(paragraphs(base.__dict__["__doc__"]) for base in of if base.__dict__.get("__doc__"))
+    return "\n\n".join(flowing(base.__dict__["__doc__"]) for base in of if base.__dict__.get("__doc__"))
 
 
 def comments_of(kind: type, names: Collection[str]) -> dict[str, str]:
