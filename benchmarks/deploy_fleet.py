@@ -17,13 +17,12 @@ import asyncssh
 
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.clock import WallClock, to_s
-from swarmwire.deploy.cli.robots.contents import contents_of
+from swarmwire.deploy.fleet.check import contents_of
 from swarmwire.deploy.fleet.deploy import deploy
-from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
-from swarmwire.deploy.fleet.environment.target import Target
 from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.host_side.facts import facts
+from swarmwire.deploy.fleet.host_side.system import facts
+from swarmwire.deploy.fleet.packages import LockedEnvironments, Target
 from tests.support.deploy.fleet.fake_host import new_key, write_key
 from tests.support.deploy.fleet.small_fleet import AGENT
 from tests.support.deploy.fleet.sshd import SSHD

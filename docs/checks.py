@@ -28,7 +28,7 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
 from swarmwire.deploy.campaign.plan import planned
-from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
+from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
 ROOT = Path(__file__).parents[1]
@@ -141,7 +141,10 @@ def fleet_keys() -> Problems:
     """The page about fleets has a row for every key of `fleet.toml`."""
     rows = [line.split("|")[1] for line in _text("docs/fleet.md").splitlines() if line.startswith("| `")]
     told = {name for row in rows for name in row.split("`")[1::2]}
-    yield from (f"docs/fleet.md: has no row for {key}" for key in sorted({*OF_FLEET, *OF_ROBOT} - told))
+    yield from (
+        f"docs/fleet.md: has no row for {key}"
+        for key in sorted({*FleetTable.model_fields, *RobotTable.model_fields} - told)
+    )
 
 
 def robot_bytes() -> Problems:

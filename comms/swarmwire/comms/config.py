@@ -13,9 +13,13 @@ from difflib import get_close_matches
 from enum import IntEnum
 from math import isfinite
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Any, Self, TypeVar, cast
+
+import msgspec
 
 from swarmwire.comms.errors import BadInput
+
+T = TypeVar("T")
 
 FORMAT_KEY = "format"  # in a file: the version of its format
 MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # in msgpack
@@ -139,6 +143,18 @@ def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, 
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(str(path), "", f"expected TOML: {error}") from None
+
+
+def converted(kind: type[T], value: object, where: str) -> T:
+    """A value of a file, made of maps, lists and plain values, as an instance of a typed class (msgspec converts it).
+
+    BadInput names the file and the key that does not fit. Unknown keys are ignored, unless the class refuses them.
+    """
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        fault, _, path = str(error).partition(" - at `$")
+        raise BadInput(where, path.strip(".`"), f"{fault[0].lower()}{fault[1:]}") from None
 
 
 def check_plain(value: object, where: str, key: str) -> None:

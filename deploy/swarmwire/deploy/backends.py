@@ -11,7 +11,7 @@ from swarmwire.comms.clock import Clock
 from swarmwire.comms.interfaces import AgentBackend
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.endpoint import local_endpoint
-from swarmwire.deploy.gateways.served import Served
+from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.new_terms import new_terms
 from swarmwire.deploy.runner_processes import RunnerProcesses

@@ -27,9 +27,8 @@ from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.endpoint import check_socket, new_run_id
-from swarmwire.deploy.gateways.behind import Behind
 from swarmwire.deploy.gateways.gateways import GatewaysGiven, as_gateways
-from swarmwire.deploy.gateways.served import Served
+from swarmwire.deploy.gateways.serving import RunGateways, Served
 from swarmwire.deploy.gateways.undriven import Undriven
 from swarmwire.deploy.guarded import Guarded
 from swarmwire.deploy.interrupt import Interrupt
@@ -115,7 +114,7 @@ class Simulation:
         self._clock = WallClock()
         self._called_ns = self._clock.now_ns()
         self.scenario = scenario_of(scenario, overrides)
-        self._behind = Behind(as_gateways(gateways), self.scenario)
+        self._behind = RunGateways(as_gateways(gateways), self.scenario)
         factor = self._behind.factor(real_time_factor(realtime))
         self._subtick_s = subtick_of(subtick, factor, self.scenario)
         self.agents = agent_specs(self.scenario)

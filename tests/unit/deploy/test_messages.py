@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy.certificates.certificate_folder import begin_authority
+from swarmwire.deploy.certificates.folder import begin_authority
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.commands import LOSSY, called
 

@@ -50,7 +50,7 @@ def join_command(
     from swarmwire.agent.join_command import join_and_report, names_in
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.deploy.certificates.member import member
-    from swarmwire.deploy.certificates.purposes import RUNNER
+    from swarmwire.deploy.certificates.register import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, files=(ca, certificate, key), insecure=insecure)
     code = join_and_report(

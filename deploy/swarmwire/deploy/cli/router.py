@@ -59,7 +59,7 @@ def router_command(
     from swarmwire.comms.wire.access_control import RunAccess, router_access
     from swarmwire.comms.wire.sessions import router_config
     from swarmwire.deploy.certificates.member import member
-    from swarmwire.deploy.certificates.purposes import ROUTER
+    from swarmwire.deploy.certificates.register import ROUTER
 
     named = RunAccess(runners=tuple(runners or ()), routers=tuple(routers or ()))
     if worlds:

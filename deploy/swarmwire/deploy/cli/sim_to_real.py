@@ -34,8 +34,7 @@ def sim_to_real_command(
     # Imported here: polars, scipy and numba take a second, which --help should not.
     from rich.console import Console
 
-    from swarmwire.deploy.sim_to_real.emulation import read_emulation
-    from swarmwire.deploy.sim_to_real.settings import differing_settings
+    from swarmwire.deploy.sim_to_real import differing_settings, read_emulation
     from swarmwire.deploy.terminal.sim_to_real_table import print_sim_to_real
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.real_log.measured_log import measured_log

@@ -7,16 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from swarmwire.deploy.fleet.archive import Archive, Entry
-from swarmwire.deploy.fleet.environment.environments import Environments
-from swarmwire.deploy.fleet.environment.target import Target
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
-from swarmwire.deploy.fleet.host_failed import HostFailed
-from swarmwire.deploy.fleet.host_session import HostSession
-from swarmwire.deploy.fleet.on_hosts import on_hosts
-from swarmwire.deploy.fleet.release import package_links, write_release
-from swarmwire.deploy.fleet.result import Result
-from swarmwire.deploy.fleet.unit_file import ROBOT_PROGRAM
-from swarmwire.deploy.fleet.watcher import SILENT, Watcher
+from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
+from swarmwire.deploy.fleet.packages import Environments, Target
+from swarmwire.deploy.fleet.release import ROBOT_PROGRAM, package_links, write_release
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
 
 TRIAL_S = 60.0  # an old Pi takes seconds to import its packages for the first time
 ROOM = 1.5  # free bytes that are asked for, over those that are to come

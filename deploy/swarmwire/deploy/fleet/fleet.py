@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.certificates.revoked import revoked_in
+from swarmwire.comms.wire.access_control import TRACKER
+from swarmwire.deploy.certificates.register import CertificateRequest, Issued, Register, certificate_request, revoked_in
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,22 @@ class Fleet:
     def revoked(self) -> list[str]:
         """Names whose certificates count no more; BadInput if the register of certificates cannot be read."""
         return revoked_in(self.certificates) if self.certificates is not None else []
+
+    def lacking_certificates(self, register: Register, now: datetime) -> list[CertificateRequest]:
+        """Requests for the certificates of robots, tracker and operator that are missing or end soon.
+
+        A robot's certificate must have the address where others call it. BadInput for a revoked name.
+        """
+        members = [certificate_request(robot.name, [robot.network_host]) for robot in self.robots]
+        members += [CertificateRequest(TRACKER, TRACKER), CertificateRequest(self.operator, "operator")]
+        return [of for of in members if self._lacks(of, register.last(of.name), now)]
+
+    def _lacks(self, of: CertificateRequest, last: Issued | None, now: datetime) -> bool:
+        if last is None:
+            return True
+        if last.revoked is not None:
+            raise BadInput(str(self.file), of.name, "is revoked for good: expected another name for this robot")
+        return last.ends_soon(now) or not set(of.hosts) <= set(last.hosts)
 
     def chosen(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[Robot, ...]:
         """The robots of these names and groups, all if none is given; BadInput for a name that there is not."""

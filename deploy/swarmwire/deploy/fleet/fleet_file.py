@@ -1,18 +1,84 @@
 """`fleet.toml`: robots, how they are reached, and what runs on them; read and checked key by key."""
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
+
+from pydantic import BaseModel, Field, ValidationError
 
 from swarmwire.comms.config import check_format, did_you_mean, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot
-from swarmwire.deploy.fleet.fleet_keys import FORMAT, HOST_KEYS, OF_FLEET, OF_ROBOT, SETTINGS, checked_table
-from swarmwire.deploy.fleet.host_side.folders import TAKEN
+from swarmwire.deploy.fleet.host_side.files import TAKEN
+from swarmwire.world.scenario.schema import TABLE
+from swarmwire.world.validation import fault
 
+FORMAT = 1
 NETWORK_PORT = 7557  # not 7447, which a zenoh router or a bridge of ROS 2 has on the same machine
-DEFAULTS: dict[str, Any] = {"port": 22, "key": "", "python": "python3", "network_port": NETWORK_PORT, "packages": []}
+
+Name = Annotated[str, Field(min_length=1)]
+Port = Annotated[int, Field(ge=1, le=65535)]
+
+
+class AgentTable(BaseModel):
+    """Settings of the agent, as in robot.toml, which explains them."""
+
+    model_config = TABLE
+    agent: Name = ""
+    params: dict[str, Any] = {}
+    body: str = ""
+    rate_hz: int = 0
+    watchdog_s: float = 0.0
+    max_linear_mps: float = 0.0
+    max_angular_radps: float = 0.0
+    driver: dict[str, Any] = {}
+    radio: dict[str, Any] = {}
+    tracker: bool = False
+    seed: int = 0
+
+
+class GroupTable(AgentTable):
+    """The keys of a group: the way to its robots, and their settings."""
+
+    user: Name = ""
+    port: Port = 22
+    key: str = ""
+    python: Name = "python3"
+    network_address: str = ""
+    network_port: Port = NETWORK_PORT
+    packages: list[str] = []
+
+
+class DefaultsTable(GroupTable):
+    """The keys of the defaults."""
+
+    groups: list[str] = []
+
+
+class RobotTable(DefaultsTable):
+    """The keys of one robot."""
+
+    address: Name = ""
+
+
+DEFAULTS = {key: RobotTable.model_fields[key].default for key in ("port", "key", "python", "network_port", "packages")}
+
+
+class FleetTable(BaseModel):
+    """The keys of the file. Robots take values from their groups and the defaults, so no robot needs a key."""
+
+    model_config = TABLE
+    format: int
+    swarm: Name
+    robots: Annotated[dict[str, RobotTable], Field(min_length=1)]
+    known_hosts: str = "known_hosts"
+    certificates: str | None = None
+    insecure: bool = False
+    operator: str = "operator"
+    defaults: DefaultsTable = DefaultsTable()
+    groups: dict[str, GroupTable] = {}
 
 
 def read_fleet(file: Path) -> Fleet:
@@ -20,57 +86,48 @@ def read_fleet(file: Path) -> Fleet:
     where = str(file)
     table = read_toml(file)
     check_format(table, FORMAT, where)
-    checked_table(table, OF_FLEET, where, "")
-    for key in ("swarm", "robots"):
-        if key not in table:
-            raise BadInput(where, key, "is missing")
-    fault = fault_of_name(table["swarm"])
-    if fault:
-        raise BadInput(where, "swarm", fault)
-    certificates = _certificates(table, file)
-    robots = _robots(table, where, file.parent, "tcp" if certificates is None else "tls")
+    try:
+        checked = FleetTable.model_validate(table)
+    except ValidationError as error:
+        raise fault(error, _schema(), where) from None
+    name_fault = fault_of_name(checked.swarm)
+    if name_fault:
+        raise BadInput(where, "swarm", name_fault)
+    if checked.insecure and checked.certificates is not None:
+        raise BadInput(where, "insecure", "expected either certificates or insecure = true")
+    if not checked.insecure and checked.certificates is None:
+        raise BadInput(where, "certificates", "expected the folder of `swarmwire certs`, or insecure = true")
     return Fleet(
         file=file,
-        swarm=table["swarm"],
-        robots=robots,
-        known_hosts=file.parent / table.get("known_hosts", "known_hosts"),
-        certificates=certificates,
-        operator=table.get("operator", "operator"),
+        swarm=checked.swarm,
+        robots=_robots(table, where, file.parent, "tcp" if checked.insecure else "tls"),
+        known_hosts=file.parent / checked.known_hosts,
+        certificates=None if checked.certificates is None else file.parent / checked.certificates,
+        operator=checked.operator,
     )
 
 
-def _certificates(table: Mapping[str, Any], file: Path) -> Path | None:
-    if table.get("insecure", False):
-        if "certificates" in table:
-            raise BadInput(str(file), "insecure", "expected either certificates or insecure = true")
-        return None
-    if "certificates" not in table:
-        raise BadInput(str(file), "certificates", "expected the folder of `swarmwire certs`, or insecure = true")
-    return file.parent / table["certificates"]
+@cache
+def _schema() -> dict[str, Any]:
+    return FleetTable.model_json_schema()
 
 
 def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -> tuple[Robot, ...]:
-    defaults = checked_table(table.get("defaults", {}), {**OF_ROBOT, "address": ()}, where, "defaults")
-    groups = {
-        name: checked_table(of, {**OF_ROBOT, "address": (), "groups": ()}, where, f"groups.{name}")
-        for name, of in table.get("groups", {}).items()
-    }
-    if not table["robots"]:
-        raise BadInput(where, "robots", "expected at least one robot, such as [robots.flock-0]")
+    """The robots of a checked table, each of what the defaults, its groups and its own table have."""
+    defaults, groups = ("defaults", table.get("defaults", {})), table.get("groups", {})
     ports, hosts = _Ports(where), dict[Host, Host]()
     robots: list[Robot] = []
-    for name, given in table["robots"].items():
+    for name, own in table["robots"].items():
         key = f"robots.{name}"
-        fault = fault_of_name(name)
-        if fault is None and name in TAKEN:
-            fault = f"expected another name: on hosts ~/swarmwire/{name} is not a robot's"
-        if fault:
-            raise BadInput(where, key, fault)
-        own = checked_table(given, OF_ROBOT, where, key)
+        name_fault = fault_of_name(name)
+        if name_fault is None and name in TAKEN:
+            name_fault = f"expected another name: on hosts ~/swarmwire/{name} is not a robot's"
+        if name_fault:
+            raise BadInput(where, key, name_fault)
         for group in own.get("groups", []):
             if group not in groups:
                 raise BadInput(where, f"{key}.groups", f"expected {did_you_mean(groups, group)}; got {group!r}")
-        layers = [("defaults", defaults), *((f"groups.{of}", groups[of]) for of in own.get("groups", [])), (key, own)]
+        layers = [defaults, *((f"groups.{of}", groups[of]) for of in own.get("groups", [])), (key, own)]
         robot = _robot(name, layers, where, folder, protocol, ports)
         host = hosts.setdefault(robot.host, robot.host)
         if (host.python, host.key) != (robot.host.python, robot.host.key):
@@ -82,8 +139,8 @@ def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -
 def _robot(
     name: str, layers: list[tuple[str, dict[str, Any]]], where: str, folder: Path, protocol: str, ports: "_Ports"
 ) -> Robot:
-    """A robot of what the defaults, its groups and itself say, the last of them first."""
-    whole, places = {**DEFAULTS}, dict[str, str]()
+    """A robot of its layers: later ones replace earlier ones, and tables are merged."""
+    whole, places = dict[str, Any](DEFAULTS), dict[str, str]()
     for place, table in layers:
         for key, value in table.items():
             of_tables = isinstance(value, dict) and isinstance(whole.get(key), dict)
@@ -102,7 +159,7 @@ def _robot(
         endpoint=f"{protocol}/{f'[{reached}]' if ':' in reached else reached}:{port}",
         groups=tuple(whole.get("groups", [])),
         packages=tuple(whole["packages"]),
-        settings={key: value for key, value in whole.items() if key in SETTINGS and key not in HOST_KEYS},
+        settings={key: value for key, value in whole.items() if key in AgentTable.model_fields},
         places=places,
     )
 

@@ -1,18 +1,27 @@
-"""Which robots of a run answer as real ones, as users say it: in Python, or in options of `swarmwire run`."""
+"""The choice of gateways: which robots of a run answer as real ones, from Python or options of `swarmwire run`.
+
+`chosen_gateways` checks the choice against the scenario.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.config import from_toml
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.config import did_you_mean, from_toml
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.revoked import revoked_in
+from swarmwire.deploy.certificates.register import revoked_in
+from swarmwire.world.gateways.gateway import Gateway, gateway_kind
+from swarmwire.world.scenario.scenario import Scenario
 
 OTHERS = ""  # in place of a group: all that are not named
 LOOPBACK = Network(listen=("tcp/127.0.0.1:0",))
+WHERE, OPTION, SWARM = "--gateway", "--gateway-set", "--swarm"
 
 
 @dataclass(frozen=True)
@@ -115,3 +124,59 @@ def _option(text: str) -> tuple[str, Any]:
     except tomllib.TOMLDecodeError:
         return name.strip(), value.strip()
     return name.strip(), found["value"] if len(found) == 1 else value
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The gateway of one group, not made yet."""
+
+    kind: str
+    address: str  # "": of the gateway's choice
+    made: type[Gateway]
+    options: Any  # an instance of `made.options`
+
+    def sensors(self, body: Body) -> tuple[str, ...]:
+        """The sensors of this body that it tells."""
+        return tuple(name for name in body.sensors if name in self.made.sensors)
+
+
+def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Chosen]:
+    """By group: its gateway; BadInput for a group, kind or option that is not there, or a value that will not do."""
+    for group in gateways.of:
+        if group != OTHERS and group not in scenario.robots:
+            expected = f"expected a group of the scenario, {did_you_mean(scenario.robots, group)}; got {group!r}"
+            raise BadInput(WHERE, f"{group}={gateways.of[group]}", expected)
+    fault = fault_of_name(gateways.swarm)
+    if fault:
+        raise BadInput(SWARM, "", fault)
+    texts = {group: gateways.of.get(group, gateways.of.get(OTHERS)) for group in scenario.robots}
+    kinds = {group: text.partition("@") for group, text in texts.items() if text is not None}
+    made = {group: gateway_kind(kind, WHERE, texts[group] or "") for group, (kind, _, _) in kinds.items()}
+    options = _options(gateways.options, made)
+    return {
+        group: Chosen(kind, address, made[group], built(made[group].options, options[group], OPTION, ""))
+        for group, (kind, _, address) in kinds.items()
+    }
+
+
+def _options(given: Mapping[str, Any], made: Mapping[str, type[Gateway]]) -> dict[str, dict[str, Any]]:
+    """By group what was given for its gateway; what names a group counts more than what is for all."""
+    known = {group: {of.name for of in fields(kind.options)} for group, kind in made.items()}
+    found: dict[str, dict[str, Any]] = {group: {} for group in made}
+    for name in sorted(given, key=lambda name: "." in name):
+        group, _, option = name.rpartition(".")
+        if group and group not in made:
+            expected = f"expected a group that has a gateway, {did_you_mean(made, group)}; got {group!r}"
+            raise BadInput(OPTION, name, expected)
+        takers = [of for of in ([group] if group else made) if option in known[of]]
+        if not takers:
+            options = sorted(set[str]().union(*(known[of] for of in ([group] if group else made))))
+            expected = (
+                f"unknown option; expected {did_you_mean(options, option)}"
+                if options
+                else "expected none: it has no options"
+            )
+            raise BadInput(OPTION, name, expected)
+        for of in takers:
+            found[of][option] = given[name]
+    return found

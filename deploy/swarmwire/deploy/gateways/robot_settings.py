@@ -1,6 +1,8 @@
 """What `swarmwire-agent` needs to drive robots of a run: the settings of each, and their files in the run folder."""
 
-from collections.abc import Mapping
+import socket
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from swarmwire.comms.assignment import params_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.gateways.chosen import Chosen
+from swarmwire.deploy.gateways.gateways import Chosen
 from swarmwire.metrics.atomic import write_text
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
@@ -99,3 +101,15 @@ def _shared_options(chosen: Chosen) -> dict[str, Any]:
     known = {of.name: of.default for of in fields(driver.options)}
     given = {of.name: getattr(chosen.options, of.name) for of in fields(chosen.made.options) if of.name in known}
     return {name: value for name, value in given.items() if value is not None and value != known[name]}
+
+
+def listening_places(names: Sequence[str], network: Network) -> dict[str, str]:
+    """By robot, in their order: an endpoint on loopback with a port that is free now, and no other's.
+
+    With certificates there are none: those are made out to addresses, which their owner knows.
+    """
+    if network.proves:
+        return {}
+    with ExitStack() as stack:
+        held = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in names]
+        return {name: f"tcp/127.0.0.1:{one.getsockname()[1]}" for name, one in zip(names, held, strict=True)}

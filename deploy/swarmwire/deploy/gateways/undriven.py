@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Truth
-from swarmwire.deploy.gateways.served import Served, ServedRobot
+from swarmwire.deploy.gateways.serving import Served, ServedRobot
 
 GRACE_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
 NAMED = 6  # robots, at most

@@ -6,7 +6,7 @@ from rich.console import Console
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.gateways.served import ServedRobot
+from swarmwire.deploy.gateways.serving import ServedRobot
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.rows import aligned
 

@@ -7,16 +7,15 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, revoke
-from swarmwire.deploy.certificates.files import REVOKED
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.certificates.register import REVOKED, certificate_request
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
 def test_openssl_takes_what_is_good_and_refuses_what_is_revoked(tmp_path: Path):
     folder = tmp_path / "ca"
     begin_authority(folder, WallClock())
-    issue(folder, [wanted(name, ("10.0.0.5",)) for name in ("flock-0", "flock-1")], 30, WallClock())
+    issue(folder, [certificate_request(name, ("10.0.0.5",)) for name in ("flock-0", "flock-1")], 30, WallClock())
     revoke(folder, "flock-1", WallClock())
 
     def verified(name: str, *more: str) -> bool:

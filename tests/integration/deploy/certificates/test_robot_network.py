@@ -11,8 +11,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session, closed_after
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.certificates.peers import (
     KEYS,
@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A CA, and certificates of three robots and their company."""
     folder = tmp_path_factory.mktemp("lab") / "ca"
     begin_authority(folder, WallClock())
-    issue(folder, [wanted(name, HERE) for name in (*ROBOTS, "tracker", "operator")], 1, WallClock())
+    issue(folder, [certificate_request(name, HERE) for name in (*ROBOTS, "tracker", "operator")], 1, WallClock())
     return folder
 
 
@@ -154,7 +154,7 @@ def test_a_revoked_name_is_received_by_those_only_who_do_not_know(folder: Path, 
 def test_strangers_are_not_let_in(folder: Path, opened: ExitStack, tmp_path: Path):
     foreign = tmp_path / "foreign"
     begin_authority(foreign, WallClock())
-    issue(foreign, [wanted("flock-1", HERE)], 1, WallClock())
+    issue(foreign, [certificate_request("flock-1", HERE)], 1, WallClock())
     endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     close_session(stranger(endpoint, folder, (folder, "flock-1"), PATIENT_MS))
     refused: list[tuple[str, tuple[Path, str] | None]] = [
@@ -170,8 +170,8 @@ def test_strangers_are_not_let_in(folder: Path, opened: ExitStack, tmp_path: Pat
 def test_a_certificate_that_has_ended_is_refused(opened: ExitStack, tmp_path: Path):
     folder, past = tmp_path / "ca", DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(folder, past)
-    issue(folder, [wanted("flock-0", HERE)], 3000, past)
-    issue(folder, [wanted("flock-1", HERE)], 1, past)
+    issue(folder, [certificate_request("flock-0", HERE)], 3000, past)
+    issue(folder, [certificate_request("flock-1", HERE)], 1, past)
     endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     with pytest.raises(zenoh.ZError):
         stranger(endpoint, folder, (folder, "flock-1"), REFUSED_MS)

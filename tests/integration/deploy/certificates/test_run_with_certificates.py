@@ -6,8 +6,8 @@ from shutil import copy
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Recording, Simulation
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.gateways.gateways import Gateways
 from tests.support.deploy.gateways.driven import DrivenRobots
 
@@ -19,7 +19,7 @@ SHORT = ("robots.flock.count=2", "duration_s=3", "radio.loss=0")
 def test_agents_with_certificates_of_their_names_hear_one_another_in_a_run(tmp_path):
     ca, out = tmp_path / "ca", tmp_path / "run"
     begin_authority(ca, WallClock())
-    issue(ca, [wanted(name, ("127.0.0.1",)) for name in ("tracker", *ROBOTS)], 1, WallClock())
+    issue(ca, [certificate_request(name, ("127.0.0.1",)) for name in ("tracker", *ROBOTS)], 1, WallClock())
     proof = {"ca": ca / "ca.pem", "certificate": ca / "tracker.pem", "key": ca / "tracker.key"}
     gateways = Gateways({"": "epuck2"}, network=Network(("tls/127.0.0.1:0",), **proof))
     bare = Recording(tables=False, rrd=False)

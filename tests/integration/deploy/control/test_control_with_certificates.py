@@ -11,9 +11,9 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.wire.access_control import observers_access
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observed
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
+from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.control import remote_control
 from swarmwire.deploy.control.control_server import ControlServer
@@ -30,8 +30,8 @@ def certs(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("lab") / "ca"
     begin_authority(folder, WallClock())
     names = [
-        wanted("world", ["127.0.0.1"], "world"),
-        *(wanted(name, [], name) for name in ("operator", "observer", "runner")),
+        certificate_request("world", ["127.0.0.1"], "world"),
+        *(certificate_request(name, [], name) for name in ("operator", "observer", "runner")),
     ]
     issue(folder, names, 2, WallClock())
     return folder
@@ -91,7 +91,7 @@ def test_an_operator_controls_and_an_observer_looks(certs, controls, endpoint, m
 
 def test_who_is_of_another_authority_is_told_that_a_certificate_may_be_at_fault(tmp_path, endpoint):
     begin_authority(tmp_path / "ca", WallClock())
-    issue(tmp_path / "ca", [wanted("operator", [], "operator")], 2, WallClock())
+    issue(tmp_path / "ca", [certificate_request("operator", [], "operator")], 2, WallClock())
     with pytest.raises(RunGone, match="cannot be reached.*certificate"):
         only_run_at(endpoint, member("operator", certs=tmp_path / "ca").network)
 

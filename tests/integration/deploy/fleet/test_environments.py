@@ -10,10 +10,8 @@ from pathlib import Path
 import pytest
 
 from swarmwire.deploy.fleet.archive import Archive
-from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
-from swarmwire.deploy.fleet.environment.pins import pins
-from swarmwire.deploy.fleet.environment.target import Target
-from swarmwire.deploy.fleet.host_failed import HostFailed
+from swarmwire.deploy.fleet.packages import LockedEnvironments, Target, pins
+from swarmwire.deploy.fleet.result import HostFailed
 
 PI = {
     "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,

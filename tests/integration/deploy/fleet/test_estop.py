@@ -9,7 +9,7 @@ from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.deploy.fleet import estop as estop_module
+from swarmwire.deploy.fleet import units as estop_module
 
 PLAIN = Network(listen=("tcp/127.0.0.1:0",))
 KEYS = SwarmKeys("lab")

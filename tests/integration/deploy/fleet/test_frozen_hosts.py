@@ -5,8 +5,7 @@ from threading import Event
 import pytest
 
 from swarmwire.deploy.fleet import connecting, host_session, logs
-from swarmwire.deploy.fleet.host_side.refusal import Refusal
-from swarmwire.deploy.fleet.host_side.unpacking import unpack
+from swarmwire.deploy.fleet.host_side.files import Refusal, unpack
 from tests.integration.deploy.fleet.test_hostile_logs import member, packed
 
 LONG_S = 100.0  # for which a host is frozen, unless it is thawed

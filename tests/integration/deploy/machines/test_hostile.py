@@ -19,7 +19,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run
-from swarmwire.deploy.certificates.certificate_folder import revoke
+from swarmwire.deploy.certificates.folder import revoke
 from tests.support.deploy.certificates.peers import at_once, wait_for_listeners
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.machines.guarded_world import AT_TICK, SHORT, GuardedWorld, authority

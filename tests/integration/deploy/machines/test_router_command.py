@@ -7,7 +7,7 @@ import pytest
 import zenoh
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.certificates.certificate_folder import revoke
+from swarmwire.deploy.certificates.folder import revoke
 from tests.integration.deploy.machines.test_three_machines import lab
 from tests.support.deploy.commands import called
 from tests.support.deploy.machines.on_machines import on

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.certificates.folder_access import access_in, network_in
+from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy import run
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.machines.namespaces import machines
 from tests.support.deploy.machines.on_machines import on
@@ -18,8 +18,10 @@ SHORT = "duration_s=3"
 def lab(folder: Path, addresses: Mapping[str, Sequence[str]], *runners: str) -> Path:
     """A CA, certificates of the world and of routers at their addresses, and of runners."""
     begin_authority(folder, WallClock())
-    members = [wanted(name, at, "world" if name == "world" else "router") for name, at in addresses.items()]
-    issue(folder, [*members, *(wanted(name, purpose="runner") for name in runners)], 1, WallClock())
+    members = [
+        certificate_request(name, at, "world" if name == "world" else "router") for name, at in addresses.items()
+    ]
+    issue(folder, [*members, *(certificate_request(name, purpose="runner") for name in runners)], 1, WallClock())
     return folder
 
 

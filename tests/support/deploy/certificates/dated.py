@@ -1,7 +1,9 @@
 """A clock whose date a test sets."""
 
+from datetime import datetime
+
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.deploy.certificates.dates import DAY, date_of
+from swarmwire.deploy.certificates.register import DAY
 from tests.support.clocks import FakeClock
 
 
@@ -10,7 +12,7 @@ class DatedFakeClock(FakeClock):
 
     def __init__(self, date: str) -> None:
         super().__init__()
-        self.date = date_of(date)
+        self.date = datetime.fromisoformat(date)
 
     def utc_ns(self) -> int:
         return round(self.date.timestamp()) * NS_PER_S

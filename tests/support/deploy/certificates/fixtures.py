@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy.certificates.certificate_folder import begin_authority
+from swarmwire.deploy.certificates.folder import begin_authority
 from tests.support.deploy.certificates.dated import DatedFakeClock
 
 TODAY = "2026-06-01T12:00:00Z"

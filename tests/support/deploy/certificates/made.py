@@ -4,14 +4,13 @@ from pathlib import Path
 
 from cryptography import x509
 
-from swarmwire.deploy.certificates.certificate_folder import issue
-from swarmwire.deploy.certificates.register import Issued
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import issue
+from swarmwire.deploy.certificates.register import Issued, certificate_request
 from tests.support.deploy.certificates.dated import DatedFakeClock
 
 
 def issued(folder: Path, clock: DatedFakeClock, *names: str, days: int = 365, renew: bool = False) -> list[Issued]:
-    return issue(folder, [wanted(name) for name in names], days, clock, renew=renew)
+    return issue(folder, [certificate_request(name) for name in names], days, clock, renew=renew)
 
 
 def certificate(folder: Path, name: str) -> x509.Certificate:

@@ -6,9 +6,9 @@ import asyncssh
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.fleet.environment import environments
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.fleet import packages as packages_module
 from tests.support.deploy.commands import called
 from tests.support.deploy.fleet.fake_host import HostServers, host_servers, new_key
 from tests.support.deploy.fleet.small_fleet import SmallFleet, SmallPackages
@@ -36,7 +36,7 @@ def fleet(tmp_path, servers, client_key) -> SmallFleet:
 def packages(tmp_path, monkeypatch) -> SmallPackages:
     """What robots get in the place of wheels from an index."""
     small = SmallPackages(tmp_path)
-    monkeypatch.setattr(environments, "LockedEnvironments", lambda **_: small)
+    monkeypatch.setattr(packages_module, "LockedEnvironments", lambda **_: small)
     return small
 
 
@@ -60,7 +60,7 @@ def lab_certificates(fleet) -> Callable[..., None]:
     def made(*names: str) -> None:
         folder = fleet.folder / "certs"
         begin_authority(folder, WallClock())
-        list(issue(folder, [wanted(name, ["127.0.0.1"], None) for name in names], 30, WallClock()))
+        list(issue(folder, [certificate_request(name, ["127.0.0.1"], None) for name in names], 30, WallClock()))
         del fleet.table["insecure"]
         fleet.table["certificates"] = "certs"
         fleet.write()

@@ -10,7 +10,7 @@ import asyncssh
 import tomli_w
 
 from swarmwire.deploy.fleet.archive import Archive, Entry, write_archive
-from swarmwire.deploy.fleet.environment.target import Target
+from swarmwire.deploy.fleet.packages import Target
 from tests.support.deploy.fleet.fake_host import STAND_INS, FakeHost, HostServers, write_key
 
 AGENT = """from swarmwire.agent import Agent, Robot

@@ -17,9 +17,9 @@ from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.deploy import Recording, Result, Simulation
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.folder_access import access_in, network_in
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.member import access_in, network_in
+from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.running import finished
 from swarmwire.world.backends.registry import RunnerEvent
@@ -34,7 +34,12 @@ PURPOSES = {"world": "world", "r0": "runner", "r1": "runner", "mallory": "runner
 def authority(folder: Path) -> Path:
     """A CA with a certificate for each name, good on this machine."""
     begin_authority(folder, WallClock())
-    issue(folder, [wanted(name, ("127.0.0.1",), purpose) for name, purpose in PURPOSES.items()], 1, WallClock())
+    issue(
+        folder,
+        [certificate_request(name, ("127.0.0.1",), purpose) for name, purpose in PURPOSES.items()],
+        1,
+        WallClock(),
+    )
     return folder
 
 

@@ -17,10 +17,10 @@ from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
 from swarmwire.deploy.campaign.plan import planned
-from swarmwire.deploy.certificates.folder_access import access_in, network_in
+from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.robot_settings import robot_settings
+from swarmwire.deploy.fleet.release import robot_settings
 from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.simulation import Simulation

@@ -10,8 +10,8 @@ from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
 
 WHOLE = """
 format = 1
@@ -167,7 +167,7 @@ def folders(tmp_path_factory) -> tuple[Path, Path]:
     for name in ("lab", "other"):
         folder = tmp_path_factory.mktemp(name) / "ca"
         begin_authority(folder, WallClock())
-        issue(folder, [wanted("flock-0"), wanted("flock-1")], 30, WallClock())
+        issue(folder, [certificate_request("flock-0"), certificate_request("flock-1")], 30, WallClock())
         made.append(folder)
     return made[0], made[1]
 

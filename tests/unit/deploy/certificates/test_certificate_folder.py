@@ -7,12 +7,9 @@ from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.certificates import certificate_folder
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, renew_authority, revoke
-from swarmwire.deploy.certificates.dates import date_now
-from swarmwire.deploy.certificates.files import REGISTER, REPLACED, REVOKED
-from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates import folder as certificate_folder
+from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, renew_authority, revoke
+from swarmwire.deploy.certificates.register import REGISTER, REVOKED, Register, certificate_request, date_now
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.certificates.made import certificate, issued
 
@@ -27,7 +24,7 @@ def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
 
 
 def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Path, clock: DatedFakeClock):
-    issue(folder, [wanted("flock-0", ("10.0.0.5",))], 365, clock)
+    issue(folder, [certificate_request("flock-0", ("10.0.0.5",))], 365, clock)
     old = (folder / "flock-0.key").read_bytes()
     assert "2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
     (again,) = issued(folder, clock, "flock-0", renew=True)
@@ -36,7 +33,7 @@ def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Pat
     issued(folder, clock, "flock-0", renew=True)
     assert (folder / REPLACED / "flock-0.1.key").read_bytes() == old
     register = Register.read(folder)
-    states = [register.state_of(of, date_now(clock)) for of in register.certificates]
+    states = [state for _, state in register.states(date_now(clock))][1:]
     assert states == ["replaced", "replaced", "valid"]
 
 
@@ -46,7 +43,7 @@ def test_a_certificate_that_ends_within_a_month_may_be_renewed(folder: Path, clo
     assert "has a certificate" in refusal(folder, clock, "flock-0")
     clock.pass_days(2)
     register = Register.read(folder)
-    assert register.state_of(register.certificates[0], date_now(clock)) == "ends soon"
+    assert list(register.states(date_now(clock)))[1][1] == "ends soon"
     (again,) = issued(folder, clock, "flock-0")
     assert again.valid_until > register.certificates[0].valid_until
 
@@ -164,13 +161,13 @@ def test_what_is_damaged_in_a_folder_is_named(
 @pytest.mark.parametrize("name", ["", "radio/*", "a b", "-a", "a-", "0", "ä", "a" * 64, "a\n", "ca", "CA", "../x"])
 def test_a_bad_name_is_refused(name: str):
     with pytest.raises(BadInput, match="^NAME: "):
-        wanted(name)
+        certificate_request(name)
 
 
 @pytest.mark.parametrize("host", ["", "tls/10.0.0.5", "10.0.0.5:7447", "10.0.0.256", "10.0", "a b", "*.lab"])
 def test_a_bad_host_is_refused(host: str):
     with pytest.raises(BadInput, match="^--host: "):
-        wanted("flock-0", (host,))
+        certificate_request("flock-0", (host,))
 
 
 def test_names_that_one_file_might_hold_are_refused(folder: Path, clock: DatedFakeClock):

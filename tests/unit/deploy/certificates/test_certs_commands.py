@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.commands import called
 
@@ -64,8 +64,8 @@ def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
 def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
     past = DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(certs.folder, past)
-    issue(certs.folder, [wanted("old")], 1, past)
-    issue(certs.folder, [wanted("gone")], 1, past)
+    issue(certs.folder, [certificate_request("old")], 1, past)
+    issue(certs.folder, [certificate_request("gone")], 1, past)
     certs("revoke", "gone")
     assert certs("list")[1].endswith(f": swarmwire certs issue {certs.folder} old\n")
     certs("issue", "old")
@@ -83,7 +83,7 @@ def test_a_fleet_gets_what_it_lacks(certs: Certs, tmp_path: Path):
     fleet = tmp_path / "fleet.toml"
     fleet.write_text(FLEET.replace("ADDRESS", "10.0.0.11"))
     begin_authority(certs.folder, WallClock())
-    issue(certs.folder, [wanted("flock-0", ("10.0.0.10",))], 365, WallClock())
+    issue(certs.folder, [certificate_request("flock-0", ("10.0.0.10",))], 365, WallClock())
     assert names_written(certs("issue", "--fleet", fleet)[0]) == ["flock-1", "tracker", "alice"]
     assert certs("issue", "--fleet", fleet)[1] == ""
     fleet.write_text(FLEET.replace("ADDRESS", "fe80::1"))  # a robot that has moved

@@ -6,21 +6,20 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
-from swarmwire.deploy.certificates.certificate_folder import issue, revoke
-from swarmwire.deploy.certificates.folder_access import access_in, name_in, network_in
-from swarmwire.deploy.certificates.purposes import PURPOSES
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import issue, revoke
+from swarmwire.deploy.certificates.member import access_in, name_in, network_in
+from swarmwire.deploy.certificates.register import PURPOSES, certificate_request
 from tests.support.deploy.certificates.dated import DatedFakeClock
 
 
 @pytest.fixture
 def issued(folder: Path, clock: DatedFakeClock) -> Path:
     members = [
-        wanted("laptop-1", purpose="runner"),
-        wanted("laptop-2", purpose="runner"),
-        wanted("wall", purpose="observer"),
-        wanted("gate", purpose="router"),
-        *map(wanted, ("world", "operator", "tracker", "flock-0")),
+        certificate_request("laptop-1", purpose="runner"),
+        certificate_request("laptop-2", purpose="runner"),
+        certificate_request("wall", purpose="observer"),
+        certificate_request("gate", purpose="router"),
+        *map(certificate_request, ("world", "operator", "tracker", "flock-0")),
     ]
     issue(folder, members, 365, clock)
     return folder
@@ -42,8 +41,8 @@ def test_a_revoked_name_loses_whatever_it_may_do(role: str):
 
 
 def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(issued, clock):
-    issue(issued, [wanted("wall", purpose="runner")], 365, clock, renew=True)
-    issue(issued, [wanted("wall")], 365, clock, renew=True)
+    issue(issued, [certificate_request("wall", purpose="runner")], 365, clock, renew=True)
+    issue(issued, [certificate_request("wall")], 365, clock, renew=True)
     access = access_in(issued)
     assert access.observers == ()
     assert access.runners == ("laptop-1", "laptop-2", "wall")
@@ -75,6 +74,6 @@ def test_a_machine_with_its_own_files_alone_needs_no_register(issued, tmp_path):
 
 def test_a_purpose_that_nobody_looks_for_is_refused():
     for purpose in PURPOSES:
-        assert wanted("a", purpose=purpose).purpose == purpose
+        assert certificate_request("a", purpose=purpose).purpose == purpose
     with pytest.raises(BadInput, match="did you mean runner"):
-        wanted("a", purpose="runer")
+        certificate_request("a", purpose="runer")

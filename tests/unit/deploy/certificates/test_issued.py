@@ -9,9 +9,8 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from swarmwire.deploy.certificates.certificate_folder import issue
-from swarmwire.deploy.certificates.dates import DAY, date_now
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import issue
+from swarmwire.deploy.certificates.register import DAY, certificate_request, date_now
 from tests.support.deploy.certificates.dated import DatedFakeClock
 from tests.support.deploy.certificates.made import certificate, issued
 
@@ -27,7 +26,7 @@ def test_a_ca_signs_certificates_and_lists_for_ten_years(folder: Path, clock: Da
 
 
 def test_a_certificate_is_a_servers_and_a_clients_of_its_name_and_hosts(folder: Path, clock: DatedFakeClock):
-    issue(folder, [wanted("flock-0", ("10.0.0.5", "pi.local", "fe80::1"))], 365, clock)
+    issue(folder, [certificate_request("flock-0", ("10.0.0.5", "pi.local", "fe80::1"))], 365, clock)
     leaf = certificate(folder, "flock-0")
     leaf.verify_directly_issued_by(certificate(folder, "ca"))
     names = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value

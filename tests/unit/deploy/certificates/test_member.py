@@ -6,16 +6,25 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
-from swarmwire.deploy.certificates.certificate_folder import issue
+from swarmwire.deploy.certificates.folder import issue
 from swarmwire.deploy.certificates.member import member
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.register import certificate_request
 
 BEYOND, HERE = ("tls/10.0.0.5:7447",), ("unixsock-stream//tmp/x", "tcp/127.0.0.1:1")
 
 
 @pytest.fixture
 def certs(folder: Path, clock) -> Path:
-    issue(folder, [wanted("world"), wanted("a", purpose="runner"), wanted("gate", purpose="router")], 365, clock)
+    issue(
+        folder,
+        [
+            certificate_request("world"),
+            certificate_request("a", purpose="runner"),
+            certificate_request("gate", purpose="router"),
+        ],
+        365,
+        clock,
+    )
     return folder
 
 

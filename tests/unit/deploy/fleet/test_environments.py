@@ -6,9 +6,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.fleet.archive import Entry, name_of, write_archive
-from swarmwire.deploy.fleet.environment.pins import pins
-from swarmwire.deploy.fleet.environment.target import Target
-from swarmwire.deploy.fleet.host_failed import HostFailed
+from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.result import HostFailed
 
 PI = {
     "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,

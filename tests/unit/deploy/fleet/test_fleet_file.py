@@ -9,10 +9,8 @@ import tomli_w
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
-from swarmwire.deploy.fleet.release import release_entries
-from swarmwire.deploy.fleet.robot_settings import operator_network, robot_settings
+from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
+from swarmwire.deploy.fleet.release import operator_network, release_entries, robot_settings
 from tests.support.deploy.commands import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
@@ -41,7 +39,7 @@ def test_the_example_is_a_fleet():
 
 
 def test_the_examples_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.cli.robots.contents import contents_of
+    from swarmwire.deploy.fleet.check import contents_of
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)
@@ -134,7 +132,7 @@ def test_files_are_beside_the_robots_settings(tmp_path):
         ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port"),
         ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port"),
         ({"robots": {"a": {"address": "h", "groups": ["rad"]}}}, "robots.a.groups"),
-        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups"),
+        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups.0"),
         ({"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}}, "robots.b"),
         ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address"),
         ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups"),
@@ -160,4 +158,10 @@ def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
 
 def test_the_example_shows_every_key():
     in_example = {line.lstrip("# ").split(" ")[0] for line in EXAMPLE.read_text().splitlines() if " = " in line}
-    assert {*OF_ROBOT, *OF_FLEET} - in_example == {"defaults", "robots", "groups", "insecure", "seed"} - in_example
+    assert {*RobotTable.model_fields, *FleetTable.model_fields} - in_example == {
+        "defaults",
+        "robots",
+        "groups",
+        "insecure",
+        "seed",
+    } - in_example

@@ -7,9 +7,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.cli.robots.acting import act
-from swarmwire.deploy.fleet.host_failed import HostFailed
-from swarmwire.deploy.fleet.progress import Nothing, result_lines, shown_on
-from swarmwire.deploy.fleet.result import Result
+from swarmwire.deploy.fleet.result import HostFailed, Nothing, Result, result_lines, shown_on
 
 
 def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatch):

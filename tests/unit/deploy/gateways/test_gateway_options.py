@@ -11,8 +11,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Gateways, Simulation
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, revoke
-from swarmwire.deploy.certificates.wanted import wanted
+from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.gateways.gateways import as_gateways, gateways_of_options, network_of
 from tests.support.world.gateways.scripted import ScriptedGateway
 
@@ -75,7 +75,7 @@ def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not
 def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_the_authority(tmp_path) -> None:
     folder, clock = tmp_path / "ca", WallClock()
     begin_authority(folder, clock)
-    issue(folder, [wanted("tracker"), wanted("flock-1")], 1, clock)
+    issue(folder, [certificate_request("tracker"), certificate_request("flock-1")], 1, clock)
     proof = (folder / "ca.pem", folder / "tracker.pem", folder / "tracker.key")
     revoke(folder, "flock-1", clock)
     for named, expected in (((), ("flock-1",)), (("flock-0",), ("flock-0", "flock-1"))):

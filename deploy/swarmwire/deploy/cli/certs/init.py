@@ -23,7 +23,7 @@ def init_command(
       swarmwire certs init lab-ca
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.certificate_folder import begin_authority, renew_authority
+    from swarmwire.deploy.certificates.folder import begin_authority, renew_authority
 
     if renew:
         typer.echo(f"kept: {renew_authority(folder, WallClock())}")

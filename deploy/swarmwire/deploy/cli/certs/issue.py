@@ -8,11 +8,11 @@ import typer
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import CERTIFICATES
-from swarmwire.deploy.certificates.purposes import PURPOSES
+from swarmwire.deploy.certificates.register import PURPOSES
 from swarmwire.deploy.cli.certs.options import AuthorityFolder
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.wanted import Wanted
+    from swarmwire.deploy.certificates.register import CertificateRequest
 
 
 def issue_command(
@@ -56,32 +56,33 @@ def issue_command(
       swarmwire certs issue lab-ca laptop-1 laptop-2 --for runner
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.certificate_folder import issue
+    from swarmwire.deploy.certificates.folder import issue
+    from swarmwire.deploy.certificates.register import text_of
 
     if fleet is not None:
         if names or hosts or purpose:
             raise BadInput("--fleet", "", "expected no NAME, --host or --for with it")
-        wanted, renew = _lacking(folder, fleet), True
+        requests, renew = _lacking(folder, fleet), True
     else:
-        wanted = _named(names or [], hosts or [], purpose)
-    for issued in issue(folder, wanted, days, WallClock(), renew=renew):
-        typer.echo(f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {issued.valid_until}")
-    if not wanted:
+        requests = _named(names or [], hosts or [], purpose)
+    for issued in issue(folder, requests, days, WallClock(), renew=renew):
+        typer.echo(
+            f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}"
+        )
+    if not requests:
         typer.echo("every member of the fleet has a good certificate")
 
 
-def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[Wanted]":
-    from swarmwire.deploy.certificates.wanted import wanted
+def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
+    from swarmwire.deploy.certificates.register import certificate_request
 
     if not names:
         raise BadInput("NAME", "", "expected at least one name, or --fleet")
-    return [wanted(name, hosts, purpose) for name in names]
+    return [certificate_request(name, hosts, purpose) for name in names]
 
 
-def _lacking(folder: Path, fleet: Path) -> "list[Wanted]":
-    from swarmwire.deploy.certificates.dates import date_now
-    from swarmwire.deploy.certificates.lacking import lacking
-    from swarmwire.deploy.certificates.register import Register
+def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
+    from swarmwire.deploy.certificates.register import Register, date_now
     from swarmwire.deploy.fleet.fleet_file import read_fleet
 
-    return lacking(read_fleet(fleet), Register.read(folder), date_now(WallClock()))
+    return read_fleet(fleet).lacking_certificates(Register.read(folder), date_now(WallClock()))

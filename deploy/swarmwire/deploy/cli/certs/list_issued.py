@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import typer
+from msgspec import to_builtins
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.cli.certs.options import AuthorityFolder
@@ -26,32 +26,28 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
 
       swarmwire certs list lab-ca
     """
-    from swarmwire.deploy.certificates.dates import date_now
-    from swarmwire.deploy.certificates.register import Register
+    from swarmwire.deploy.certificates.register import Register, date_now
 
-    now, register = date_now(WallClock()), Register.read(folder)
-    every = (register.authority, *register.certificates)
-    states = [register.state_of(of, now) for of in every]
+    states = list(Register.read(folder).states(date_now(WallClock())))
     if as_json:
-        typer.echo(
-            json.dumps([asdict(of) | {"state": state} for of, state in zip(every, states, strict=True)], indent=2)
-        )
+        typer.echo(json.dumps([to_builtins(of) | {"state": state} for of, state in states], indent=2))
         return
-    _print(every, states)
-    ending = [of.name for of, state in zip(every, states, strict=True) if state in ENDING]
-    if states[0] in ENDING:
+    _print(states)
+    ending = [of.name for of, state in states if state in ENDING]
+    if states[0][1] in ENDING:
         typer.echo(f"warning: all must be renewed with their CA: swarmwire certs init --renew {folder}", err=True)
     elif ending:
         typer.echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
 
 
-def _print(every: "Sequence[Issued]", states: list[str]) -> None:
+def _print(states: "Sequence[tuple[Issued, str]]") -> None:
     from rich.console import Console
 
+    from swarmwire.deploy.certificates.register import text_of
     from swarmwire.deploy.terminal.rows import print_rows
 
     rows = [
-        (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], of.valid_until, state)
-        for of, state in zip(every, states, strict=True)
+        (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], text_of(of.valid_until), state)
+        for of, state in states
     ]
     print_rows(COLUMNS, rows, Console(highlight=False))

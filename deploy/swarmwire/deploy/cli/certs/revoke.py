@@ -20,9 +20,8 @@ def revoke_command(
       swarmwire certs revoke lab-ca flock-3
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.certificate_folder import revoke
-    from swarmwire.deploy.certificates.files import REVOKED
-    from swarmwire.deploy.certificates.register import Register
+    from swarmwire.deploy.certificates.folder import revoke
+    from swarmwire.deploy.certificates.register import REVOKED, Register
 
     revoke(folder, name, WallClock())
     names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())

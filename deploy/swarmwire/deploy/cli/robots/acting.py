@@ -11,15 +11,14 @@ from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.cli.exit_codes import FAILED
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.fleet.result import Result
-    from swarmwire.deploy.fleet.watcher import Watcher
+    from swarmwire.deploy.fleet.result import Result, Watcher
 
 T = TypeVar("T")
 
 
 def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays."""
-    from swarmwire.deploy.fleet.progress import shown_on
+    from swarmwire.deploy.fleet.result import shown_on
 
     async def run() -> T:
         with shown_on(Console(stderr=True)) as watcher:
@@ -33,7 +32,7 @@ def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
 
 def tell(results: "Sequence[Result]") -> None:
     """Print a line per robot; exit code 1 if one of them failed."""
-    from swarmwire.deploy.fleet.progress import result_lines
+    from swarmwire.deploy.fleet.result import result_lines
 
     for line in result_lines(results):
         typer.echo(line)

@@ -10,10 +10,10 @@ from swarmwire.deploy.cli.robots.acting import act, tell
 from swarmwire.deploy.cli.robots.options import FleetFile, OfGroups, OfRobots, chosen
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.cli.robots.contents import Contents
+    from swarmwire.deploy.fleet.check import Contents
+    from swarmwire.deploy.fleet.connecting import NewHost
     from swarmwire.deploy.fleet.fleet import Robot
     from swarmwire.deploy.fleet.result import Result
-    from swarmwire.deploy.fleet.trusting import NewHost
 
 
 def check_command(
@@ -39,9 +39,8 @@ def check_command(
       swarmwire robots check fleet.toml --trust
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.cli.robots.contents import contents_of
-    from swarmwire.deploy.fleet.check import check
-    from swarmwire.deploy.fleet.trusting import trust_new
+    from swarmwire.deploy.fleet.check import check, contents_of
+    from swarmwire.deploy.fleet.connecting import trust_new
 
     if trust and offline:
         raise BadInput("--trust", "", "expected either --trust or --offline")

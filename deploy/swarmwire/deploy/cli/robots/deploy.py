@@ -31,9 +31,9 @@ def deploy_command(
       swarmwire robots deploy fleet.toml --group red --restart
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.cli.robots.contents import contents_of
+    from swarmwire.deploy.fleet.check import contents_of
     from swarmwire.deploy.fleet.deploy import deploy
-    from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
+    from swarmwire.deploy.fleet.packages import LockedEnvironments
 
     contents = contents_of(fleet, mine)
     for error in contents.faults.values():

@@ -13,6 +13,6 @@ def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
       swarmwire robots estop fleet.toml
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.estop import estop
+    from swarmwire.deploy.fleet.units import estop
 
     tell(act(lambda watcher: estop(fleet, mine, watcher)))

@@ -12,7 +12,7 @@ from swarmwire.deploy.cli.robots.acting import act
 from swarmwire.deploy.cli.robots.options import FleetFile, OfGroups, OfRobots, chosen
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.fleet.status import RobotState
+    from swarmwire.deploy.fleet.units import RobotState
 
 COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent")
 
@@ -25,7 +25,7 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
       swarmwire robots status fleet.toml
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.status import status
+    from swarmwire.deploy.fleet.units import status
 
     states = act(lambda watcher: status(fleet, mine, watcher))
     if as_json:
@@ -40,8 +40,7 @@ def _print(states: "list[RobotState]") -> None:
     """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
     from rich.console import Console
 
-    from swarmwire.deploy.fleet.progress import result_lines
-    from swarmwire.deploy.fleet.result import Result
+    from swarmwire.deploy.fleet.result import Result, result_lines
     from swarmwire.deploy.terminal.rows import print_rows
 
     rows = [_row(state) for state in states if not state.fault]

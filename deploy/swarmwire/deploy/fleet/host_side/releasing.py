@@ -1,4 +1,4 @@
-"""Releases: tried, made the current one in one step, gone back from, and those that nobody needs any more removed."""
+"""Releases on a host: try one, make it the current one in one step, go back, remove what nobody needs."""
 
 import json
 import os
@@ -7,20 +7,20 @@ import subprocess
 import sys
 from pathlib import Path
 
-from swarmwire.deploy.fleet.host_side.folders import (
+from swarmwire.deploy.fleet.host_side.files import (
     KEPT,
     PART,
+    Refusal,
     current,
     environment,
+    part_of,
     releases,
     root,
     sync_folder,
     whole_in,
     write_whole,
 )
-from swarmwire.deploy.fleet.host_side.refusal import Refusal
-from swarmwire.deploy.fleet.host_side.units import install_unit, shown
-from swarmwire.deploy.fleet.host_side.unpacking import part_of
+from swarmwire.deploy.fleet.host_side.system import install_unit, shown
 
 LINES = 5  # of what a failed trial printed
 

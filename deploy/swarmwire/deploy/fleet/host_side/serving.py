@@ -12,17 +12,26 @@ from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, BinaryIO
 
-from swarmwire.deploy.fleet.host_side import facts, releasing, units
-from swarmwire.deploy.fleet.host_side.folders import current, environment, releases, root, sync_files
-from swarmwire.deploy.fleet.host_side.refusal import Cut, Refusal, refusal_of
-from swarmwire.deploy.fleet.host_side.unpacking import Incoming, unpack_whole
+from swarmwire.deploy.fleet.host_side import releasing, system
+from swarmwire.deploy.fleet.host_side.files import (
+    Cut,
+    Incoming,
+    Refusal,
+    current,
+    environment,
+    refusal_of,
+    releases,
+    root,
+    sync_files,
+    unpack_whole,
+)
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer until the requests end."""
     with ExitStack() as held:
         operations = {**OPERATIONS, "lock": lambda: held.enter_context(_locked())}
-        _answer(answers, {"said": facts.facts()})
+        _answer(answers, {"said": system.facts()})
         while line := requests.readline():
             request: dict[str, Any] = json.loads(line)
             if "size" in request:
@@ -77,7 +86,7 @@ def _reach(host: str, port: int, timeout_s: float) -> str:
 
 
 def _state(robots: list[str]) -> dict[str, Any]:
-    known = units.shown(robots)
+    known = system.shown(robots)
     return {robot: {**known.get(robot, {}), "current": current(robot), "status": _status(robot)} for robot in robots}
 
 
@@ -91,17 +100,17 @@ def _status(robot: str) -> dict[str, Any] | None:
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "clear_parts": releasing.clear_parts,
-    "present": facts.present,
+    "present": system.present,
     "put_environment": _put_environment,
     "put_release": _put_release,
     "try_out": releasing.try_out,
     "switch": releasing.switch,
     "go_back": releasing.go_back,
     "tidy": releasing.tidy,
-    "utc_ns": facts.utc_ns,
-    "lingers": facts.lingers,
-    "linger": facts.linger,
-    "run_units": units.run_units,
+    "utc_ns": system.utc_ns,
+    "lingers": system.lingers,
+    "linger": system.linger,
+    "run_units": system.run_units,
     "state": _state,
     "reach": _reach,
 }

@@ -1,7 +1,8 @@
-"""Robots behind gateways as a run has them: chosen at the door, served while it goes on."""
+"""The gateways of a run: robots that answer as real ones while the run goes on."""
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.deploy.gateways.chosen import Chosen, chosen_gateways
-from swarmwire.deploy.gateways.gateways import Gateways
-from swarmwire.deploy.gateways.listening import listening_places
-from swarmwire.deploy.gateways.robot_settings import RobotSettings, write_settings
-from swarmwire.deploy.gateways.served import Served, ServedRobot
+from swarmwire.deploy.gateways.gateways import Chosen, Gateways, chosen_gateways
+from swarmwire.deploy.gateways.robot_settings import RobotSettings, listening_places, write_settings
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from swarmwire.world.gateways.tracker import EmulatedTracker
@@ -23,7 +21,31 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 
 
-class Behind:
+@dataclass(frozen=True)
+class ServedRobot:
+    """A robot of a run that answers as a real one."""
+
+    name: str
+    kind: str  # of its gateway, and of the driver that speaks with it
+    address: str  # as that driver takes it
+    settings: Mapping[str, Any]  # of `swarmwire-agent`, as in `robot.toml`
+    file: Path | None  # where these are written, if the run has a folder
+
+
+@dataclass(frozen=True)
+class Served:
+    """All of them, ready to answer."""
+
+    groups: tuple[GatewayGroup, ...]
+    robots: tuple[ServedRobot, ...]
+    medium: RadioBridge | None
+    show: Callable[[], None]  # tells where all robots are
+    show_counts: Callable[[], dict[str, int]]  # what of that nobody was told
+    swarm: str
+    endpoints: tuple[str, ...]  # of the network
+
+
+class RunGateways:
     """The gateways of one run, of which there may be none.
 
     Attributes:

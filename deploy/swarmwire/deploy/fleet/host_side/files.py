@@ -1,5 +1,9 @@
-"""Archives that arrive: unpacked beside their place, and moved there when every byte is as it was sent."""
+"""Files of a host: where things lie, how archives are unpacked, and the refusal of a request.
 
+An archive is unpacked beside its place, and moved there when every byte is as it was sent.
+"""
+
+import errno
 import hashlib
 import os
 import shutil
@@ -7,11 +11,93 @@ import tarfile
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from swarmwire.deploy.fleet.host_side.folders import PART
-from swarmwire.deploy.fleet.host_side.refusal import Cut, Refusal, refusal_of
-
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+KEPT = 3  # releases of a robot that can be gone back to, the current one among them
+TAKEN = ("env", "lock")  # in `root`, so that no robot can have such a name
+PART = ".part"  # of what is not whole yet
 BLOCK = 1 << 18
 NO_ARCHIVE = (tarfile.TarError, EOFError)  # what `unpack` raises for what is none
+
+
+class Refusal(Exception):
+    """One request fails: `kind` is for the program at the other end, `text` for people."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        self.kind, self.text = kind, text
+        super().__init__(text)
+
+
+class Cut(Exception):
+    """The connection ended in the middle of a request."""
+
+
+def refusal_of(error: OSError) -> Refusal:
+    """The refusal that an error of the system comes to."""
+    kind = "full" if error.errno in FULL else "system"
+    place = f": {error.filename}" if error.filename else ""
+    return Refusal(kind, f"{error.strerror or error}{place}")
+
+
+def root() -> Path:
+    """The folder of all that is deployed."""
+    return Path.home() / "swarmwire"
+
+
+def environment(name: str) -> Path:
+    """The folder of some packages."""
+    return root() / "env" / name
+
+
+def releases(robot: str) -> Path:
+    """The folder of a robot's releases."""
+    return root() / robot / "releases"
+
+
+def current(robot: str) -> str | None:
+    """The release that starts next; None if there is none."""
+    try:
+        name = (root() / robot / "current").readlink().name
+    except OSError:
+        return None
+    return name if (releases(robot) / name).is_dir() else None
+
+
+def whole_in(folder: Path) -> list[str]:
+    """The names of what is whole in a folder."""
+    if not folder.is_dir():
+        return []
+    return sorted(path.name for path in folder.iterdir() if path.is_dir() and not path.name.endswith(PART))
+
+
+def sync_files(folder: Path) -> None:
+    """See to it that what a folder holds is on the disk, whatever happens to the robot from now on."""
+    for path in folder.iterdir():
+        if path.is_file() and not path.is_symlink():
+            _sync(path)
+    sync_folder(folder)
+
+
+def sync_folder(folder: Path) -> None:
+    """See to it that the names in a folder are on the disk."""
+    _sync(folder)
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """A file that is there with all of this text, or as it was before."""
+    part = path.with_name(path.name + PART)
+    with part.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
 
 
 class Incoming:

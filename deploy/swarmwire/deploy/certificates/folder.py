@@ -1,10 +1,10 @@
-"""The folder of a CA: begun, renewed, and what is done with it.
+"""The folder of a CA: begin and renew the CA, issue and revoke certificates.
 
 ca.pem, ca.key        the CA; its key never leaves this folder
 NAME.pem, NAME.key    a certificate and its key, for the machine of that name
 certs.json            the register: written last, so what stands in it is there
 revoked.crl           the serial numbers that are revoked, for programs that read such lists; zenoh does not
-replaced/             what renewed certificates took the place of
+replaced/             keys and certificates that were renewed
 """
 
 from collections.abc import Generator, Sequence
@@ -17,26 +17,28 @@ from cryptography import x509
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.taken import taken
-from swarmwire.deploy.certificates.authority import Authority, certificate_pem, key_pem
-from swarmwire.deploy.certificates.dates import date_now, date_of, text_of
-from swarmwire.deploy.certificates.files import (
+from swarmwire.deploy.certificates.authority import Authority, certificate_pem, key_pem, write_key
+from swarmwire.deploy.certificates.register import (
     AUTHORITY,
     REVOKED,
+    CertificateRequest,
+    Issued,
+    Register,
     certificate_path,
+    date_now,
     key_path,
-    make_private_folder,
-    put_aside,
-    write_key,
+    no_authority,
+    text_of,
 )
-from swarmwire.deploy.certificates.register import Issued, Register
-from swarmwire.deploy.certificates.wanted import Wanted
 from swarmwire.metrics.atomic import write_text
+
+REPLACED = "replaced"  # folder of keys and certificates that new ones replaced
 
 
 def begin_authority(folder: Path, clock: DatedClock) -> None:
     """Make a CA in a new or empty folder; BadInput for any other folder."""
     now = date_now(clock)
-    make_private_folder(folder)
+    _make_private_folder(folder)
     with _written(folder):
         authority = Authority.new(now)
         write_key(key_path(folder, AUTHORITY), key_pem(authority.key))
@@ -52,7 +54,7 @@ def renew_authority(folder: Path, clock: DatedClock) -> Path:
     BadInput if there is no CA.
     """
     if not certificate_path(folder, AUTHORITY).is_file():
-        raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}")
+        raise no_authority(folder)
     whole = folder.absolute()
     kept = whole.with_name(f"{whole.name}-until-{date_now(clock):%Y%m%dT%H%M%SZ}")
     try:
@@ -63,7 +65,9 @@ def renew_authority(folder: Path, clock: DatedClock) -> Path:
     return kept
 
 
-def issue(folder: Path, names: Sequence[Wanted], days: int, clock: DatedClock, *, renew: bool = False) -> list[Issued]:
+def issue(
+    folder: Path, names: Sequence[CertificateRequest], days: int, clock: DatedClock, *, renew: bool = False
+) -> list[Issued]:
     """Make certificates; all names are checked before the first.
 
     A certificate that ends soon is replaced, with `renew` any other, too. BadInput for a name that is revoked, that has
@@ -110,14 +114,16 @@ def _check(folder: Path, register: Register, name: str, now: datetime, *, renew:
             f" lists of revoked ones; expected another name, or a new CA: swarmwire certs init --renew {folder}",
         )
     if not (renew or last.ends_soon(now)):
-        raise BadInput("NAME", "", f"{name} has a certificate until {last.valid_until}; --renew makes another")
+        raise BadInput("NAME", "", f"{name} has a certificate until {text_of(last.valid_until)}; --renew makes another")
 
 
-def _issue(folder: Path, authority: Authority, of: Wanted, last: Issued | None, days: int, now: datetime) -> Issued:
+def _issue(
+    folder: Path, authority: Authority, of: CertificateRequest, last: Issued | None, days: int, now: datetime
+) -> Issued:
     """Write a key and its certificate, whose place in the register is still to be taken."""
-    hosts = of.hosts or (tuple(last.hosts) if last else ())
+    hosts = of.hosts or (last.hosts if last else ())
     purpose = of.purpose or (last.purpose if last else of.usual_purpose)
-    put_aside(folder, of.name)
+    _put_aside(folder, of.name)
     certificate, key = authority.issue(of.name, hosts, days, now)
     write_key(key_path(folder, of.name), key_pem(key))
     write_text(certificate_path(folder, of.name), certificate_pem(certificate))
@@ -125,13 +131,13 @@ def _issue(folder: Path, authority: Authority, of: Wanted, last: Issued | None, 
 
 
 def _entry(name: str, purpose: str, hosts: tuple[str, ...], certificate: x509.Certificate) -> Issued:
-    since, until = text_of(certificate.not_valid_before_utc), text_of(certificate.not_valid_after_utc)
+    since, until = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     return Issued(name, purpose, f"{certificate.serial_number:x}", hosts, since, until)
 
 
 def _write_revoked(folder: Path, authority: Authority, register: Register, now: datetime) -> None:
     """Write the list that other programs read, whole from the register."""
-    revoked = [(int(of.serial, 16), date_of(of.revoked)) for of in register.certificates if of.revoked is not None]
+    revoked = [(int(of.serial, 16), of.revoked) for of in register.certificates if of.revoked is not None]
     write_text(folder / REVOKED, authority.revocation_list(revoked, now).decode())
 
 
@@ -142,6 +148,28 @@ def _written(folder: Path) -> Generator[None]:
         with taken(folder, "folder of certificates"):
             yield
     except FileNotFoundError:
-        raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}") from None
+        raise no_authority(folder) from None
     except OSError as error:
         raise BadInput(str(error.filename or folder), "", f"cannot be written: {error.strerror}") from None
+
+
+def _make_private_folder(path: Path) -> None:
+    """A new folder, or an empty one, that its owner alone may enter; BadInput if there is more, or it cannot be."""
+    try:
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if any(path.iterdir()):
+            raise BadInput(str(path), "", "expected a new or empty folder")
+        path.chmod(0o700)
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a folder that can be written: {error.strerror}") from None
+
+
+def _put_aside(folder: Path, name: str) -> None:
+    """Move a name's key and certificate, as far as they are there, to where what was replaced is kept."""
+    kept = folder / REPLACED
+    there = [path for path in (key_path(folder, name), certificate_path(folder, name)) if path.exists()]
+    if there:
+        kept.mkdir(mode=0o700, exist_ok=True)
+    number = 1 + len({path.stem for path in kept.glob(f"{name}.*")})
+    for path in there:
+        path.rename(kept / f"{name}.{number}{path.suffix}")
