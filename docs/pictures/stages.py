@@ -13,7 +13,7 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.sensors.sensor import Field, Noise, RangedSensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import save
-from swarmwire.metrics.drawing.looks import FAINT
+from swarmwire.metrics.drawing.style import FAINT
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Sensor
 

@@ -8,10 +8,9 @@ import numpy as np
 import polars as pl
 
 from docs.experiments.figures._pso_samples import EVERY_S, HALF, at, mean_distances, times, values
-from swarmwire.metrics.drawing.looks import INK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.style import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.report.axes import ordered_colors
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import summary
 

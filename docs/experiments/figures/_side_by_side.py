@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.style import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
 from swarmwire.metrics.statistics.sample import Interval
 

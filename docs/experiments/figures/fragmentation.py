@@ -12,10 +12,9 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.style import SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.axes import ordered_colors
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.sample import Sample, time_sample
 from swarmwire.metrics.statistics.summary import quartiles_text, summary

@@ -12,9 +12,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.style import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import number_sample
 from swarmwire.metrics.statistics.summary import summary

@@ -112,7 +112,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch,
 
 
 def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
+    from swarmwire.metrics.drawing.animation import FilmFigure
 
     export(run, "--mp4", *SMALL)
     before = (run / "film.mp4").read_bytes()

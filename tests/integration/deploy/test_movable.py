@@ -82,7 +82,7 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
     assert box.x_m > 0.2
     assert "movable_x_m" not in folder.metrics().columns
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
+    from swarmwire.metrics.drawing.animation import FilmFigure
     from tests.integration.metrics.drawing.test_film_figure import FLOOR, MOVABLE, color_at
 
     figure = FilmFigure(film, 640)

@@ -21,7 +21,7 @@ from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.showing import Drawer, RadioModel
 from swarmwire.deploy.live.whole_recording import whole
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.viewer.program import end, free_port, is_open, program
+from swarmwire.metrics.viewer.screenshot import end, free_port, is_open, program
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.watching import At
 from tests.support.waiting import until

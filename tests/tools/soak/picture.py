@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from swarmwire.metrics.report.svg import as_svg, blank_figure
+from swarmwire.metrics.report.page import as_svg, blank_figure
 from tests.tools.soak.samples import Sample, cpu_per_tick_ms, read_samples
 
 SHOWN = {

@@ -46,7 +46,7 @@ def draw_command(
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path, size_px: int) -> None:
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.metrics.drawing.scenario_sheet import draw_scenario
+    from swarmwire.metrics.drawing.scenario import draw_scenario
 
     simulation = Simulation(path, seed=seed, overrides=overrides)
     draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to, size_px)
@@ -54,7 +54,7 @@ def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path,
 
 def _draw_named_body(name: str, to: Path, size_px: int) -> None:
     from swarmwire.comms.bodies.body import body_names, load_body
-    from swarmwire.metrics.drawing.body_sheet import draw_body
+    from swarmwire.metrics.drawing.bodies import draw_body
 
     if name not in body_names():
         raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
@@ -62,7 +62,7 @@ def _draw_named_body(name: str, to: Path, size_px: int) -> None:
 
 
 def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
-    from swarmwire.metrics.drawing.body_sheet import draw_body
+    from swarmwire.metrics.drawing.bodies import draw_body
     from swarmwire.world.scenario.bodies import read_body
 
     draw_body(read_body(path, str(path), ""), to, size_px)

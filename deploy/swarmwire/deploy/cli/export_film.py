@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.progress import track
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from swarmwire.metrics.drawing.footage import Footage
+    from swarmwire.metrics.drawing.animation import FilmFigure
+    from swarmwire.metrics.drawing.film import Footage
 
 FilmKind = Literal["gif", "mp4"]
 USUAL_FRAMES_PER_S = {"gif": 10.0, "mp4": 25.0}
@@ -38,9 +38,8 @@ def export_film(
 ) -> None:
     """Draw the arena, and metrics beside it, as a film; the console is told how it goes."""
     from swarmwire.metrics.atomic import check_output_path
-    from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
-    from swarmwire.metrics.drawing.footage import footage
+    from swarmwire.metrics.drawing.animation import FilmFigure
+    from swarmwire.metrics.drawing.film import film_of, footage
     from swarmwire.metrics.run_folder import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))
@@ -53,8 +52,7 @@ def export_film(
 
 def _write(figure: "FilmFigure", shown: "Footage", kind: FilmKind, to: Path, console: Console) -> None:
     from swarmwire.metrics.atomic import output_file
-    from swarmwire.metrics.drawing.gif import write_gif
-    from swarmwire.metrics.drawing.mp4 import write_mp4
+    from swarmwire.metrics.drawing.animation import write_gif, write_mp4
 
     count = len(shown.ticks)
     console.print(f"{count} frames, {shown.frames_per_s:g} a second, {shown.speed:g} x real time")

@@ -13,9 +13,9 @@ END = "end"
 
 def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metrics: list[str] | None) -> None:
     """Draw the arena, and metrics beside it, `at` a time in s or END; BadInput if it was not recorded."""
+    from swarmwire.metrics.drawing.animation import FilmFigure
     from swarmwire.metrics.drawing.canvas import check_picture
     from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
     from swarmwire.metrics.run_folder import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))
@@ -26,7 +26,7 @@ def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metri
 
 def export_distances(run: Path, to: Path, arena: int, size_px: int) -> None:
     """Draw the share of receivers that received, over distance."""
-    from swarmwire.metrics.drawing.distance_sheet import draw_distances
+    from swarmwire.metrics.drawing.radio import draw_distances
     from swarmwire.metrics.run_folder import RunFolder
 
     draw_distances(RunFolder(run), arena, to, size_px)

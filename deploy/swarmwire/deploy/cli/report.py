@@ -8,7 +8,7 @@ import typer
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.report.section import Report
+    from swarmwire.metrics.report.page import Report
 
 
 def report_command(
@@ -33,7 +33,7 @@ def report_command(
       swarmwire report campaigns/loss --response aggregation_time_s --response order
     """
     # Imported here: matplotlib and scipy take a second, which --help should not.
-    from swarmwire.metrics.report.write_report import PAGE, write_report
+    from swarmwire.metrics.report.page import PAGE, write_report
 
     written = write_report(_report(folder, response or []), to or folder / PAGE)
     typer.echo(f"written: {written[0]}")
@@ -46,8 +46,8 @@ def _report(folder: Path, responses: list[str]) -> "Report":
     from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
     from swarmwire.metrics.campaign.formats import ABOUT
     from swarmwire.metrics.record.names import STATIC
-    from swarmwire.metrics.report.campaign.campaign_report import campaign_report
-    from swarmwire.metrics.report.run_report import run_report
+    from swarmwire.metrics.report.campaign import campaign_report
+    from swarmwire.metrics.report.run import run_report
 
     if (folder / ABOUT).exists():
         return campaign_report(CampaignFolder(folder), responses)

@@ -14,7 +14,7 @@ def screenshot_command(
     tick: Annotated[int | None, typer.Option(help="The tick to show. Default: the last.")] = None,
 ) -> None:
     """Draw a recording as rerun's viewer shows it, without a screen. Needs a Vulkan driver; Mesa's will do."""
-    from swarmwire.metrics.viewer.picture import render_png
+    from swarmwire.metrics.viewer.screenshot import render_png
 
     render_png(recording / RECORDING if recording.is_dir() else recording, to, tick)
     typer.echo(f"written: {to}")

@@ -52,7 +52,7 @@ def sim_to_real_command(
     told = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
     print_sim_to_real(found, told, Console(highlight=False))
     if to is not None:
-        from swarmwire.metrics.report.write_report import write_report
+        from swarmwire.metrics.report.page import write_report
         from swarmwire.metrics.sim_to_real.sim_to_real_report import sim_to_real_report
 
         write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), to)

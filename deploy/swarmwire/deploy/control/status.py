@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import numbers_of
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
-from swarmwire.metrics.viewer.plotted import Measured
+from swarmwire.metrics.viewer.plots import Measured
 from swarmwire.world.backends.registry import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups

@@ -26,8 +26,8 @@ from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.live.live_file import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
-from swarmwire.metrics.viewer.plotted import Measured
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.metrics.viewer.plots import Measured
+from swarmwire.metrics.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
 LEAVE_S = 2.0  # how long the last frame may take

@@ -13,7 +13,7 @@ from swarmwire.deploy.live.following import Following, following
 from swarmwire.deploy.live.live_file import Live
 from swarmwire.deploy.live.viewer_program import Viewer, viewer
 from swarmwire.deploy.live.whole_recording import whole
-from swarmwire.metrics.viewer.live import RerunLive
+from swarmwire.metrics.viewer.recording import RerunLive
 
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.metrics.viewer.program import end, ending_with_this, free_port, is_open, program
+from swarmwire.metrics.viewer.screenshot import end, ending_with_this, free_port, is_open, program
 
 START_NS = 30 * NS_PER_S  # how long it may take to listen
 PAUSE_NS = NS_PER_S // 20

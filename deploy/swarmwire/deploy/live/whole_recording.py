@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.viewer.program import program
+from swarmwire.metrics.viewer.screenshot import program
 
 HEAD = b"RRF2"  # how a recording begins
 FOOT = b"RRF2FOOT\x01\x00\x00\x00"  # and how a complete one ends

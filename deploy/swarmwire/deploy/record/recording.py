@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.metrics.viewer.selection import selected_robot
 
 
 @dataclass(frozen=True)

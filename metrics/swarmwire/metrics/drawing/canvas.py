@@ -1,5 +1,6 @@
-"""Figures without pyplot: made, turned into pixels, and saved."""
+"""Figures without pyplot, and the layout of a picture of an arena: title, legend, arena to scale, and a panel."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -7,7 +8,7 @@ from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
 from swarmwire.metrics.atomic import check_output_path, output_file
-from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
+from swarmwire.metrics.drawing.style import LONG_SIDE_IN, PAPER
 
 MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
 
@@ -54,3 +55,79 @@ def save(figure: Any, to: Path) -> None:
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
     with output_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
         figure.savefig(part, dpi=figure.dpi, metadata=undated)
+
+
+PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
+_EDGE_IN, _GAP_IN = 0.14, 0.2
+_TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
+_PANEL_BESIDE_IN = 1.95
+_FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
+_MIN_WIDTH_IN = 3.9
+_BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Rectangles (left, bottom, width, height) as shares of a figure of this size."""
+
+    width_in: float
+    height_in: float
+    arena: tuple[float, float, float, float]
+    panel: tuple[float, float, float, float] | None
+    beside: bool  # the panel stands right of the arena, not below
+
+    @property
+    def left(self) -> float:
+        """Where titles start."""
+        return _EDGE_IN / self.width_in
+
+    @property
+    def right(self) -> float:
+        """Where they end at the latest."""
+        return 1.0 - _EDGE_IN / self.width_in
+
+    def below_top(self, inches: float) -> float:
+        """The height, as a share, of what is so far below the upper edge."""
+        return 1.0 - inches / self.height_in
+
+
+def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> Layout:
+    """The layout for an arena of this size, with so much room for its axes left and below.
+
+    `panel_in` is the height of the panel where it has to go below the arena; 0: there is none.
+    """
+    pad_m = 2.0 * PAD * max(size_m)
+    across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
+    beside = panel_in > 0.0 and up_m / across_m >= _BESIDE_FROM
+    head_in = _TITLE_IN + legend_rows * _LEGEND_ROW_IN
+    left_in = _EDGE_IN + axes_in
+    beside_in = _GAP_IN + _PANEL_BESIDE_IN if beside else 0.0
+    below_in = 0.0 if beside or not panel_in else _GAP_IN + panel_in
+    low_in = _FOOT_IN + axes_in / 2 + below_in
+    in_per_m = min((LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m)
+    arena_in = across_m * in_per_m, up_m * in_per_m
+    width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _MIN_WIDTH_IN)
+    height_in = head_in + arena_in[1] + low_in
+    place = left_in, low_in, *arena_in
+    panel = None
+    if beside:  # a narrow arena leaves it more room
+        from_left = left_in + arena_in[0] + _GAP_IN
+        panel = from_left, low_in, width_in - _EDGE_IN - from_left, arena_in[1]
+    elif panel_in:
+        panel = _EDGE_IN, _EDGE_IN, width_in - 2 * _EDGE_IN, panel_in
+
+    def shares(rectangle: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        x, y, width, height = rectangle
+        return x / width_in, y / height_in, width / width_in, height / height_in
+
+    return Layout(width_in, height_in, shares(place), shares(panel) if panel else None, beside)
+
+
+def add_arena_axes(figure: Any, layout: Layout, size_m: tuple[float, float]) -> Any:
+    """Axes in m of the arena, to scale, without any line of their own."""
+    axes = figure.add_axes(layout.arena)
+    pad_m = PAD * max(size_m)
+    half_x, half_y = size_m[0] / 2 + pad_m, size_m[1] / 2 + pad_m
+    axes.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), aspect="equal")
+    axes.set_axis_off()
+    return axes

@@ -1,12 +1,111 @@
-"""A report as one page of HTML that needs nothing else: no network, no scripts, no fonts."""
+"""A report and its parts, and the page of HTML that holds all of it: no network, no scripts, no fonts."""
 
+import io
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
-from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
+from swarmwire.metrics.atomic import check_output_path, output_file
+from swarmwire.metrics.drawing.canvas import new_figure
+from swarmwire.metrics.drawing.style import LONG_SIDE_IN
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing with what it shows."""
+
+    name: str  # of its file, without .svg: unique within a report
+    svg: str  # a whole <svg> element, whose ids are its own
+    caption: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts, numbers already rounded for people."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str
+    folded: bool = False  # whether the page shows the caption alone until it is asked for the rest
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Lines to be read letter by letter: commands, messages of errors."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with what belongs under it, in order."""
+
+    title: str
+    parts: tuple[str | Listing | Table | Figure, ...]  # a text is a paragraph; `so` within it is code
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page."""
+
+    title: str
+    sections: tuple[Section, ...]
+    about: str = ""  # a line below the title: what it is about, at a glance
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """All figures, in order."""
+        return tuple(part for section in self.sections for part in section.parts if isinstance(part, Figure))
+
+
+COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
+
+_DPI_SIZE_PX = 1280  # only what is drawn as pixels within a figure depends on it
+_HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)
+_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
+_STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
+_NAMED = re.compile(r'\sid="([^"]*)"')
+_DRAWN = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
+_SPACE = re.compile(r"\n\s*|\s*<!--.*?-->")
+_LONG = re.compile(r"(\d\.\d\d)\d+")
+_USED = re.compile(r'(?:xlink:href="#|url\(#)([^")]*)')
+
+
+def blank_figure(width_in: float, height_in: float) -> Any:
+    """An empty matplotlib figure for `as_svg`; BadInput without matplotlib."""
+    return new_figure(width_in, height_in, round(_DPI_SIZE_PX * max(width_in, height_in, LONG_SIDE_IN) / LONG_SIDE_IN))
+
+
+def as_svg(figure: Any, name: str) -> str:
+    """The figure as one <svg> element, whose ids begin with its name (letters, digits, `-`, `_`, `.`).
+
+    Letters are drawn as paths, so that it looks the same in any browser, text processor and print.
+    """
+    import matplotlib as mpl
+
+    fixed = cast("Any", mpl).rc_context
+    written = io.StringIO()
+    with fixed({"svg.hashsalt": "swarmwire", "svg.fonttype": "path"}):
+        figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = _STYLE.sub("", _METADATA.sub("", _HEAD.sub("", written.getvalue())))
+    # Its style sheet would hold for the whole page.
+    text = text.replace("<svg ", '<svg stroke-linejoin="round" stroke-linecap="butt" ', 1)
+    # A hundredth of a point is less than a printer shows.
+    text = _DRAWN.sub(lambda found: _LONG.sub(r"\1", found[0]), text)
+    return _with_own_ids(_SPACE.sub("\n", text), name).strip()
+
+
+def _with_own_ids(text: str, name: str) -> str:
+    """Ids that something refers to begin with the name, the others are gone."""
+    used = set(_USED.findall(text))
+    kept = _NAMED.sub(lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", text)
+    return _USED.sub(lambda found: found[0].replace(f"#{found[1]}", f"#{name}-{found[1]}"), kept)
+
 
 _NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
 _CODE = re.compile(r"`([^`]*)`")
@@ -77,3 +176,33 @@ def _breakable(text: str) -> Any:
     from markupsafe import Markup, escape
 
     return Markup(".<wbr>").join(map(escape, text.split(".")))
+
+
+PAGE = "report.html"  # in the folder that it is of
+FIGURES = "figures"
+_SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
+
+
+def write_report(report: Report, to: Path) -> list[Path]:
+    """Write the page there and the figures into a folder beside it; the paths of all of them, the page first.
+
+    Those of `report.html` go to `figures/`, those of `NAME.html` to `NAME-figures/`.
+    BadInput for a path that cannot be.
+    """
+    check_output_path(to, (".html", ".htm"))
+    text = page(report)
+    folder = to.parent / (FIGURES if to.name == PAGE else f"{to.stem}-{FIGURES}")
+    files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n" for figure in report.figures}
+    if files:
+        _make(folder)
+    for path, content in (files | {to: text}).items():
+        with output_file(path) as aside:
+            aside.write_text(content, encoding="utf-8")
+    return [to, *files]
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise BadInput(str(folder), "", f"expected a folder that can be made: {error.strerror}") from None

@@ -1,22 +1,102 @@
-"""What is known of a run that is to be reported: its folder read, as far as there is something."""
+"""The data of a run's report: its folder, film, events by kind, and tables."""
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.report.lanes import Lane, lanes_of
+from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.table_file import corruption_errors
 from swarmwire.metrics.verify.sound_table import sound_table
 
 if TYPE_CHECKING:
     import polars as pl
+
+
+@dataclass(frozen=True)
+class Span:
+    """Something that happened; where its end is not recorded, it was of a moment, or lasted to the run's end."""
+
+    from_s: float
+    until_s: float | None
+
+
+@dataclass
+class Lane:
+    """All that happened of one kind, in order."""
+
+    words: str  # the action, with its part if it has one
+    spans: list[Span] = field(default_factory=list[Span])
+    robots: set[str] = field(default_factory=set[str])  # names of all that it changed
+
+    @property
+    def title(self) -> str:
+        """The kind, how often it happened, and to how many robots."""
+        times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
+        return f"{self.words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{self.words}{times}"
+
+
+def lanes_of(events: "pl.DataFrame") -> list[Lane]:
+    """The lanes of one arena's rows of `events`, by first occurrence.
+
+    Rows do not say which of several occurrences an end belongs to: it is the first that is open and changed the same
+    robots, else the first that is open.
+    """
+    lanes: dict[str, Lane] = {}
+    opened: dict[str, list[tuple[int, list[str]]]] = {}
+    for row in events.iter_rows(named=True):
+        words = f"{row['do']} {row['part']}".strip()
+        lane, still_open = lanes.setdefault(words, Lane(words)), opened.setdefault(words, [])
+        lane.robots.update(row["robots"])
+        if row["ended"]:
+            _end(lane, still_open, row)
+        else:
+            still_open.append((len(lane.spans), row["robots"]))
+            lane.spans.append(Span(row["time_s"], None))
+    return [lane for lane in lanes.values() if lane.spans]
+
+
+def _end(lane: Lane, still_open: list[tuple[int, list[str]]], row: dict[str, Any]) -> None:
+    if not still_open:
+        return
+    same = [item for item in still_open if item[1] == row["robots"]]
+    ended = (same or still_open)[0]
+    still_open.remove(ended)
+    place, _ = ended
+    lane.spans[place] = Span(lane.spans[place].from_s, row["time_s"])
+
+
+MAX_POINTS = 800  # of a curve: about what a figure has dots for across
+
+
+def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
+    """The places to draw of a curve (T,), rising: all, or of each stretch the least and the greatest value.
+
+    A stretch without any value keeps its first place, so that a gap stays one.
+    """
+    if len(value) <= most:
+        return np.arange(len(value))
+    kept: set[int] = {0, len(value) - 1}
+    bounds = np.linspace(0, len(value), most // 2 + 1).astype(int).tolist()
+    for first, after in pairwise(bounds):
+        stretch = value[first:after]
+        known = np.flatnonzero(np.isfinite(stretch))
+        if not len(known):
+            kept.add(first)
+            continue
+        kept |= {first + int(known[stretch[known].argmin()]), first + int(known[stretch[known].argmax()])}
+    return np.array(sorted(kept))
+
 
 ARENA = 0  # whose pictures are drawn
 

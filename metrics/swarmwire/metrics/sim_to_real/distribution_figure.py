@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import COLUMN_IN, blank_figure
+from swarmwire.metrics.drawing.style import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
+from swarmwire.metrics.report.page import COLUMN_IN, blank_figure
 from swarmwire.metrics.sim_to_real.comparison import MetricRow
 
 _HEIGHT_IN = 2.1

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from swarmwire.metrics.report.section import Figure, Report, Section, Table
-from swarmwire.metrics.report.svg import as_svg
+from swarmwire.metrics.report.page import Figure, Report, Section, Table, as_svg
 from swarmwire.metrics.sim_to_real.comparison import MetricRow, SimToReal
 from swarmwire.metrics.sim_to_real.distribution_figure import distribution_figure
 from swarmwire.metrics.sim_to_real.sim_to_real_texts import (

@@ -1,11 +1,11 @@
-"""How a recording looks when it is opened: the arena in the middle, explained on the left, measured on the right."""
+"""The layout of a recording: the arena in the middle, explanations at the left, plots at the right."""
 
 from typing import Any, Literal
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.viewer.classes import LEGEND_LINES
-from swarmwire.metrics.viewer.selected import EYE, close_up_m
+from swarmwire.metrics.viewer.selection import EYE, close_up_m
+from swarmwire.metrics.viewer.style import LEGEND_LINES, shown
 
 TRAIL_S = 5.0
 _MARGIN = 1.03  # of the arena's half width, so that its walls are seen
@@ -149,3 +149,32 @@ def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> 
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
         plot_legend=rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom,
     )
+
+
+def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> str:
+    """Markdown: the run, and how to read the picture."""
+    size = " × ".join(f"{side:.3g}" for side in static.arena_size_m)
+    groups = ", ".join(f"{group.stop - group.start} × {group.body.name} ({group.name})" for group in static.groups)
+    lines = [
+        f"**{static.name}**, seed {static.seeds[arena]}",
+        "",
+        f"{groups} in {size} m, {static.rate_hz} ticks per second",
+        "",
+        " ".join([f"The ring marks {selected}.", *_drawn(static, selected)]),
+    ]
+    if static.range_m is not None:
+        often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"
+        lines += [
+            "",
+            f"The radio reaches {static.range_m:.3g} m: the large circle. Grey lines join robots in reach; "
+            f"coloured ones are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
+        ]
+    return "\n".join(shown(line) for line in lines)
+
+
+def _drawn(static: Static, selected: str) -> list[str]:
+    """What the selected robot's body lets the picture show of its sensors."""
+    index = static.robot_names.index(selected)
+    body = next(group.body for group in static.groups if group.start <= index < group.stop)
+    rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []
+    return [*rays, "Yellow bars: light."] if body.light else rays

@@ -1,4 +1,4 @@
-"""A recording of a run for rerun's viewer: the arena as it moves, and its metrics over time, in one file."""
+"""Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
 
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,11 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.event_log import names
 from swarmwire.metrics.record.chunk_limit import ChunkLimit
-from swarmwire.metrics.viewer.about import about
-from swarmwire.metrics.viewer.arena import RerunArena
-from swarmwire.metrics.viewer.layout import layout
-from swarmwire.metrics.viewer.plots import RerunPlots
-from swarmwire.metrics.viewer.plotted import Measured
+from swarmwire.metrics.viewer.layout import about, layout, page_layout
+from swarmwire.metrics.viewer.plots import Measured, RerunPlots
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.metrics.viewer.scene import RerunArena
+from swarmwire.metrics.viewer.selection import selected_robot
 
 ROOM_BYTES = 1_000_000  # for what is written before the first tick
 # Of each block rerun keeps two or three kilobytes an entity until the file is closed, 37 kB for a swarm with a radio.
@@ -123,3 +121,36 @@ class RerunRecording(Observer):
             finally:
                 self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
+
+
+class RerunLive(RerunRecording):
+    """Observer that draws one arena of a run in the viewer at a URL, which shows the newest tick.
+
+    For a process of its own: a call waits for a viewer that does not take what it is sent.
+    """
+
+    _send_bytes = 0  # people wait for it
+
+    def __init__(
+        self,
+        url: str,
+        metrics: Measured,
+        clock: Clock,
+        arena: int = 0,
+        selected: str | None = None,
+        *,
+        page: bool = False,
+    ) -> None:
+        """Draw in the viewer at "rerun+http://…/proxy", laid out for the `page` if that is it.
+
+        BadInput without the extra [view].
+        """
+        super().__init__(None, metrics, clock, arena, selected)
+        self._url, self._page = url, page
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        return page_layout(static, selected) if self._page else layout(static, selected, "following")
+
+    def _connect(self, layout: Any) -> None:
+        self._arena_view.links_every_ticks = 1  # whoever publishes the ticks has thinned the links already
+        self._rec.connect_grpc(self._url, default_blueprint=layout)

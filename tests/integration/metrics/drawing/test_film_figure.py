@@ -9,11 +9,11 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle, Static
+from swarmwire.metrics.drawing.animation import FilmFigure
 from swarmwire.metrics.drawing.film import NO_STATE, Film
-from swarmwire.metrics.drawing.film_figure import FilmFigure
-from swarmwire.metrics.drawing.looks import DEAD, OTHER_STATE, STATE_COLORS
-from swarmwire.metrics.drawing.radio_range import in_range
-from swarmwire.metrics.drawing.scenario_sheet import _facts
+from swarmwire.metrics.drawing.scenario import _facts
+from swarmwire.metrics.drawing.style import DEAD, OTHER_STATE, STATE_COLORS
+from swarmwire.metrics.drawing.swarm import in_range
 from swarmwire.metrics.palette import robot_color
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 

@@ -9,9 +9,7 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group
-from swarmwire.metrics.drawing.film_figure import FilmFigure
-from swarmwire.metrics.drawing.gif import write_gif
-from swarmwire.metrics.drawing.mp4 import write_mp4
+from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
 from swarmwire.metrics.palette import robot_color
 from tests.support.metrics.films import film, two_groups
 

@@ -5,16 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from swarmwire.metrics.report.campaign.levels import MAX_LEVELS, levels_of
-from swarmwire.metrics.report.campaign.rounding import rounding_of
-from swarmwire.metrics.report.figures.distributions import Group, distributions
-from swarmwire.metrics.report.figures.heat_map import heat_map
-from swarmwire.metrics.report.figures.log_axis import fits_log
-from swarmwire.metrics.report.figures.resilience_curve import FittedShape, resilience_curve
-from swarmwire.metrics.report.figures.response_curve import Jump, MedianLine, response_curve
-from swarmwire.metrics.report.figures.scaling_curve import scaling_curve
-from swarmwire.metrics.report.figures.survival_curves import SurvivalCurve, survival_curves
-from swarmwire.metrics.report.svg import as_svg
+from swarmwire.metrics.report.axes import fits_log
+from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
+from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
+from swarmwire.metrics.report.charts_models import (
+    FittedShape,
+    SurvivalCurve,
+    resilience_curve,
+    scaling_curve,
+    survival_curves,
+)
+from swarmwire.metrics.report.page import as_svg
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.report.campaign.campaign_report import campaign_report
-from swarmwire.metrics.report.page import page
-from swarmwire.metrics.report.write_report import write_report
+from swarmwire.metrics.report.campaign import campaign_report
+from swarmwire.metrics.report.page import page, write_report
 from tests.support.metrics.campaign.campaigns import write_campaign
 from tests.support.metrics.report.pages import Page, check_alone
 

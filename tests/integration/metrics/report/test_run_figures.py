@@ -8,19 +8,12 @@ import pytest
 
 from swarmwire.comms.packets import Fate
 from swarmwire.metrics.network.latency import Latencies
-from swarmwire.metrics.report.lanes import Lane, Span, lanes_of
-from swarmwire.metrics.report.run_figures.delivery_by_distance import delivery_by_distance
-from swarmwire.metrics.report.run_figures.latency_histogram import latency_histogram, percentiles
-from swarmwire.metrics.report.run_figures.link_histogram import link_histogram
-from swarmwire.metrics.report.run_figures.link_matrix import link_matrix
-from swarmwire.metrics.report.run_figures.paths import MAX_PATHS, MAX_POINTS, paths_of
-from swarmwire.metrics.report.run_figures.small_panels import MAX_PANELS, small_panels
-from swarmwire.metrics.report.run_figures.timeline import Curve, timeline
-from swarmwire.metrics.report.run_figures.trajectories import trajectories
-from swarmwire.metrics.report.run_sections.latencies import acts_at_ns
-from swarmwire.metrics.report.run_sections.links import of_links
-from swarmwire.metrics.report.svg import as_svg
-from swarmwire.metrics.report.thinned import thinned
+from swarmwire.metrics.report.page import as_svg
+from swarmwire.metrics.report.run_data import Lane, Span, lanes_of, thinned
+from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_links
+from swarmwire.metrics.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
+from swarmwire.metrics.report.run_radio import acts_at_ns, delivery_by_distance, latency_histogram, percentiles
+from swarmwire.metrics.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
 from swarmwire.metrics.run_folder import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from tests.support.metrics.films import two_groups

@@ -10,14 +10,12 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.record.metric_facts import MetricFacts
+from swarmwire.metrics.report import run_timeline
 from swarmwire.metrics.report.in_words import number
-from swarmwire.metrics.report.lanes import Span
-from swarmwire.metrics.report.run_data import read_run
-from swarmwire.metrics.report.run_report import run_report
-from swarmwire.metrics.report.run_sections import what_happened
-from swarmwire.metrics.report.run_sections.measured import of_metrics
-from swarmwire.metrics.report.section import Listing, Table
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.report.page import Listing, Table, blank_figure
+from swarmwire.metrics.report.run import run_report
+from swarmwire.metrics.report.run_data import Span, read_run
+from swarmwire.metrics.report.run_metrics import of_metrics
 from swarmwire.metrics.run_folder import RunFolder
 from tests.support.metrics.radio_runs import DISK, ticks
 from tests.support.metrics.recorded import links, wandering
@@ -181,7 +179,7 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
     file = folder / "ticks.parquet"
     found = pl.when(pl.col("tick") > 11).then(1.2).alias("aggregation_time_s")
     pl.read_parquet(file).with_columns(found).write_parquet(file)
-    monkeypatch.setattr(what_happened, "timeline", lambda *of: (drawn.append(of), blank_figure(1.0, 1.0))[1])
+    monkeypatch.setattr(run_timeline, "timeline", lambda *of: (drawn.append(of), blank_figure(1.0, 1.0))[1])
     report = run_report(folder)
     [(_, _, lanes)] = drawn
     assert {lane.words: lane.spans for lane in lanes} == {
@@ -210,7 +208,7 @@ def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
     assert adds_up != is_time
     film = read_run(folder).film
     assert not isinstance(film, str)
-    [shown] = [curve for curve in what_happened.curves(film, what_happened.second(film)) if "gas" in curve.name]
+    [shown] = [curve for curve in run_timeline.curves(film, run_timeline.second(film)) if "gas" in curve.name]
     assert shown.title == "gas (ppm)"
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.viewer.picture import NoGraphics, render_png
 from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import static, truth, watch
 

@@ -11,8 +11,8 @@ from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, Reception
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.verify.finding import State
 from swarmwire.metrics.verify.recording_check import check_recording
-from swarmwire.metrics.viewer.colors import DEAD, FATES, packed
 from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.viewer.style import DEAD, FATES, packed
 from tests.support.clocks import StillClock
 from tests.support.metrics.recordings import class_names, column, moving, record, series
 from tests.support.metrics.truths import edges, static, tally, truth, watch

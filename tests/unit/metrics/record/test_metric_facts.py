@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from swarmwire.metrics.drawing.metric_axes import is_count, limits, titled
+from swarmwire.metrics.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.run_folder import RunFolder

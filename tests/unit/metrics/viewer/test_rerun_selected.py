@@ -9,8 +9,8 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import Group
-from swarmwire.metrics.viewer.about import about
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.metrics.viewer.layout import about
+from swarmwire.metrics.viewer.selection import selected_robot
 from tests.support.metrics.recordings import column, record
 from tests.support.metrics.truths import static, truth
 

@@ -64,7 +64,7 @@ def fit_command(
     text = radio_fit_toml(fit, antenna, file)
     print_fit(fit, str(file), Console(highlight=False, markup=False))
     if to is not None:
-        from swarmwire.metrics.drawing.radio_fit_sheet import draw_radio_fit
+        from swarmwire.metrics.drawing.radio_fit import draw_radio_fit
 
         draw_radio_fit(fit, file.name, to, size)
         typer.echo(f"written: {to}")
@@ -115,7 +115,7 @@ def _tell_network(fit: "NetworkFit", file: Path, to: Path | None, write: Path | 
     text = network_fit_toml(fit, file)
     print_network_fit(fit, str(file), Console(highlight=False, markup=False))
     if to is not None:
-        from swarmwire.metrics.drawing.network_fit_sheet import draw_network_fit
+        from swarmwire.metrics.drawing.radio_fit import draw_network_fit
 
         draw_network_fit(fit, file.name, to, size)
         typer.echo(f"written: {to}")

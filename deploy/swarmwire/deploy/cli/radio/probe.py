@@ -114,7 +114,7 @@ def _probe_scenario(
 
 
 def _draw(probe: "CoverageProbe", to: Path, size_px: int) -> None:
-    from swarmwire.metrics.drawing.coverage_sheet import draw_coverage
+    from swarmwire.metrics.drawing.radio import draw_coverage
 
     title = f"{probe.static.name}: packets of {probe.payload_bytes} bytes"
     draw_coverage(probe.static, probe.map, probe.distances, probe.sensitivity_dbm, title, to, size_px)

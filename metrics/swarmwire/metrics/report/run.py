@@ -1,0 +1,185 @@
+"""The report of a run from its folder alone, and its first section: the scenario, the course and the machine."""
+
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.drawing.film import Film
+from swarmwire.metrics.report.in_words import counted, number
+from swarmwire.metrics.report.page import Listing, Report, Section, Table
+from swarmwire.metrics.report.run_data import RunData, read_run
+from swarmwire.metrics.report.run_metrics import measured
+from swarmwire.metrics.report.run_radio import radio
+from swarmwire.metrics.report.run_timeline import what_happened
+
+_MAX_LINES = 300  # of the scenario
+_ENDED = {
+    "duration": "with its duration",
+    "stopped": "stopped",
+    "interrupted": "interrupted (Ctrl-C)",
+    "left": "left by the program that stepped it",
+    "failed": "failed",
+}
+
+
+def what_was_run(run: RunData) -> Section:
+    """The section: a table of facts, what was not as it should be, and the command that repeats the run."""
+    facts = [*_scenario(run), *_course(run), *_machine(run)]
+    again = (
+        "The folder alone is enough to run it again; on this CPU and with these versions bit for bit:"
+        if run.started
+        else "Without its `run.json` the run cannot be repeated."
+    )
+    return Section(
+        "What was run",
+        (
+            Table(("", ""), tuple(facts), ""),
+            *_not_as_it_should_be(run),
+            *_hash(run),
+            again,
+            *([Listing(f"swarmwire repeat {run.shown_name}")] if run.started else []),
+        ),
+    )
+
+
+def scenario_text(run: RunData) -> list[Section]:
+    """The scenario as run, at the end of a report; nothing if the folder lacks it."""
+    lines = run.scenario.splitlines()
+    if not lines:
+        return []
+    rest = len(lines) - _MAX_LINES
+    cut = (f"{counted(rest, 'more line')} in `scenario.toml`.",) if rest > 0 else ()
+    return [Section("The scenario", (Listing("\n".join(lines[:_MAX_LINES])), *cut))]
+
+
+def _scenario(run: RunData) -> list[tuple[str, str]]:
+    static = run.static
+    seeds = ", ".join(map(str, static.seeds[:12])) + (", …" if static.arenas > 12 else "")
+    rows = [
+        ("scenario", static.name),
+        ("seed" if static.arenas == 1 else f"seeds of {static.arenas} arenas", seeds),
+        ("robots", groups(static) + (" in each arena" if static.arenas > 1 else "")),
+        ("arena", _arena(static)),
+    ]
+    if static.range_m is not None:
+        rows.append(("radio", f"reaches {number(static.range_m)} m"))
+    return rows
+
+
+def groups(static: Static) -> str:
+    """How many robots of which kind, group by group."""
+    return ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
+
+
+def _arena(static: Static) -> str:
+    size = " × ".join(f"{side:g}" for side in static.arena_size_m)
+    around = {"walls": "walls around", "open": "open", "torus": "a torus"}[static.boundary]
+    things = [counted(len(static.obstacles[0]), "obstacle")] if static.obstacles[0] else []
+    things += [counted(len(static.lights[0]), "light")] if static.lights and static.lights[0] else []
+    return ", ".join([f"{size} m", around, *things])
+
+
+def _course(run: RunData) -> list[tuple[str, str]]:
+    summary = run.summary
+    if summary is None:
+        reached = f"recorded up to {number(float(run.film.time_s[-1]))} s" if isinstance(run.film, Film) else "no tick"
+        asked = run.started.get("ticks")
+        wanted = f" of {number(asked / run.static.rate_hz)} s" if isinstance(asked, int) else ""
+        return [("ended", f"no summary: it was killed, or goes on; {reached}{wanted}")]
+    runners = summary["runners"]
+    backend = (
+        "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
+    )
+    return [
+        ("engine", summary["engine"]),
+        ("mode", f"{summary['mode']}, {backend}"),
+        *([("stops at", "; ".join(summary["stop"]))] if summary["stop"] else []),
+        ("ended", _ended(summary)),
+        (
+            "simulated",
+            f"{number(summary['sim_time_s'])} s, {counted(summary['ticks'], 'tick')} at {run.static.rate_hz} Hz",
+        ),
+        ("took", _took(summary)),
+    ]
+
+
+def _ended(summary: dict[str, Any]) -> str:
+    how = str(_ENDED.get(summary["ended"], summary["ended"]))
+    arenas: list[dict[str, Any]] = summary["by_arena"]
+    stopped = [arena for arena in arenas if arena["stopped_by"]]
+    if len(arenas) > 1 and stopped:
+        how += f"; {len(stopped)} of {len(arenas)} arenas by what they stop at"
+    elif stopped:
+        how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
+    return f"{how}: {summary['error']}" if summary["error"] else how
+
+
+def _took(summary: dict[str, Any]) -> str:
+    return f"{number(summary['wall_time_s'])} s, {number(summary['realtime_factor'])} × real time"
+
+
+def _hash(run: RunData) -> list[str]:
+    """By what a repetition is compared: in a paragraph, since a cell so wide would be cut off on a phone."""
+    if run.summary is None:
+        return []
+    of = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
+    same = "equal exactly where two runs moved and received the same"
+    return [f"{of}: `{run.summary['trajectory_sha256'][0]}`; {same}."]
+
+
+def _machine(run: RunData) -> list[tuple[str, str]]:
+    known = run.summary or run.started
+    versions: dict[str, str] = known.get("versions") or {}
+    rows = [("CPU", str(known["cpu"]))] if "cpu" in known else []
+    told = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return [*rows, ("versions", told)] if told else rows
+
+
+def _not_as_it_should_be(run: RunData) -> list[str]:
+    """Paragraphs about what a reader should know before believing anything."""
+    summary, arenas = run.summary, run.static.arenas
+    said: list[str] = []
+    if arenas > 1:
+        said.append(
+            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so."
+        )
+    if summary is None:
+        return said
+    counts = {name: value for name, value in summary["counts"].items() if value}
+    if counts:
+        said.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
+    lost: list[Any] = summary["lost_runners"]
+    if lost:
+        said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
+    changes: list[dict[str, Any]] = summary["runner_events"]
+    moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
+    if moved:
+        said.append(f"Runners that came and went: {'; '.join(moved)}.")
+    dropped = {name: part["dropped"] for name, part in summary["record"].items() if part.get("dropped")}
+    if dropped:
+        rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
+        said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
+    readings: dict[str, list[str]] = summary["global_sensors"]
+    if readings:
+        bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in readings.items())
+        said.append(f"Bodies that know more than their surroundings: {bodies}.")
+    return said
+
+
+def run_report(folder: Path) -> Report:
+    """What was run, over time, where, the radio, the metrics: with what there is of a run that was killed or goes on.
+
+    Of several arenas the first is drawn, and tables tell of all. A table that was not recorded, or is damaged, costs
+    its figure, and the text says so. BadInput where there is no run folder, or its `static.json` or summary cannot be
+    read, or without matplotlib.
+    """
+    run = read_run(folder)
+    sections = (what_was_run(run), what_happened(run), radio(run), measured(run), *scenario_text(run))
+    return Report(run.static.name, sections, _about(run))
+
+
+def _about(run: RunData) -> str:
+    static = run.static
+    seeds = f"seed {static.seeds[0]}" if static.arenas == 1 else counted(static.arenas, "arena")
+    time_s = "killed or going on" if run.summary is None else f"{number(run.summary['sim_time_s'])} s"
+    return f"A run of {groups(static)}, {seeds}, {time_s}."

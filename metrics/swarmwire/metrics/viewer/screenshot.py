@@ -1,0 +1,190 @@
+"""Rerun's viewer as a process, and a picture of a recording that it draws without a screen."""
+
+import os
+import socket
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.extras import VIEW
+
+LEAVE_S = 5.0  # how long it may take to end when it is told to
+# Linux kills whoever asks for it (PR_SET_PDEATHSIG, 1) with its parent; if that is dead by then, nothing begins.
+ASKS = (
+    "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9); "
+    "os.getppid() == int(sys.argv[1]) or os._exit(1); os.execv(sys.argv[2], sys.argv[2:])"
+)
+
+
+def program() -> Path:
+    """The viewer. Not `rerun` on the path: that is a wrapper, and ending it would leave the viewer behind."""
+    import rerun_cli
+
+    return Path(rerun_cli.__file__).with_name("rerun")
+
+
+def free_port() -> int:
+    """A port of this machine's loopback that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def ending_with_this(command: Sequence[str]) -> list[str]:
+    """The command, such that on Linux it ends with this process, also if that is killed and cannot end it."""
+    if not sys.platform.startswith("linux"):
+        return list(command)
+    return [sys.executable, "-I", "-S", "-c", ASKS, str(os.getpid()), *command]
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """Tell the process to end, and kill it if it does not, also if it is stopped."""
+    process.terminate()
+    try:
+        process.wait(LEAVE_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def is_open(port: int) -> bool:
+    """Whether somebody listens at this port of the loopback."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
+_PAUSE_NS = NS_PER_S // 20
+_SAME_IN_A_ROW = 4
+_NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # how the viewer says that it has no Vulkan
+_Found = TypeVar("_Found")
+
+
+class NoGraphics(SwarmwireError):
+    """This machine has nothing to draw with: the viewer needs a Vulkan driver, a GPU's or Mesa's on the processor."""
+
+
+def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, int] = (1600, 900)) -> None:
+    """Write the viewer's window, of this size in pixels, with the recording at this tick (None: at its last).
+
+    The viewer is rerun's own program. It listens on this machine alone, keeps its files in a directory that goes with
+    it, and has ended when this returns. BadInput without the extra [view], the recording or the tick; NoGraphics
+    without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
+    """
+    VIEW.need("picture")
+    if png.suffix.lower() != ".png":
+        raise BadInput(str(png), "", "expected a file name that ends in .png")
+    if not rrd.is_file():
+        raise BadInput(str(rrd), "", "there is no such recording")
+    if not png.parent.is_dir():
+        raise BadInput(str(png), "", "expected a path in a folder that exists")
+    with _viewer(rrd, size) as viewer:
+        client = viewer.wait(viewer.connected)
+        state = viewer.wait(lambda: _opened(client))
+        client.set_time("sim_time", duration=_time_s(state, rrd, tick), play_state="paused")
+        png.write_bytes(viewer.wait(_still(client.take_screenshot)))
+
+
+def _time_s(state: Any, rrd: Path, tick: int | None) -> float:
+    """Where the tick is on the timeline of seconds, on which the plots are easier to read."""
+    end = {timeline.name: timeline.end for timeline in state.recordings[0].timelines}
+    if tick is None:
+        return end["sim_time"] / NS_PER_S
+    if not 0 <= tick <= end["tick"]:
+        raise BadInput(str(rrd), "tick", f"expected 0 to {end['tick']}, got {tick}")
+    # The middle of the tick: its start is rounded down to ns, and a cursor just before it would show the one before.
+    per_tick_s = end["sim_time"] / NS_PER_S / max(end["tick"], 1)
+    return min((tick + 0.5) * per_tick_s, end["sim_time"] / NS_PER_S)
+
+
+def _opened(client: Any) -> Any | None:
+    """The viewer's state once it shows the recording with its layout, else None."""
+    state = client.get_state()
+    return state if state.views and state.recordings and not state.loading else None
+
+
+def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
+    """A function that gives the picture once some in a row are the same.
+
+    After a jump in time the viewer fetches what it has not loaded yet, and its plots slide into place.
+    """
+    row: deque[bytes] = deque(maxlen=_SAME_IN_A_ROW)
+
+    def taken() -> bytes | None:
+        row.append(take())
+        return row[0] if row.count(row[0]) == _SAME_IN_A_ROW else None
+
+    return taken
+
+
+class _Viewer:
+    """A viewer's process, and waiting for what it does for as long as it lives."""
+
+    def __init__(self, process: subprocess.Popen[bytes], port: int, log: Path) -> None:
+        self._process, self._log, self._clock = process, log, WallClock()
+        self._url = f"rerun+http://127.0.0.1:{port}/proxy"
+
+    def connected(self) -> Any | None:
+        """A client, once the viewer listens."""
+        from rerun.experimental import ViewerClient
+
+        try:
+            return ViewerClient.connect(self._url)
+        except ConnectionError:
+            return None
+
+    def wait(self, ready: Callable[[], _Found | None]) -> _Found:
+        """What `ready` returns once it is not None."""
+        until_ns = self._clock.now_ns() + PATIENCE_NS
+        while self._clock.now_ns() < until_ns:
+            try:
+                found = ready()
+            except (ConnectionError, RuntimeError):  # it died while it was asked, or does not answer yet
+                found = None
+            if found is not None:
+                return found
+            if self._process.poll() is not None:
+                raise _death(self._log.read_text(encoding="utf-8", errors="replace"))
+            self._clock.sleep_until(self._clock.now_ns() + _PAUSE_NS)
+        raise SwarmwireError(f"rerun's viewer had no picture after {PATIENCE_NS // NS_PER_S} s")
+
+
+@contextmanager
+def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
+    port = free_port()
+    window = f"{size[0]}x{size[1]}"
+    options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", window]
+    with TemporaryDirectory(prefix="swarmwire-picture-") as home:
+        log = Path(home, "log")
+        with log.open("wb") as out:
+            process = subprocess.Popen([program(), *options, rrd], env=_environment(home), stdout=out, stderr=out)
+        try:
+            yield _Viewer(process, port, log)
+        finally:
+            end(process)
+
+
+def _environment(home: str) -> dict[str, str]:
+    """A home of its own: the viewer neither finds the user's settings nor leaves any, and reports to nobody.
+
+    Without a log there are no notices of it in the picture either.
+    """
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+    return {**kept, "HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "off", "NO_COLOR": "1"}
+
+
+def _death(log: str) -> SwarmwireError:
+    if any(words in log for words in _NO_GRAPHICS):
+        return NoGraphics(
+            "no graphics: rerun's viewer found no Vulkan driver; on Debian and Ubuntu `apt-get install libvulkan1 "
+            "mesa-vulkan-drivers` brings one that needs no GPU"
+        )
+    return SwarmwireError(f"rerun's viewer ended by itself:\n{log[-2000:]}")
