@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
     from swarmwire.deploy.running import run
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
 __all__ = [
     "ArenaResult",
@@ -43,7 +43,7 @@ _PLACES = {
     "Listening": "swarmwire.deploy.listening",
     "Recording": "swarmwire.deploy.record.recording",
     "Repetition": "swarmwire.deploy.repetition",
-    "RunFolder": "swarmwire.metrics.run_folder",
+    "RunFolder": "swarmwire.metrics.run_folder.reader",
     "Simulation": "swarmwire.deploy.simulation",
     "Sweep": "swarmwire.deploy.campaign.sweeping",
     "repeat": "swarmwire.deploy.repetition",

@@ -10,7 +10,7 @@ from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.live_events import LiveEventsRecord
 from swarmwire.deploy.record.origin import Origin
 from swarmwire.deploy.result import EventResult, Result, arena_result
-from swarmwire.metrics.record.recorders import record_summary
+from swarmwire.metrics.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.registry import Loss, RunnerEvent
 

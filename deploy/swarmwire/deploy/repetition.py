@@ -17,8 +17,8 @@ from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.record.names import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
+from swarmwire.metrics.run_folder.reader import RunFolder
 
 
 @dataclass(frozen=True)

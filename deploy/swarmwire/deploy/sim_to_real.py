@@ -20,8 +20,8 @@ from swarmwire.metrics.campaign.selection import select
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RobotLog
-from swarmwire.metrics.record.names import SCENARIO, STATIC
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC
+from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns, runs_of_campaign, runs_of_folder
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario

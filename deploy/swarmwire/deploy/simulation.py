@@ -47,9 +47,9 @@ from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.system_limits import need_open_files, need_threads
 from swarmwire.deploy.too_large import TooLarge
-from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.stop import StopConditions as MetricStopConditions
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend

@@ -5,8 +5,8 @@ from typing import Any, get_args
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import custom_class
 from swarmwire.metrics.metric import Kind, Metric
-from swarmwire.metrics.record.tick_columns import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.run_folder.ticks import KEYS, MOVABLE, RADIO, ROBOT_COLUMNS, SIDEWAYS, VALUE
 
 COLUMNS = {*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO}  # of the table of ticks, where each has one, too
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY, family, runners_of, started, swarmwire
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]

@@ -18,7 +18,7 @@ SMALL = ("--size", "200")
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A run folder of three seconds at 10 Hz."""
-    reader = ModuleType("swarmwire.metrics.run_folder")
+    reader = ModuleType("swarmwire.metrics.run_folder.reader")
     reader.RunFolder = Folder
     monkeypatch.setitem(sys.modules, reader.__name__, reader)
     folder = tmp_path / "run"

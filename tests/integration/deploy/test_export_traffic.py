@@ -13,8 +13,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.recording import Recording
-from swarmwire.metrics.verify.finding import State
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import ROOT
 from tests.support.metrics.capture.reading import Capture, read
 

@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.deploy.record import origin
 from swarmwire.deploy.result import Result
-from swarmwire.metrics.verify.finding import State
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY, called
 
 SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")

@@ -7,11 +7,11 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.metrics.record.part_files import part_file, parts_of
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.finding import State
-from swarmwire.metrics.verify.recording_check import check_recording
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.recording_check import check_recording
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.run_folder.writer import part_file, parts_of
 from tests.support.deploy.commands import called
 from tests.support.deploy.recorded import record_run, started
 

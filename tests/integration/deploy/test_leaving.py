@@ -16,7 +16,7 @@ from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.registry import METRICS
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS
 from tests.support.encoded_backend import EncodedBackend
 

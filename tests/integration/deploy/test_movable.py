@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.deploy import Recording, Simulation, run
 from swarmwire.metrics.drawing.film import film_of
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.deploy.layouts import run_spread
 
 PUSHER = """

@@ -11,7 +11,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
-from swarmwire.metrics.record.names import INPUTS
+from swarmwire.metrics.run_folder.layout import INPUTS
 from tests.support.deploy.commands import LOSSY, called
 
 RELAY = """

@@ -18,7 +18,7 @@ from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.inputs import RecordedBackend
 from swarmwire.deploy.record.modules import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
-from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
+from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import LOSSY, ROOT

@@ -13,7 +13,7 @@ from swarmwire.comms.truth import Truth
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.record.inputs import WITHIN
 from swarmwire.deploy.record.run_record import RunRecord
-from swarmwire.metrics.record.names import INPUTS
+from swarmwire.metrics.run_folder.layout import INPUTS
 from tests.integration.deploy.test_realtime import frames_of, runners_here
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import Watcher, interrupt

@@ -10,8 +10,8 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, repeat
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.layouts import PER_ROBOT, run_spread
 

@@ -9,8 +9,8 @@ from unittest.mock import patch
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, run
-from swarmwire.metrics.record import chunk_limit, table_writer
-from swarmwire.metrics.record.part_files import join_parts
+from swarmwire.metrics.run_folder import writer
+from swarmwire.metrics.run_folder.writer import join_parts
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.deploy.commands import LOSSY, ROOT
 
@@ -27,8 +27,8 @@ def hastily() -> Generator[None]:
         join_parts(folder, name)
 
     with (
-        patch.object(chunk_limit, "MAX_S", chunk_limit.MAX_S / 50),
-        patch.object(table_writer, "join_parts", say_and_join),
+        patch.object(writer, "MAX_S", writer.MAX_S / 50),
+        patch.object(writer, "join_parts", say_and_join),
         patch.object(RerunRecording, "_send_bytes", sys.maxsize),
     ):
         yield

@@ -9,7 +9,7 @@ import polars as pl
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.record.metric_facts import MetricFacts
+from swarmwire.metrics.run_folder.layout import MetricInfo
 
 OBSTACLES = (
     Obstacle("cylinder", 2.0, 2.0, radius_m=0.4),
@@ -72,7 +72,7 @@ class Folder:
 
     def __init__(self, path: Path, static: Static | None = None) -> None:
         self.path, self.static = path, static or two_groups()
-        self.measured: dict[str, MetricFacts] = {}
+        self.measured: dict[str, MetricInfo] = {}
 
     def ticks(self, arena: int | None = None) -> pl.DataFrame:
         whole = self.path / "ticks.parquet"

@@ -7,7 +7,8 @@ import numpy as np
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.record.recorders import record_summary, recorders
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import record_summary, recorders
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch
 
@@ -15,7 +16,7 @@ from tests.support.metrics.truths import truth, watch
 def record(folder: Path, of, ticks, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
-    observers = [metrics, *recorders(folder, metrics, StillClock(), **options)]
+    observers = [metrics, *recorders(RecordOptions(folder, metrics, StillClock(), **options))]
     watch(of, ticks, *observers)
     parts = {}
     for observer in observers:

@@ -12,9 +12,9 @@ from swarmwire.deploy.record.origin import read_origin
 from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.verify import verify
 from tests.tools.soak.supervised import family
 
 COMES = ("joined", "returned")

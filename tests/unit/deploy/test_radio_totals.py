@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY, ROOT
 from tests.support.deploy.layouts import run_spread
 

@@ -8,11 +8,11 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.record import table_writer
-from swarmwire.metrics.record.part_files import write_file
-from swarmwire.metrics.record.tick_recorder import TickRecorder
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder import writer
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.ticks import TickRecorder
+from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.run_folder.writer import write_file
 from tests.support.clocks import GoingClock
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.layouts import run_spread
@@ -123,7 +123,7 @@ def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path
             raise OSError(28, "No space left on device")
         write_file(frame, path)
 
-    monkeypatch.setattr(table_writer, "write_file", full)
+    monkeypatch.setattr(writer, "write_file", full)
     metrics, keeper = Metrics(), Keeper()
     recorder = TickRecorder(tmp_path, metrics, GoingClock(NS_PER_S // 10))
     result = run(LOSSY, overrides=["duration_s=8"], observers=[metrics, recorder, keeper])

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, run
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.layouts import run_spread
 

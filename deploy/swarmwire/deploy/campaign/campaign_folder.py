@@ -25,8 +25,8 @@ from swarmwire.deploy.campaign.taken import taken
 from swarmwire.deploy.campaign.task import Row, TaskResult
 from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.campaign.formats import FAILED, PARTS, SERIES, SUMMARY
-from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.writer import PARQUET
 from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 if TYPE_CHECKING:

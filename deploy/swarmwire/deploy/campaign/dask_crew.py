@@ -21,7 +21,7 @@ from swarmwire.deploy.campaign.dask_fitness import Fitness, code_fault
 from swarmwire.deploy.campaign.dask_worker import about, receive, work
 from swarmwire.deploy.campaign.executor import Finished
 from swarmwire.deploy.campaign.task import Task, result_from, task_message
-from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.metrics.run_folder.layout import SCENARIO
 
 NO_LIMIT = 2**31
 News = Finished | ClusterFailed

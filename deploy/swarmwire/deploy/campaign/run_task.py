@@ -107,7 +107,7 @@ def _joined(parts: list[TaskResult]) -> TaskResult:
         return TaskResult(rows, series[0] if series else None)
     import polars as pl
 
-    from swarmwire.metrics.record.part_files import PARQUET
+    from swarmwire.metrics.run_folder.writer import PARQUET
 
     file = BytesIO()
     pl.concat([pl.read_parquet(BytesIO(of)) for of in series]).write_parquet(file, **PARQUET)

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from swarmwire.metrics.atomic import atomic_write
-from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.run_folder.writer import PARQUET
 from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 MEND = "without the file its runs stay in the table, but not their series"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.run_folder.writer import PARQUET
 
 Values = NDArray[np.float32]
 

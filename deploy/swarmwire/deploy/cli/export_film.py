@@ -40,7 +40,7 @@ def export_film(
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.animation import FilmFigure
     from swarmwire.metrics.drawing.film import film_of, footage
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))
     check_output_path(to, (f".{kind}",))

@@ -16,7 +16,7 @@ def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metri
     from swarmwire.metrics.drawing.animation import FilmFigure
     from swarmwire.metrics.drawing.canvas import check_picture
     from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
     film = film_of(RunFolder(run), arena, str(run))
     check_picture(to)
@@ -27,7 +27,7 @@ def export_picture(run: Path, to: Path, arena: int, at: str, size_px: int, metri
 def export_distances(run: Path, to: Path, arena: int, size_px: int) -> None:
     """Draw the share of receivers that received, over distance."""
     from swarmwire.metrics.drawing.radio import draw_distances
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
     draw_distances(RunFolder(run), arena, to, size_px)
 

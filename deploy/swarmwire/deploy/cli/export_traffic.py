@@ -8,7 +8,7 @@ from swarmwire.comms.errors import BadInput
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
     from swarmwire.metrics.capture.link_headers import Link
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
 SUFFIX = ".pcapng"
 MAX_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
@@ -22,8 +22,7 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     from swarmwire.comms.clock import to_ns
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.capture.pcapng import frames_on_air, write_capture
-    from swarmwire.metrics.run_folder import RunFolder
-    from swarmwire.metrics.verify.sound_table import sound_table
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
     check_output_path(to, (SUFFIX,))
     _check_times(from_s, until_s)
@@ -31,7 +30,7 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     if not 0 <= arena < folder.static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
     radio, link = _radio_of(folder, run)
-    packets = sound_table(folder, "packets", folder.packets(arena))
+    packets = folder.validated("packets", arena)
     first_ns = 0 if from_s is None else to_ns(from_s)
     stop_ns = None if until_s is None else to_ns(until_s)
     frames = (
@@ -54,7 +53,7 @@ def _check_times(from_s: float | None, until_s: float | None) -> None:
 def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     """The radio of a run whose packets were recorded, and the kind of link that captures know it as."""
     from swarmwire.metrics.capture.link_headers import link_of
-    from swarmwire.metrics.record.names import SCENARIO
+    from swarmwire.metrics.run_folder.layout import SCENARIO
     from swarmwire.world.scenario_file import load_scenario
 
     radio = load_scenario(run / SCENARIO).radio

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.metrics.record.names import RECORDING
+from swarmwire.metrics.run_folder.layout import RECORDING
 
 
 def screenshot_command(

@@ -20,7 +20,7 @@ def verify_command(
 
     Exit code 0: intact; 1: incomplete or damaged (what a killed run left can still be read); 2: no run folder.
     """
-    from swarmwire.metrics.verify.verify import verify
+    from swarmwire.metrics.run_folder.verify import verify
 
     findings = verify(folder)
     console = Console(highlight=False)

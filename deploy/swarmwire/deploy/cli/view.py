@@ -10,7 +10,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
 from swarmwire.deploy.cli.with_parent import WithParent, standard_input_closed
-from swarmwire.metrics.record.names import RECORDING
+from swarmwire.metrics.run_folder.layout import RECORDING
 
 if TYPE_CHECKING:
     from swarmwire.deploy.live.showing import RadioModel

@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord, Static
-from swarmwire.metrics.event_log import names
+from swarmwire.metrics.run_folder.events import names
 
 NAMED = 5  # robots of an event, at most
 MAX_WHO = 200  # events; the status tells of no more either

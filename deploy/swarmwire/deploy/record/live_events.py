@@ -16,7 +16,7 @@ from typing import Any, cast
 
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.record.names import LIVE_EVENTS
+from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.record.names import LOG
+from swarmwire.metrics.run_folder.layout import LOG
 
 
 def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:

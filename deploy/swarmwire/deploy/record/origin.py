@@ -17,9 +17,7 @@ from swarmwire.deploy.record.modules import changed_modules, module_digests
 from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.record.formats import RUN_FORMAT
-from swarmwire.metrics.record.metric_facts import MetricFacts, facts_in, facts_of
-from swarmwire.metrics.record.names import RUN_JSON
+from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, MetricInfo, metric_info, metric_infos
 from swarmwire.world.scenario.scenario import Scenario
 
 
@@ -36,7 +34,7 @@ class Origin:
     cpu: str
     versions: Mapping[str, str]
     gateways: Mapping[str, str]  # by group: of which kind it has one
-    metrics: tuple[MetricFacts, ...]  # that were measured
+    metrics: tuple[MetricInfo, ...]  # that were measured
     subtick_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
@@ -78,7 +76,7 @@ def origin_of(
         cpu=machine.cpu(),
         versions=machine.versions(),
         gateways=gateways,
-        metrics=tuple(facts_of(metric) for metric in metrics),
+        metrics=tuple(metric_info(metric) for metric in metrics),
         subtick_s=subtick_s,
     )
     if folder:
@@ -118,6 +116,6 @@ def _origin(found: dict[str, Any]) -> Origin:
         cpu=str(found["cpu"]),
         versions=dict(found["versions"]),
         gateways=dict(found["gateways"]),
-        metrics=facts_in(found),
+        metrics=metric_infos(found),
         subtick_s=None if found["subtick_s"] is None else float(found["subtick_s"]),
     )

@@ -22,9 +22,10 @@ from swarmwire.deploy.record.trajectory_log import TrajectoryLog
 from swarmwire.deploy.refusals import refusal
 from swarmwire.deploy.result import Result
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.record.names import RECORDING, SUMMARY
-from swarmwire.metrics.record.recorders import recorders
-from swarmwire.metrics.record.run_log import RunLog
+from swarmwire.metrics.run_folder.layout import RECORDING, SUMMARY
+from swarmwire.metrics.run_folder.log import RunLog
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import recorders
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.world.backends.join_policy import ListenSettings
 from swarmwire.world.live_events import LiveEvent
@@ -70,13 +71,7 @@ class RunRecord:
         if what.tables:
             topics = {DICT_TAG: "dict"} | {kind.tag: kind.__name__ for kind in message_classes()}
             found += recorders(
-                folder,
-                metrics,
-                clock,
-                packets=what.packets,
-                topics=topics,
-                links=what.links,
-                may_drop=may_drop,
+                RecordOptions(folder, metrics, clock, what.packets, topics, links=what.links, may_drop=may_drop)
             )
         if what.rrd:
             found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=what.select))

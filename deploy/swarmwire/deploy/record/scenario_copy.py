@@ -20,7 +20,7 @@ import tomli_w
 from swarmwire.comms.config import from_toml
 from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
-from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of

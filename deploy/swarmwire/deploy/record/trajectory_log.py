@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.metrics.record.names import DIGEST_BYTES, DIGESTS
+from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS
 
 Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
 

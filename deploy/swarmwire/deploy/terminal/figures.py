@@ -9,8 +9,8 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
-from swarmwire.metrics.event_log import names
 from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.events import names
 
 SHOWN = ("order", "largest_component", "components")  # of the metrics
 HISTORY_S = 60  # simulated; one value a second

@@ -10,7 +10,7 @@ from swarmwire.deploy.record.scenario_copy import FILES, copy_scenario
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.trial import Trial
 from swarmwire.deploy.tuning.tuning import Tuning, scenario_file
-from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.world.scenario_file import load_scenario
 
 FILE = "best.toml"

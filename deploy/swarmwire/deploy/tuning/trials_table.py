@@ -9,7 +9,7 @@ from swarmwire.deploy.tuning.search import Search
 from swarmwire.deploy.tuning.trial import Trial
 from swarmwire.deploy.tuning.tuning import Tuning
 from swarmwire.metrics.atomic import atomic_write
-from swarmwire.metrics.record.part_files import PARQUET
+from swarmwire.metrics.run_folder.writer import PARQUET
 
 FILE = "trials.parquet"
 

@@ -15,7 +15,7 @@ from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.search import Parameter, Search
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.record.names import SCENARIO
+from swarmwire.metrics.run_folder.layout import SCENARIO
 
 ABOUT = "tuning.json"
 FORMAT = 1

@@ -9,9 +9,9 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
-from swarmwire.metrics.record.metric_facts import MetricFacts
-from swarmwire.metrics.record.tick_columns import MOVABLE
 from swarmwire.metrics.registry import LINK_PDR
+from swarmwire.metrics.run_folder.layout import MetricInfo
+from swarmwire.metrics.run_folder.ticks import MOVABLE
 
 if TYPE_CHECKING:
     import polars as pl
@@ -29,7 +29,7 @@ class Recorded(Protocol):
         ...
 
     @property
-    def measured(self) -> Mapping[str, MetricFacts]:
+    def measured(self) -> Mapping[str, MetricInfo]:
         """What each metric says of itself, by name."""
         ...
 
@@ -51,7 +51,7 @@ class Film:
     state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
     state_names: tuple[str, ...] = ()
     # By name, of what the run measured.
-    facts: Mapping[str, MetricFacts] = field(default_factory=dict[str, MetricFacts])
+    facts: Mapping[str, MetricInfo] = field(default_factory=dict[str, MetricInfo])
     movable: AnyArray | None = None  # (T, k, 3) where movable obstacles were; None: there are none
 
     def movable_at(self, index: int) -> tuple[Obstacle, ...]:

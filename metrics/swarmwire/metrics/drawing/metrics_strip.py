@@ -11,20 +11,20 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.drawing.canvas import Layout
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.style import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.record.metric_facts import MetricFacts, facts_of
 from swarmwire.metrics.registry import LINK_PDR, METRICS
+from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 
-Facts = Mapping[str, MetricFacts]
+Facts = Mapping[str, MetricInfo]
 UNKNOWN: Facts = {}
 
 
-def told_of(name: str, facts: Facts) -> MetricFacts:
+def told_of(name: str, facts: Facts) -> MetricInfo:
     """What is known of a metric: nothing but its name, at the least."""
     if name in facts:
         return facts[name]
     if name in METRICS:
-        return facts_of(METRICS[name])
-    return MetricFacts(name, "", "", "level", (None, None))
+        return metric_info(METRICS[name])
+    return MetricInfo(name, "", "", "level", (None, None))
 
 
 def is_count(name: str, facts: Facts = UNKNOWN) -> bool:

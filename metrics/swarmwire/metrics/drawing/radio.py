@@ -27,9 +27,8 @@ from swarmwire.metrics.drawing.style import (
     Look,
     plain_axes,
 )
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
-from swarmwire.metrics.verify.sound_table import sound_table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -87,7 +86,7 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
     static = run.static
     if not 0 <= arena < static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {static.arenas - 1}, got {arena}")
-    table = received_bins(sound_table(run, "radio_distances", run.radio_distances(arena)))
+    table = received_bins(run.validated("radio_distances", arena))
     if not len(table):
         raise BadInput("--pdr", "", "expected a run in which packets went on air")
     figure = new_figure(LONG_SIDE_IN, _DELIVERY_HEIGHT_IN, size_px)

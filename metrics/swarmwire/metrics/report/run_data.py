@@ -13,11 +13,10 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.record.names import SCENARIO
 from swarmwire.metrics.report.in_words import counted
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors
-from swarmwire.metrics.verify.sound_table import sound_table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -137,13 +136,8 @@ class RunData:
         """`events`, `radio_distances` or `radio_links`, or why it cannot be had: not recorded, or damaged."""
         if not self.folder.files(name) and not (self.folder.path / name).is_dir():
             return f"`{name}` was not recorded."
-        read = {
-            "events": self.folder.events,
-            "radio_distances": self.folder.radio_distances,
-            "radio_links": self.folder.radio_links,
-        }[name]
         try:
-            return sound_table(self.folder, name, read(arena))
+            return self.folder.validated(name, arena)
         except BadInput as error:
             return f"{error}."
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.metrics_strip import is_count, told_of
-from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.page import Section, Table
 from swarmwire.metrics.report.run_data import RunData
+from swarmwire.metrics.run_folder.layout import MetricInfo
 
 STATISTICS = ("final", "mean", "min", "max")
 _KINDS = {"level": "", "count": "adds up", "time": "a time"}
@@ -63,7 +63,7 @@ def _statistics(value: FloatArray, adds_up: bool) -> dict[str, float | None]:
     return {"final": final, "mean": float(each.mean()), "min": float(each.min()), "max": float(each.max())}
 
 
-def _about(of: MetricFacts) -> tuple[str, str]:
+def _about(of: MetricInfo) -> tuple[str, str]:
     """Its unit, and what it is."""
     return of.unit, "; ".join(filter(None, (of.help or "the user's own", _KINDS.get(of.kind))))
 

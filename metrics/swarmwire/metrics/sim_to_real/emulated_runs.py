@@ -11,7 +11,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.formats import SERIES
 from swarmwire.metrics.campaign.selection import Selection
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.metrics.event_log import names
-from swarmwire.metrics.record.chunk_limit import ChunkLimit
+from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.run_folder.writer import ChunkLimit
 from swarmwire.metrics.viewer.layout import about, layout, page_layout
 from swarmwire.metrics.viewer.plots import Measured, RerunPlots
 from swarmwire.metrics.viewer.rows import RerunRows

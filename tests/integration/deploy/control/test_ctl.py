@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live.live_file import read_live
-from swarmwire.metrics.record.names import LIVE_EVENTS
+from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY, started
 from tests.support.waiting import until
 

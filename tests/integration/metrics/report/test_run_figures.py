@@ -14,7 +14,7 @@ from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_l
 from swarmwire.metrics.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
 from swarmwire.metrics.report.run_radio import acts_at_ns, delivery_by_distance, latency_histogram, percentiles
 from swarmwire.metrics.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from tests.support.metrics.films import two_groups
 from tests.support.metrics.radio_runs import RADIOS, ticks

@@ -9,14 +9,14 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import EventRecord
-from swarmwire.metrics.record.metric_facts import MetricFacts
 from swarmwire.metrics.report import run_timeline
 from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.page import Listing, Table, blank_figure
 from swarmwire.metrics.report.run import run_report
 from swarmwire.metrics.report.run_data import Span, read_run
 from swarmwire.metrics.report.run_metrics import of_metrics
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.metrics.run_folder.layout import MetricInfo
+from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.metrics.radio_runs import DISK, ticks
 from tests.support.metrics.recorded import links, wandering
 from tests.support.metrics.report.run_folders import run_folder
@@ -194,8 +194,8 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
 def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
     of = static(3)
     folder = run_folder(tmp_path, of, wandering(of, 20), summary=False)
-    gas = MetricFacts("gas", "what it smells of", "ppm", "count", (0.0, None))
-    found = MetricFacts("gas_found", "when it did", "s", "time", (0.0, None))
+    gas = MetricInfo("gas", "what it smells of", "ppm", "count", (0.0, None))
+    found = MetricInfo("gas_found", "when it did", "s", "time", (0.0, None))
     started = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(json.dumps({**started, "metrics": [asdict(gas), asdict(found)]}))
     file = folder / "ticks.parquet"

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from swarmwire.metrics.event_log import EventLog
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.run_folder.events import EventLog
 from tests.support.metrics.recorded import record
 from tests.support.metrics.summaries import made_up_summary
 from tests.support.metrics.truths import watch

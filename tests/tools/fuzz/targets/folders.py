@@ -13,10 +13,10 @@ from swarmwire.metrics.radio_fit.logs import is_network_table, network_log_of_ro
 from swarmwire.metrics.real_log.clock_offsets import in_step
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.truths import real_run
-from swarmwire.metrics.record.names import RECORDING, SCENARIO
 from swarmwire.metrics.report.run_data import read_run
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.layout import RECORDING, SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY
 from tests.support.metrics.campaign.campaigns import write_campaign
 from tests.support.metrics.real_log.as_logs import as_logs

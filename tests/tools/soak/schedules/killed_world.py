@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.deploy import repeat
-from swarmwire.metrics.record.names import DIGESTS
-from swarmwire.metrics.verify.finding import State
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.layout import DIGESTS
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.waiting import until
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken

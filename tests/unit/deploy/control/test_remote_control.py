@@ -7,7 +7,7 @@ import pytest
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.control.remote_control import Refused
 from swarmwire.deploy.live.live_file import Live, read_live
-from swarmwire.metrics.record.names import LIVE_EVENTS
+from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.control.going import at_tick, going
 from tests.support.waiting import until

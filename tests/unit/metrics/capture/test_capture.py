@@ -12,7 +12,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import pcapng
 from swarmwire.metrics.capture.link_headers import link_of
 from swarmwire.metrics.capture.pcapng import Frame, frames_on_air
-from swarmwire.metrics.record.packet_columns import packet_schema
+from swarmwire.metrics.run_folder.packets import Packets
 from tests.support.metrics.capture.reading import Captured, read
 from tests.unit.world.scenario.test_radio_tables import radio_of
 
@@ -21,8 +21,8 @@ NAMES = ("a-0", "a-1", "a-2")
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
     usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
-    whole = [{**dict.fromkeys(packet_schema()), **usual, **row} for row in rows]
-    return pl.DataFrame(whole, schema=packet_schema())
+    whole = [{**dict.fromkeys(Packets().schema()), **usual, **row} for row in rows]
+    return pl.DataFrame(whole, schema=Packets().schema())
 
 
 def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():

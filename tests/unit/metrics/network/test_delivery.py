@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network import link_counts
-from swarmwire.metrics.network.link_counts import LinkCounts
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.network.robot_counts import RobotCounts
+from swarmwire.metrics.run_folder import links as links_table
+from swarmwire.metrics.run_folder.links import LinkCounts
+from swarmwire.metrics.run_folder.robots import RobotCounts
 from tests.support.comms.radio.runs import make_medium, packets
 from tests.support.metrics.radio_runs import radio_runs, rows_of
 from tests.support.metrics.recorded import links
@@ -154,7 +154,7 @@ def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, 
     of, seen = run
     counts, expected = LinkCounts(of), Counter()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(link_counts, "WAITING_ROWS", waiting)
+        patch.setattr(links_table, "WAITING_ROWS", waiting)
         for one in seen:
             counts.see(one.finished)
             expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)

@@ -1,0 +1,49 @@
+"""The files of a run folder by name, their formats, and what run.json lists of the metrics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isinf
+from typing import Any
+
+from swarmwire.metrics.metric import Metric
+
+SUMMARY = "summary.json"  # written last: where it is, the run is over
+RUN_JSON = "run.json"  # from what the run was made, written first
+SCENARIO = "scenario.toml"  # as run, with overrides and seed
+STATIC = "static.json"  # arena, bodies and names: what does not change
+RECORDING = "run.rrd"  # for the viewer
+DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
+INPUTS = "inputs/actions.frames"  # what came from outside
+LIVE_EVENTS = "live_events.jsonl"  # what people did to it while it went on
+LOG = "log.txt"  # what people were told
+DIGEST_BYTES = 8  # of each tick in DIGESTS
+SUMMARY_FORMAT = 1  # of summary.json
+RUN_FORMAT = 1  # of run.json
+TABLES_FORMAT = 1  # of static.json, which has it, and of the tables
+
+
+@dataclass(frozen=True)
+class MetricInfo:
+    """A metric that a run measured."""
+
+    name: str
+    help: str  # one line: formula and unit
+    unit: str
+    kind: str  # "level", "count" or "time"
+    bounds: tuple[float | None, float | None]  # least and largest value of a tick; None: there is none
+
+
+def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
+    """What it says of itself."""
+    least, largest = (None if bound is None or isinf(bound) else float(bound) for bound in metric.bounds)
+    return MetricInfo(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
+
+
+def metric_infos(started: Mapping[str, Any]) -> tuple[MetricInfo, ...]:
+    """The metrics that `run.json` lists; KeyError, TypeError or ValueError if it does not list them as a run does."""
+    return tuple(_info(item) for item in started["metrics"])
+
+
+def _info(item: Any) -> MetricInfo:
+    least, largest = item["bounds"]
+    return MetricInfo(item["name"], item["help"], item["unit"], item["kind"], (least, largest))
