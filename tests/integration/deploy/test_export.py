@@ -4,11 +4,13 @@ import sys
 from types import ModuleType
 
 import numpy as np
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.app import app
+from swarmwire.metrics.drawing.film import film_of
 from tests.support.metrics.films import Folder, film, ticks_frame
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -44,21 +46,28 @@ def test_a_picture_is_of_the_end_unless_a_time_is_named(run, tmp_path):
     assert export(run, *SMALL).startswith(f"written: {run}/picture.png (")
     end = pixels(run / "picture.png")
     assert max(end.shape) == 200
-    for name, time in (("bare", []), ("end", ["end"]), ("last", ["2.9"]), ("first", ["0"])):
-        export(run, *SMALL, "--to", tmp_path / f"{name}.png", "--png", *time)
-    for name, same in (("bare", True), ("end", True), ("last", True), ("first", False)):
+    for name, time, same in (("end", [], True), ("last", ["--at", "2.9"], True), ("first", ["--at", "0"], False)):
+        export(run, *SMALL, "--to", tmp_path / f"{name}.png", *time)
         assert np.array_equal(pixels(tmp_path / f"{name}.png"), end) == same
 
 
-def test_a_bare_png_may_stand_before_the_run_folder(run):
-    export("--png", run, *SMALL)
-    assert (run / "picture.png").exists()
+def test_a_table_holds_the_metrics_over_time(run, tmp_path):
+    of, to = film(ticks=30), tmp_path / "metrics.csv"
+    assert export(run, "--to", to) == f"written: {to} (30 rows)\n"
+    table = pl.read_csv(to)
+    assert table.columns == ["time_s", *film_of(Folder(run), 0, "run").metrics]
+    assert table["time_s"].to_list() == of.time_s.tolist()
+    np.testing.assert_array_equal(table["order"].cast(float).to_numpy(), of.metrics["order"])
+    export(run, "--to", to, "--metric", "order", "--from", "1", "--until", "2")
+    part = pl.read_csv(to)
+    assert part.columns == ["time_s", "order"]
+    assert part["time_s"].to_list() == [at_s for at_s in of.time_s.tolist() if 1.0 <= at_s <= 2.0]
 
 
 def test_a_gif_lasts_as_long_as_the_run_and_says_what_it_is(run):
     from PIL import Image
 
-    told = export(run, "--gif", *SMALL)
+    told = export(run, "--to", run / "film.gif", *SMALL)
     assert told.splitlines()[0] == "30 frames, 10 a second, 1 x real time"
     assert told.splitlines()[1].startswith(f"written: {run}/film.gif (")
     with Image.open(run / "film.gif") as gif:
@@ -70,7 +79,7 @@ def test_an_mp4_is_of_the_time_and_speed_asked_for(run, tmp_path):
     import imageio_ffmpeg
 
     to = tmp_path / "a.mp4"
-    told = export(run, "--mp4", "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
+    told = export(run, "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
     assert told.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
     assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
 
@@ -82,7 +91,7 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
     whole.unlink()
     (run / "ticks").mkdir()
     ticks_frame(film(ticks=12)).write_parquet(run / "ticks" / "part-0.parquet")
-    export(run, "--gif", *SMALL)
+    export(run, "--to", run / "film.gif", *SMALL)
     with Image.open(run / "film.gif") as gif:
         assert gif.n_frames == 12
 
@@ -90,16 +99,19 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
 @pytest.mark.parametrize(
     ("arguments", "place", "expected"),
     [
-        (["--gif", "--mp4"], "export", "one of --png, --gif, --mp4 and --pdr"),
-        (["--png", "3", "--gif"], "export", "one of --png, --gif, --mp4 and --pdr"),
-        (["--png", "7"], "--png", "0 to 2.9 s, or end"),
-        (["--png", "nan"], "--png", "0 to 2.9 s, or end"),
-        (["--fps", "5"], "--fps", "--gif or --mp4"),
-        (["--gif", "--until", "9"], "--until", "0 to 2.9 s"),
+        (["--at", "7"], "--at", "0 to 2.9 s"),
+        (["--at", "nan"], "--at", "0 to 2.9 s"),
+        (["--fps", "5"], "--fps", ".gif, .mp4"),
+        (["--to", "a.gif", "--at", "1"], "--at", ".png"),
+        (["--to", "a.gif", "--kind", "arena"], "--kind", "film"),
+        (["--kind", "arenas"], "--kind", "arena, delivery, viewer (did you mean arena?)"),
+        (["--to", "a.gif", "--until", "9"], "--until", "0 to 2.9 s"),
         (["--arena", "1"], "RUN: arena", "0 to 0"),
         (["--metric", "ordr"], "--metric: ordr", "order, min_gap"),
-        (["--mp4", "--to", "a.gif"], "a.gif", ".mp4"),
-        (["--gif", "--size", "5"], "--size", "100 to 8000 pixels"),
+        (["--to", "a.csv", "--metric", "ordr"], "--metric: ordr", "order"),
+        (["--to", "a.csv", "--from", "9"], "--from", "0 to 2.9 s"),
+        (["--to", "a.avi"], "a.avi", ".gif, .mp4"),
+        (["--to", "a.gif", "--size", "5"], "--size", "100 to 8000 pixels"),
     ],
 )
 def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch, arguments, place, expected):
@@ -114,7 +126,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch,
 def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
     from swarmwire.metrics.drawing.animation import FilmFigure
 
-    export(run, "--mp4", *SMALL)
+    export(run, "--to", run / "film.mp4", *SMALL)
     before = (run / "film.mp4").read_bytes()
     frame = FilmFigure.frame
 
@@ -125,6 +137,6 @@ def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
 
     monkeypatch.setattr(FilmFigure, "frame", failing)
     with pytest.raises(RuntimeError, match="half way"):
-        export(run, "--mp4", *SMALL)
+        export(run, "--to", run / "film.mp4", *SMALL)
     assert (run / "film.mp4").read_bytes() == before
     assert {path.name for path in run.iterdir()} == {"ticks.parquet", "film.mp4"}

@@ -94,8 +94,9 @@ def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
 
 
 FAULTS = [
-    (["--gif"], "--to"),
-    (["--pdr"], "--to"),
+    (["--at", "1"], "--at"),
+    (["--kind", "delivery"], "--kind"),
+    (["--fps", "5"], "--fps"),
     (["--from", "5", "--until", "4"], "--until"),
     (["--from", "0.1", "--until", "0.1"], "--until"),
     (["--from", "nan"], "--from"),

@@ -64,7 +64,7 @@ OF_COMMANDS = [
     (f"run {LOSSY} --runners all", '--runners: expected "none", "per-robot" or 1 to 20 (the robots), got \'all\''),
     ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe tells about a single thing"),
     ("describe flokking", "flokking: nothing has this name; nearest: Flocking (swarmwire list names all)"),
-    ("export absent --gif", "absent: expected a run folder: there is none"),
+    ("export absent --to film.gif", "absent: expected a run folder: there is none"),
     ("certs issue absent a", "absent: expected a CA's folder: swarmwire certs init absent"),
     (
         "certs issue ca a/b",

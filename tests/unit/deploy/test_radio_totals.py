@@ -54,7 +54,7 @@ def test_the_commands_record_links_and_draw_the_ratio_over_distance(tmp_path):
     for name in ("age_of_information", "throughput", "airtime"):
         assert name in ended.output
     assert len(RunFolder(folder).radio_links()) > 0
-    ended = called("export", folder, "--pdr", "--size", "300")
+    ended = called("export", folder, "--to", folder / "pdr.png", "--kind", "delivery", "--size", "300")
     assert (ended.exit_code, ended.output.startswith(f"written: {folder}/pdr.png (")) == (0, True)
     assert (folder / "pdr.png").stat().st_size > 1000
 

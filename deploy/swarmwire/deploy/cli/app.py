@@ -16,7 +16,7 @@ from swarmwire.deploy.cli.ctl.group import ctl_app
 from swarmwire.deploy.cli.describe import describe_command
 from swarmwire.deploy.cli.draw import draw_command
 from swarmwire.deploy.cli.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
-from swarmwire.deploy.cli.export import ExportCommand, export_command
+from swarmwire.deploy.cli.export import export_command
 from swarmwire.deploy.cli.help_text import let_help_flow
 from swarmwire.deploy.cli.join import join_command
 from swarmwire.deploy.cli.list_kinds import list_command
@@ -28,7 +28,6 @@ from swarmwire.deploy.cli.robots.group import robots_app
 from swarmwire.deploy.cli.router import router_command
 from swarmwire.deploy.cli.run import run_command
 from swarmwire.deploy.cli.schema import schema_command
-from swarmwire.deploy.cli.screenshot import screenshot_command
 from swarmwire.deploy.cli.sim_to_real import sim_to_real_command
 from swarmwire.deploy.cli.sweep import sweep_command
 from swarmwire.deploy.cli.tune import tune_command
@@ -72,10 +71,9 @@ app.command("tune")(tune_command)
 app.command("repeat")(repeat_command)
 app.command("check")(check_command)
 app.command("draw")(draw_command)
-app.command("export", cls=ExportCommand)(export_command)
+app.command("export")(export_command)
 app.command("view")(view_command)
 app.command("ui")(ui_command)
-app.command("screenshot")(screenshot_command)
 app.command("schema")(schema_command)
 app.command("list")(list_command)
 app.command("describe")(describe_command)

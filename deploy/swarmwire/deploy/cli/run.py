@@ -172,4 +172,4 @@ def _say_where(result: "Result", folder: Path, console: Console) -> None:
     recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
     console.print(f"look at it: {program()} view {folder}", soft_wrap=True)
-    console.print(f"as a film: {program()} export {folder} --gif", soft_wrap=True)
+    console.print(f"as a film: {program()} export {folder} --to film.gif", soft_wrap=True)

@@ -1,5 +1,6 @@
 """Rerun's viewer as a process, and a picture of a recording that it draws without a screen."""
 
+import math
 import os
 import socket
 import subprocess
@@ -72,11 +73,11 @@ class NoGraphics(SwarmwireError):
     """This machine has nothing to draw with: the viewer needs a Vulkan driver, a GPU's or Mesa's on the processor."""
 
 
-def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, int] = (1600, 900)) -> None:
-    """Write the viewer's window, of this size in pixels, with the recording at this tick (None: at its last).
+def render_png(rrd: Path, png: Path, at_s: float | None = None, size: tuple[int, int] = (1600, 900)) -> None:
+    """Write the viewer's window, of this size in pixels, with the recording at this time (None: its end).
 
     The viewer is rerun's own program. It listens on this machine alone, keeps its files in a directory that goes with
-    it, and has ended when this returns. BadInput without the extra [view], the recording or the tick; NoGraphics
+    it, and has ended when this returns. BadInput without the extra [view], the recording or the time; NoGraphics
     without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
     """
     VIEW.need("picture")
@@ -89,20 +90,23 @@ def render_png(rrd: Path, png: Path, tick: int | None = None, size: tuple[int, i
     with _viewer(rrd, size) as viewer:
         client = viewer.wait(viewer.connected)
         state = viewer.wait(lambda: _opened(client))
-        client.set_time("sim_time", duration=_time_s(state, rrd, tick), play_state="paused")
+        client.set_time("sim_time", duration=_time_s(state, at_s), play_state="paused")
         png.write_bytes(viewer.wait(_still(client.take_screenshot)))
 
 
-def _time_s(state: Any, rrd: Path, tick: int | None) -> float:
-    """Where the tick is on the timeline of seconds, on which the plots are easier to read."""
+def _time_s(state: Any, at_s: float | None) -> float:
+    """The time on the timeline to show: the middle of the tick that had begun by `at_s`.
+
+    The start of a tick is rounded down to ns, and a cursor just before it would show the tick before.
+    """
     end = {timeline.name: timeline.end for timeline in state.recordings[0].timelines}
-    if tick is None:
-        return end["sim_time"] / NS_PER_S
-    if not 0 <= tick <= end["tick"]:
-        raise BadInput(str(rrd), "tick", f"expected 0 to {end['tick']}, got {tick}")
-    # The middle of the tick: its start is rounded down to ns, and a cursor just before it would show the one before.
-    per_tick_s = end["sim_time"] / NS_PER_S / max(end["tick"], 1)
-    return min((tick + 0.5) * per_tick_s, end["sim_time"] / NS_PER_S)
+    last_s = end["sim_time"] / NS_PER_S
+    if at_s is None:
+        return last_s
+    per_tick_s = last_s / max(end["tick"], 1)
+    if not 0.0 <= at_s < last_s + per_tick_s:
+        raise BadInput("--at", "", f"expected a time that was recorded, 0 to {last_s:g} s; got {at_s:g}")
+    return min((math.floor(at_s / per_tick_s + 1e-6) + 0.5) * per_tick_s, last_s)
 
 
 def _opened(client: Any) -> Any | None:

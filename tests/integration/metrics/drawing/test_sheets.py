@@ -154,7 +154,7 @@ def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_received(
 def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
     of = static(2)
     record(tmp_path, of, [truth(of, departed=departed([]), finished=links([], [], 0, 0))])
-    for arena, option in enumerate(("--pdr", "--arena")):
+    for arena, option in enumerate(("--kind", "--arena")):
         with pytest.raises(BadInput, check=lambda error, option=option: error.where == option):
             draw_distances(RunFolder(tmp_path), arena, tmp_path / "pdr.png", 640)
     (tmp_path / "radio_distances.parquet").unlink()

@@ -24,17 +24,18 @@ def rrd(tmp_path):
     return tmp_path / "run.rrd"
 
 
-def picture(rrd, name, tick=None):
+def picture(rrd, name, at_s=None):
     png = rrd.with_name(name)
     try:
-        render_png(rrd, png, tick, size=(640, 360))
+        render_png(rrd, png, at_s, size=(640, 360))
     except NoGraphics as fault:
         pytest.skip(str(fault))
     return png.read_bytes()
 
 
-def test_a_picture_has_the_size_asked_for_and_shows_the_tick_asked_for(rrd):
-    first, last, end = picture(rrd, "0.png", 0), picture(rrd, "19.png", 19), picture(rrd, "end.png")
+def test_a_picture_has_the_size_asked_for_and_shows_the_time_asked_for(rrd):
+    last_s = 19 / static(3).rate_hz
+    first, last, end = picture(rrd, "0.png", 0.0), picture(rrd, "19.png", last_s), picture(rrd, "end.png")
     assert struct.unpack(">II", first[16:24]) == (640, 360)
     assert first != last
     assert last == end
@@ -48,9 +49,9 @@ def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
 
 
 @pytest.mark.parametrize("tick", [-1, 20])
-def test_a_tick_that_was_not_recorded_is_refused(rrd, tick):
-    with pytest.raises(BadInput, check=lambda error: error.key == "tick" and "19" in error.expected):
-        picture(rrd, "none.png", tick)
+def test_a_time_that_was_not_recorded_is_refused(rrd, tick):
+    with pytest.raises(BadInput, check=lambda error: error.where == "--at" and "recorded" in error.expected):
+        picture(rrd, "none.png", tick / static(3).rate_hz)
 
 
 def test_a_recording_that_is_not_there_is_refused(tmp_path):

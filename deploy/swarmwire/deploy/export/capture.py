@@ -1,21 +1,21 @@
-"""`swarmwire export --to traffic.pcapng`: the frames of a run, for Wireshark."""
+"""A capture of the frames of a run, for Wireshark."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.export.exporter import Exporter, ExportOptions
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
     from swarmwire.metrics.capture.link_headers import Link
     from swarmwire.metrics.run_folder.reader import RunFolder
 
-SUFFIX = ".pcapng"
-MAX_S = 1e9  # above all that a run may last; in ns it still is a number of 64 bits
+MAX_S = 1e9  # longer than any run; in ns it still fits 64 bits
 
 
-def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_s: float | None) -> int:
-    """Write what was on air in an arena from `from_s` to before `until_s`, and say how many frames it was.
+def _write(run: Path, to: Path, options: ExportOptions) -> str:
+    """Write the frames that went on air in an arena from `from_s` to before `until_s`.
 
     BadInput for a folder without recorded packets, or of a run without a radio.
     """
@@ -24,22 +24,22 @@ def export_traffic(run: Path, to: Path, arena: int, from_s: float | None, until_
     from swarmwire.metrics.capture.pcapng import frames_on_air, write_capture
     from swarmwire.metrics.run_folder.reader import RunFolder
 
-    check_output_path(to, (SUFFIX,))
-    _check_times(from_s, until_s)
-    folder = RunFolder(run)
+    check_output_path(to, CAPTURE.suffixes)
+    _check_times(options.from_s, options.until_s)
+    folder, arena = RunFolder(run), options.arena or 0
     if not 0 <= arena < folder.static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {folder.static.arenas - 1}, got {arena}")
     radio, link = _radio_of(folder, run)
     packets = folder.validated("packets", arena)
-    first_ns = 0 if from_s is None else to_ns(from_s)
-    stop_ns = None if until_s is None else to_ns(until_s)
+    first_ns = 0 if options.from_s is None else to_ns(options.from_s)
+    stop_ns = None if options.until_s is None else to_ns(options.until_s)
     frames = (
         frame
         for frame in frames_on_air(packets, folder.static.robot_names)
         if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
     )
     description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"
-    return write_capture(to, link, f"air-{arena}", description, frames)
+    return f"{write_capture(to, link, f'air-{arena}', description, frames)} frames"
 
 
 def _check_times(from_s: float | None, until_s: float | None) -> None:
@@ -51,7 +51,7 @@ def _check_times(from_s: float | None, until_s: float | None) -> None:
 
 
 def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
-    """The radio of a run whose packets were recorded, and the kind of link that captures know it as."""
+    """The radio of a run whose packets were recorded, and its link type in captures."""
     from swarmwire.metrics.capture.link_headers import link_of
     from swarmwire.metrics.run_folder.layout import SCENARIO
     from swarmwire.world.scenario_file import load_scenario
@@ -66,3 +66,6 @@ def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     if len(folder.static.robot_names) > link.most_robots:
         raise BadInput(str(run), "robots", f"expected at most {link.most_robots}, which have addresses of their own")
     return radio, link
+
+
+CAPTURE = Exporter("capture", (".pcapng",), frozenset({"from_s", "until_s", "arena"}), _write)
