@@ -5,8 +5,8 @@ import sys
 import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.deploy.cli.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
-from swarmwire.deploy.cli.help_text import let_help_flow
+from swarmwire.deploy.cli.app import let_help_flow
+from swarmwire.deploy.cli.process import BAD_INPUT, FAILED, INTERRUPTED
 
 
 def run_app(app: typer.Typer) -> None:

@@ -122,7 +122,7 @@ def contradicting(folder: Path) -> None:
 
 
 def test_the_command_takes_a_subtick_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
-    arguments = ("--realtime", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
+    arguments = ("--realtime", "1", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
     assert code == 0, errors
     assert "in subticks of 5.0 ms" in " ".join(out.split())

@@ -32,7 +32,7 @@ REAL_TIME_SHARE = 5  # a runner of the world in real time for so many of that in
 
 def kinds(processes: int) -> list[Kind]:
     """The worlds: in lockstep nothing of what happens may matter; in real time robots coast meanwhile."""
-    in_real_time = ("--realtime", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
+    in_real_time = ("--realtime", "1", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
     return [
         Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=0.5),
         Kind("realtime", max(4, processes // REAL_TIME_SHARE), in_real_time),

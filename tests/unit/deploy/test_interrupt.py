@@ -6,7 +6,7 @@ import pytest
 import typer
 
 from swarmwire.comms.errors import Interrupted
-from swarmwire.deploy.cli.hang_up import leaving_when_hung_up
+from swarmwire.deploy.cli.process import leaving_when_hung_up
 from swarmwire.deploy.interrupt import Interrupt
 
 ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP

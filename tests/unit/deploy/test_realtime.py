@@ -57,8 +57,8 @@ def test_without_a_radio_there_is_nothing_between_ticks(tmp_path):
 
 
 @pytest.mark.usefixtures("_moved")
-@pytest.mark.parametrize("arguments", [["--realtime"], ["--realtime", "20"], ["--realtime=20"]])
-def test_the_factor_may_be_left_out(arguments, monkeypatch, capsys, tmp_path):
+@pytest.mark.parametrize("arguments", [["--realtime", "1"], ["--realtime=20"]])
+def test_the_command_keeps_to_the_factor(arguments, monkeypatch, capsys, tmp_path):
     command = ("run", *arguments, LOSSY, "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, _ = called(monkeypatch, capsys, *command)
     assert code == 0

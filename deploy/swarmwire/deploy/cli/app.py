@@ -1,4 +1,4 @@
-"""The command line `swarmwire`: its commands, and errors as one line each with their exit code."""
+"""The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code."""
 
 import io
 import sys
@@ -9,46 +9,49 @@ import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.comms.wire.ending import end_now
-from swarmwire.deploy.cli.certs.group import certs_app
-from swarmwire.deploy.cli.check import check_command
+from swarmwire.deploy.catalogue.docstrings import flowing
+from swarmwire.deploy.cli.certs import certs_app
 from swarmwire.deploy.cli.compare import compare_command
-from swarmwire.deploy.cli.ctl.group import ctl_app
-from swarmwire.deploy.cli.describe import describe_command
+from swarmwire.deploy.cli.ctl_events import ctl_app
 from swarmwire.deploy.cli.draw import draw_command
-from swarmwire.deploy.cli.exit_codes import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.cli.export import export_command
-from swarmwire.deploy.cli.help_text import let_help_flow
+from swarmwire.deploy.cli.inspect import (
+    check_command,
+    describe_command,
+    list_command,
+    new_command,
+    schema_command,
+    verify_command,
+)
 from swarmwire.deploy.cli.join import join_command
-from swarmwire.deploy.cli.list_kinds import list_command
-from swarmwire.deploy.cli.new import new_command
-from swarmwire.deploy.cli.radio.group import radio_app
+from swarmwire.deploy.cli.process import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.cli.radio import radio_app
 from swarmwire.deploy.cli.repeat import repeat_command
 from swarmwire.deploy.cli.report import report_command
-from swarmwire.deploy.cli.robots.group import robots_app
+from swarmwire.deploy.cli.robots import robots_app
 from swarmwire.deploy.cli.router import router_command
 from swarmwire.deploy.cli.run import run_command
-from swarmwire.deploy.cli.schema import schema_command
 from swarmwire.deploy.cli.sim_to_real import sim_to_real_command
 from swarmwire.deploy.cli.sweep import sweep_command
 from swarmwire.deploy.cli.tune import tune_command
-from swarmwire.deploy.cli.ui import ui_command
-from swarmwire.deploy.cli.verify import verify_command
-from swarmwire.deploy.cli.view import view_command
+from swarmwire.deploy.cli.view import ui_command, view_command
 from swarmwire.deploy.cli.world import world_command
 from swarmwire.deploy.kept_memory import share_heaps
 from swarmwire.deploy.refusals import refusal
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
+RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
+NETWORK, ROBOTS, INSPECT = "Network", "Robots", "Inspect"
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
-def _tell_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
         typer.echo(f"swarmwire {version('swarmwire-deploy')}")
         raise typer.Exit
@@ -56,37 +59,48 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback(help=ABOUT)
 def options(
-    told: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Say which version this is.")
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
 ) -> None:
-    """What the program itself takes, before any command."""
+    """Options of the program itself, before any command."""
 
 
-app.command("run")(run_command)
-app.command("world")(world_command)
-app.command("join")(join_command)
-app.command("sweep")(sweep_command)
-app.command("tune")(tune_command)
-app.command("repeat")(repeat_command)
-app.command("check")(check_command)
-app.command("draw")(draw_command)
-app.command("export")(export_command)
-app.command("view")(view_command)
-app.command("ui")(ui_command)
-app.command("schema")(schema_command)
-app.command("list")(list_command)
-app.command("describe")(describe_command)
-app.command("new")(new_command)
-app.command("verify")(verify_command)
-app.command("compare")(compare_command)
-app.command("report")(report_command)
-app.command("sim-to-real")(sim_to_real_command)
-app.command("router")(router_command)
-app.add_typer(radio_app, name="radio")
-app.add_typer(ctl_app, name="ctl")
-app.add_typer(robots_app, name="robots")
-app.add_typer(certs_app, name="certs")
+app.command("new", rich_help_panel=RUN)(new_command)
+app.command("run", rich_help_panel=RUN)(run_command)
+app.command("repeat", rich_help_panel=RUN)(repeat_command)
+app.add_typer(ctl_app, name="ctl", rich_help_panel=RUN)
+app.command("view", rich_help_panel=VIEW)(view_command)
+app.command("ui", rich_help_panel=VIEW)(ui_command)
+app.command("export", rich_help_panel=VIEW)(export_command)
+app.command("draw", rich_help_panel=VIEW)(draw_command)
+app.command("sweep", rich_help_panel=EXPERIMENTS)(sweep_command)
+app.command("tune", rich_help_panel=EXPERIMENTS)(tune_command)
+app.command("compare", rich_help_panel=EXPERIMENTS)(compare_command)
+app.command("report", rich_help_panel=EXPERIMENTS)(report_command)
+app.command("world", rich_help_panel=NETWORK)(world_command)
+app.command("join", rich_help_panel=NETWORK)(join_command)
+app.command("router", rich_help_panel=NETWORK)(router_command)
+app.add_typer(certs_app, name="certs", rich_help_panel=NETWORK)
+app.add_typer(robots_app, name="robots", rich_help_panel=ROBOTS)
+app.command("sim-to-real", rich_help_panel=ROBOTS)(sim_to_real_command)
+app.add_typer(radio_app, name="radio", rich_help_panel=INSPECT)
+app.command("check", rich_help_panel=INSPECT)(check_command)
+app.command("list", rich_help_panel=INSPECT)(list_command)
+app.command("describe", rich_help_panel=INSPECT)(describe_command)
+app.command("schema", rich_help_panel=INSPECT)(schema_command)
+app.command("verify", rich_help_panel=INSPECT)(verify_command)
+
+
+def let_help_flow(app: typer.Typer) -> None:
+    """Make the paragraphs of all help texts of an app as wide as the terminal; rich would keep our line breaks."""
+    for command in app.registered_commands:
+        command.help = flowing(command.help or (command.callback and command.callback.__doc__))
+    for group in app.registered_groups:
+        if group.typer_instance is not None:
+            let_help_flow(group.typer_instance)
+
+
 let_help_flow(app)
 
 
@@ -96,7 +110,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a letter that a terminal lacks must not end a run
             stream.reconfigure(errors="replace")
     try:
-        app(_with_factor(sys.argv[1:]))
+        app(sys.argv[1:])
     except BadInput as error:
         sys.exit(_fail(error, BAD_INPUT))
     except Interrupted as error:
@@ -104,10 +118,10 @@ def main() -> None:
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
     except (OSError, MemoryError, RuntimeError) as error:
-        told = refusal(error)
-        if told is None:
+        refused = refusal(error)
+        if refused is None:
             raise
-        sys.exit(_fail(told, FAILED))
+        sys.exit(_fail(refused, FAILED))
 
 
 def program() -> None:
@@ -118,27 +132,6 @@ def program() -> None:
     except SystemExit as ended:
         end_now(ended.code if isinstance(ended.code, int) else 0 if ended.code is None else FAILED)
         raise
-
-
-def _with_factor(arguments: list[str]) -> list[str]:
-    """The arguments, where a bare `--realtime` means 1: typer knows no option whose value may be left out."""
-    whole: list[str] = []
-    for argument in arguments:
-        if whole and whole[-1] == "--realtime":
-            factor = argument if _is_number(argument) else None
-            whole[-1] += f"={factor or 1}"
-            if factor:
-                continue
-        whole.append(argument)
-    return [*whole[:-1], "--realtime=1"] if whole and whole[-1] == "--realtime" else whole
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.access_options import Ca, Certificate, Certs, Insecure, Key
+from swarmwire.deploy.cli.options import Ca, Certificate, Certs, Insecure, Key
 
 
 def join_command(

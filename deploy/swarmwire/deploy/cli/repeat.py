@@ -7,9 +7,8 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.exit_codes import DIFFERENT, INTERRUPTED
-from swarmwire.deploy.cli.hang_up import leaving_when_hung_up
 from swarmwire.deploy.cli.options import Links, Packets, Quiet, Runners
+from swarmwire.deploy.cli.process import DIFFERENT, INTERRUPTED, leaving_when_hung_up
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.run_again import CampaignRun

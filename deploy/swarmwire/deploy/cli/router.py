@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.access_options import (
+from swarmwire.deploy.cli.options import (
     Ca,
     Certificate,
     Certs,

@@ -1,66 +1,45 @@
 """`swarmwire run`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI
-from swarmwire.deploy.cli.exit_codes import INTERRUPTED
-from swarmwire.deploy.cli.gateway_options import (
+from swarmwire.deploy.cli.options import (
     Ca,
     Certificate,
     Gateway,
     GatewaySet,
     Insecure,
     Key,
+    Links,
     NetworkEndpoint,
+    Out,
+    Overrides,
+    Packets,
+    Quiet,
+    RealTime,
     Revoked,
+    Rrd,
+    Runners,
+    ScenarioFile,
+    Seed,
+    Seeds,
+    Select,
+    Socket,
+    Subtick,
     Swarm,
+    Ui,
+    View,
 )
-from swarmwire.deploy.cli.hang_up import leaving_when_hung_up
-from swarmwire.deploy.cli.options import Links, Overrides, Packets, Quiet, Runners, ScenarioFile, Seed
-from swarmwire.deploy.cli.program import program
+from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.result import Result
     from swarmwire.deploy.simulation import Simulation
-
-Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
-Seeds = Annotated[
-    str | None,
-    typer.Option(help="One arena per seed, side by side: 9 (1 to 9), 4:10 (4 to 9) or 1,5,7.", metavar="SEEDS"),
-]
-Socket = Annotated[
-    Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
-]
-RealTime = Annotated[
-    str | None,
-    typer.Option(
-        help="Keep to the wall clock, FACTOR (1 if left out) simulated seconds per second; wait for no runner.",
-        metavar="[FACTOR]",
-    ),
-]
-Subtick = Annotated[
-    float | None,
-    typer.Option(
-        help="In real time, wake every so many seconds between ticks, 0.001 or more, and let packets cross then.",
-        metavar="SECONDS",
-    ),
-]
-Rrd = Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")]
-Select = Annotated[
-    str | None,
-    typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
-]
-View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
-
-Ui = Annotated[
-    bool,
-    typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused."),
-]
 
 
 def run_command(

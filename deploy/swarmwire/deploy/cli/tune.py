@@ -11,10 +11,8 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
-from swarmwire.deploy.cli.exit_codes import INTERRUPTED
-from swarmwire.deploy.cli.hang_up import leaving_when_hung_up
 from swarmwire.deploy.cli.options import Overrides, Quiet
-from swarmwire.deploy.cli.program import program
+from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.tuning.plan import TuningPlan

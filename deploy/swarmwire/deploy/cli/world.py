@@ -6,22 +6,35 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.extras import UI
-from swarmwire.deploy.cli.access_options import (
+from swarmwire.deploy.cli.options import (
     Ca,
     Certificate,
     Certs,
     Insecure,
     Key,
+    Links,
     Name,
     ObserverNames,
     OperatorNames,
+    Out,
+    Overrides,
+    Packets,
+    Quiet,
+    RealTime,
     Revoked,
     RouterNames,
+    Rrd,
     RunnerNames,
+    ScenarioFile,
+    Seed,
+    Seeds,
+    Select,
+    Subtick,
+    Ui,
+    View,
 )
-from swarmwire.deploy.cli.exit_codes import INTERRUPTED
-from swarmwire.deploy.cli.options import Links, Overrides, Packets, Quiet, ScenarioFile, Seed
-from swarmwire.deploy.cli.run import Out, RealTime, Rrd, Seeds, Select, Subtick, Ui, View, run_shown
+from swarmwire.deploy.cli.process import INTERRUPTED
+from swarmwire.deploy.cli.run import run_shown
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member

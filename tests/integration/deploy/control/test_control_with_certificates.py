@@ -104,7 +104,7 @@ def test_the_command_line_takes_a_folder_of_certificates(certs, controls, endpoi
     )
     assert called.output.startswith("3 ticks")
     told = CliRunner().invoke(
-        app, ["ctl", "r", "--endpoint", endpoint, "--certs", str(certs), "status"], catch_exceptions=False
+        app, ["ctl", "--run", "r", "--endpoint", endpoint, "--certs", str(certs), "status"], catch_exceptions=False
     )
     assert "tick      0 of 9" in told.output
     with pytest.raises(SwarmwireError, match="ca, certificate and key"):

@@ -29,7 +29,7 @@ def ctl(*arguments: object) -> str:
 
 
 def status(*run: object) -> dict[str, Any]:
-    return json.loads(ctl(*run, "status", "--json"))
+    return json.loads(ctl(*(("--run", *run) if run else ()), "status", "--json"))
 
 
 @pytest.fixture
@@ -91,5 +91,5 @@ def test_of_several_runs_there_is_a_table(tmp_path, process):
         assert len(ctl("status", "--json").splitlines()) == 2
         with pytest.raises(BadInput, match="several"):
             ctl("pause")
-        ctl(tmp_path / "other", "stop")
+        ctl("--run", tmp_path / "other", "stop")
         other.communicate()

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.cli.ctl.selection import selection_of
+from swarmwire.deploy.cli.ctl_events import selection_of
 from tests.support.deploy.control.going import going
 from tests.support.waiting import until
 
@@ -43,7 +43,7 @@ def ctl(*arguments: object) -> str:
         (["event", '{ do = "kil" }'], "do"),
         (["end", "7"], "event"),
         (["partition"], "between, region, halves"),
-        (["nowhere", "pause"], "nowhere"),
+        (["--run", "nowhere", "pause"], "nowhere"),
         (["--ca", "ca.pem", "pause"], "--endpoint"),
         (["--endpoint", "tcp/192.0.2.1:7447", "pause"], "beyond this machine"),
     ],
@@ -64,11 +64,11 @@ def going_run(tmp_path):
         yield found
 
 
-def test_a_word_that_is_neither_run_nor_command_is_told_with_what_was_meant():
+def test_a_word_that_is_no_command_is_refused_with_the_one_that_was_meant():
     for arguments in (["pasue"], ["pasue", "3"]):
         result = CliRunner().invoke(app, ["ctl", *arguments])
         assert result.exit_code == 2
-        assert "status, pause" in " ".join(result.output.replace("│", " ").split())
+        assert "Did you mean 'pause'?" in result.output
 
 
 def test_an_event_is_any_table_of_a_scenario(going_run):
@@ -84,7 +84,7 @@ def test_an_event_is_any_table_of_a_scenario(going_run):
     "command", ["status", "pause", "step", "speed", "kill", "impulse", "partition", "jam", "set", "event"]
 )
 def test_the_help_of_each_command_has_an_example(command):
-    assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl 3f2a", "swarmwire ctl")
+    assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl --run 3f2a", "swarmwire ctl")
 
 
 def test_robots_are_named_drawn_or_all():

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.errors import Interrupted
-from swarmwire.deploy.cli.robots.acting import act
+from swarmwire.deploy.cli.robots import act
 from swarmwire.deploy.fleet.result import HostFailed, Nothing, Result, result_lines, shown_on
 
 
