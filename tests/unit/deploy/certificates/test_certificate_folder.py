@@ -97,7 +97,7 @@ def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(certificate_folder, "write_whole", killed)
+    monkeypatch.setattr(certificate_folder, "write_text", killed)
     with pytest.raises(KeyboardInterrupt):
         issued(folder, clock, "flock-0")
     monkeypatch.undo()
