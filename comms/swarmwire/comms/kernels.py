@@ -12,7 +12,7 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
 `_source_stamp`, `_index_key`, `_compile_for_args`. So pyproject.toml pins numba's minor version, and
-`tests/unit/comms/test_kernels.py` fails when one of them is not as it was.
+`tests/unit/comms/test_draws.py` fails when one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false

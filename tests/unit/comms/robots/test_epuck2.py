@@ -36,6 +36,8 @@ COMMANDS = st.builds(
     st.sampled_from([RobotSettingsBits(bits) for bits in range(8)]),
     st.integers(0, 63),
 )
+SHARES = st.floats(0.0, 1.0)
+BODY = load_body("epuck2")
 
 
 @given(command=COMMANDS)
@@ -144,10 +146,6 @@ def wrapped(steps: int) -> int:
 def cut(sent: bytes, cuts: list[int]) -> list[bytes]:
     ends = sorted({min(at, len(sent)) for at in cuts} | {len(sent)})
     return [sent[start:end] for start, end in zip([0, *ends], ends, strict=False)]
-
-
-SHARES = st.floats(0.0, 1.0)
-BODY = load_body("epuck2")
 
 
 def tof() -> ScanSpec:
