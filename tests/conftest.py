@@ -36,7 +36,17 @@ UNIT = f"{Path(__file__).parent}/unit/"
 UNIT_LIMIT_S = float(os.environ.get("UNIT_LIMIT_S", "2"))  # of processor time, so that a busy machine fails no test
 # The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
 # and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
-ORDER = ("comms/radio", "comms/test_geometry", "comms/test_events", "world", "agent/behaviours", "metrics", "", "deploy", "test_")
+ORDER = (
+    "comms/radio",
+    "comms/test_geometry",
+    "comms/test_events",
+    "world",
+    "agent/behaviours",
+    "metrics",
+    "",
+    "deploy",
+    "test_",
+)
 # Tracing and Python in place of kernels slow all tests down; the full profile has more examples of each.
 LIMITED = PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT
 CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"

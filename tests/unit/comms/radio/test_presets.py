@@ -24,7 +24,7 @@ from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio.parameter_modules import MODULES
 from tests.support.comms.radio.phy.radios import IEEE_802_15_4
 from tests.support.comms.radio.runs import SIZE_M, at, everybody, make_medium, packets, run, scattered
-from tests.unit.world.scenario.test_radio_tables import radio_of
+from tests.unit.world.scenario.test_bodies import radio_of
 
 NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
 GAZEBO = ("gz-rfcomms", "subt")

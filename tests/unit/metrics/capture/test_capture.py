@@ -14,7 +14,7 @@ from swarmwire.metrics.capture.link_headers import link_of
 from swarmwire.metrics.capture.pcapng import Frame, frames_on_air
 from swarmwire.metrics.run_folder.packets import Packets
 from tests.support.metrics.capture.reading import Captured, read
-from tests.unit.world.scenario.test_radio_tables import radio_of
+from tests.unit.world.scenario.test_bodies import radio_of
 
 NAMES = ("a-0", "a-1", "a-2")
 

@@ -1,23 +1,31 @@
-"""Robots behind a gateway: told what they sense, moved as told, dead ones silent; all others are played as ever."""
+"""Gateways."""
 
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
 import pytest
 
+from swarmwire.comms import plugins as installed_classes
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.gateways import gateway
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
+from swarmwire.world.gateways.epuck2 import Epuck2Gateway
+from swarmwire.world.gateways.gateway import Gateway
+from swarmwire.world.gateways.ros2 import Ros2Gateway
 from swarmwire.world.subtick import Subticks
 from tests.support.agent.hosts import MEASURES, received_from
 from tests.support.clocks import FakeClock
 from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions
 
 TICK_NS = NS_PER_S // 10
+HERE = "tests.support.world.gateways.scripted:ScriptedGateway"
 
 
 class Inner:
@@ -250,3 +258,76 @@ def test_in_subticks_robots_behind_gateways_are_told_when_it_is_due_and_what_the
     assert not len(actions.sent)
     assert commands(actions)[3] == (0.05, -0.7)
     assert around.backend.report().subtick_s == 0.010
+
+
+def installed(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None:
+    found = [EntryPoint(name, value, gateway.GROUP) for name, value in points]
+    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: found if group == gateway.GROUP else [])
+
+
+def refused(name: str) -> str:
+    with pytest.raises(BadInput) as caught:
+        gateway.gateway_kind(name, "--gateway", name)
+    text = str(caught.value)
+    assert text.startswith(f"--gateway: {name}: ")
+    assert "\n" not in text
+    return text
+
+
+def test_those_that_come_with_swarmwire_are_known_without_being_imported() -> None:
+    assert set(gateway.gateway_names()) >= {"epuck2", "ros2"}
+
+
+def test_a_gateway_is_found_by_its_name(monkeypatch) -> None:
+    installed(monkeypatch, ("scripted", HERE))
+    assert gateway.gateway_kind("scripted", "--gateway") is ScriptedGateway
+
+
+def test_an_unknown_name_is_refused_with_those_there_are(monkeypatch) -> None:
+    installed(monkeypatch, ("scripted", HERE))
+    assert "scripted" in refused("epuck3")
+
+
+def test_a_name_that_two_packages_bring_is_refused(monkeypatch) -> None:
+    installed(monkeypatch, ("scripted", HERE), ("scripted", "other.package:Gateway"))
+    assert "other.package:Gateway" in refused("scripted")
+
+
+def test_a_package_that_is_missing_is_named(monkeypatch) -> None:
+    installed(monkeypatch, ("far", "a_package_that_is_not_here:Gateway"))
+    assert "does not import: No module named 'a_package_that_is_not_here'" in refused("far")
+
+
+@pytest.mark.parametrize(
+    "value", ["swarmwire.world.gateways.gateway:Nothing", "swarmwire.world.gateways.gateway:GROUP"]
+)
+def test_what_is_no_gateway_is_refused(monkeypatch, value) -> None:
+    installed(monkeypatch, ("odd", value))
+    refused("odd")
+
+
+def said(kind: type[Gateway], body: str) -> str:
+    return "; ".join(kind(("a-0",), load_body(body), "", kind.options(), WallClock()).differences())
+
+
+@pytest.mark.parametrize(("kind", "body"), [(Epuck2Gateway, "epuck2"), (Ros2Gateway, "turtlebot3-burger")])
+def test_of_the_robot_itself_nothing_is_said(kind, body) -> None:
+    assert said(kind, body) == ""
+
+
+def test_an_epuck_as_an_epuck2_has_other_eyes_and_less_senses() -> None:
+    text = said(Epuck2Gateway, "epuck")
+    assert "its proximity looks to 17, 50, 90, ... deg, not -10, -40, -90, ... deg" in text
+    assert "it goes up to 0.1287 m/s, not 0.1382" in text
+    assert "it has no scan, imu" in text
+    assert "nobody is told its camera" in text
+
+
+def test_an_epuck2_as_a_base_of_ros_2_keeps_its_proximity_to_itself() -> None:
+    assert said(Ros2Gateway, "epuck2") == "nobody is told its proximity, ground, bumper; nobody switches its LEDs"
+
+
+@pytest.mark.parametrize("body", ["turtlebot3-burger", "footbot", "point"])
+def test_what_cannot_be_an_epuck2_is_refused(body) -> None:
+    with pytest.raises(BadInput, match=f"body {body}: .*as an e-puck2 has"):
+        said(Epuck2Gateway, body)

@@ -1,4 +1,4 @@
-"""Ticks with runners: what each gets and answers, and that whatever does not fit is counted and changes nothing."""
+"""Runs in lockstep, and their pace."""
 
 from typing import Any
 
@@ -7,11 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.agent.local_backend import LocalBackend
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
-from tests.support.agent.hosts import MEASURES, plain, readings, received_from
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedBackend
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, readings, received_from, spec
+from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.world.locksteps import (
     FLOCK,
     GROUPS,
@@ -22,10 +29,15 @@ from tests.support.world.locksteps import (
     parts,
     playing,
     ready,
+    request,
     rows_of,
     sound,
     state,
+    two,
+    two_parts,
 )
+
+owners_ = st.lists(st.integers(0, 3), min_size=8, max_size=8)
 
 
 def test_a_tick_is_complete_once_all_have_answered() -> None:
@@ -149,9 +161,6 @@ def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for(
     assert len(lockstep.take().rows) == 0
 
 
-owners_ = st.lists(st.integers(0, 3), min_size=8, max_size=8)
-
-
 @given(owners_, st.lists(st.integers(0, 7), unique=True), st.data())
 def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int], acting: list[int], data: Any) -> None:
     slots = parts(dict(enumerate(owners)))
@@ -207,3 +216,174 @@ def listed(received: ReceivedPackets) -> list[Any]:
     columns = [received.receiver, received.sender, received.sequence, received.received_at_ns, *received.given.values()]
     payloads = [received.payloads.row(int(p)) for p in received.payload]
     return list(zip(*(column.tolist() for column in columns), payloads, strict=True))
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_a_failed_agent_ends_the_run_with_its_robots_and_traceback(opened: bool) -> None:
+    lockstep = joined(two(), "a", "b")
+    if opened:
+        ready(lockstep, "a", "b").open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+    with pytest.raises(AgentFailed) as caught:
+        lockstep.answer("b", frames.encode("failed", 0, {}, {"robots": "flock-4", "traceback": "Boom"}))
+    assert (caught.value.robots, caught.value.traceback) == ("flock-4", "Boom")
+
+
+@pytest.mark.parametrize("values", [{}, {"robots": "x"}, {"robots": 1, "traceback": "y"}], ids=repr)
+def test_a_failure_without_words_names_the_runners_robots(values: dict[str, Any]) -> None:
+    lockstep = joined(two(), "a", "b")
+    with pytest.raises(AgentFailed) as caught:
+        lockstep.answer("b", frames.encode("failed", 0, {}, values))
+    assert caught.value.robots == "flock-4 … lone-7 (4 robots)"
+
+
+def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
+    lockstep = joined(two(), "a", "b")
+    before = state(lockstep)
+    lockstep.gone("stranger", "its link is gone")
+    assert state(lockstep) == before
+    with pytest.raises(RunnerLost) as caught:
+        lockstep.gone("b", "its link is gone")
+    assert (caught.value.runner, caught.value.robots) == ("b", "flock-4 … lone-7 (4 robots)")
+    assert caught.value.reason == "its link is gone"
+
+
+def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None:
+    lockstep = ready(joined(Lockstep(two_parts(), "dead"), "a", "b"), "a", "b")
+    lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+    lockstep.gone("b", "its link is gone")
+    assert (lockstep.waiting, lockstep.missing[0]) == (1, "a")
+    for tick in range(2):
+        lockstep.answer("a", encode_actions(tick, actions([0, 1, 2, 3])))
+        assert not lockstep.waiting
+        got = lockstep.take()
+        still = got.rows > 3
+        assert sorted(got.rows.tolist()) == list(range(8))
+        assert got.drive[still].all()
+        assert not got.linear_mps[still].any()
+        assert not got.angular_radps[still].any()
+        out = lockstep.open_tick(tick + 1, all_readings(tick + 1), ReceivedPackets.none(MEASURES))
+        assert [name for name, _ in out] == ["a"]
+    assert [loss.runner for loss in lockstep.losses] == ["b"]
+    assert lockstep.counts() == {"runners_lost": 1}
+    with pytest.raises(JoinRefused, match="all robots are taken"):
+        lockstep.join("c", request())
+
+
+@pytest.mark.parametrize("answered", [False, True])
+def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(answered: bool) -> None:
+    lockstep = ready(joined(Lockstep(two_parts(), "wait"), "a", "b"), "a", "b")
+    out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
+    lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
+    if answered:
+        lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
+    lockstep.gone("b", "its link is gone")
+    lockstep.lose_silent("no answer")  # nobody is there to be silent
+    assert (lockstep.waiting, lockstep.missing[0], len(lockstep.losses)) == (1, "that did not join", 1)
+    joined(lockstep, "c")
+    again = lockstep.answer("c", frames.encode("ready", -1, {}))
+    assert again == [("c", out["b"])]
+    assert lockstep.waiting
+    lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
+    assert not lockstep.waiting
+    assert plain(lockstep.take()) == plain(actions(list(range(8))))
+    assert [name for name, _ in lockstep.open_tick(1, all_readings(1), ReceivedPackets.none(MEASURES))] == ["a", "c"]
+
+
+@pytest.mark.parametrize("on_loss", ["dead", "wait"])
+def test_before_the_first_tick_every_loss_ends_the_run(on_loss: Any) -> None:
+    lockstep = joined(Lockstep(two_parts(), on_loss), "a")
+    with pytest.raises(RunnerLost):
+        lockstep.gone("a", "its link is gone")
+    with pytest.raises(RunnerLost, match="no answer"):
+        lockstep.lose_silent("no answer")
+
+
+def paced(factor: float = 1.0, rate_hz: int = 10) -> tuple[FakeClock, Pace, list[str]]:
+    clock, said = FakeClock(), []
+    return clock, Pace(clock, rate_hz, factor, said.append), said
+
+
+def test_the_clock_is_asked_to_wait_until_each_next_tick_starts() -> None:
+    clock, pace, said = paced(factor=4.0, rate_hz=3)
+    for tick in range(3):
+        pace.begin()
+        clock.time_ns += 5 * MS
+        pace.hold(tick)
+    starts = [round(tick * NS_PER_S // 3 / 4.0) for tick in (1, 2, 3)]
+    assert clock.slept_until == [ORIGIN_NS + start for start in starts]
+    assert (pace.missed_ticks, pace.worst_lag_ns, said) == (0, 0, [])
+
+
+def test_a_loop_that_lags_runs_on_without_waiting_until_it_is_level() -> None:
+    clock, pace, said = paced()
+    lags_ms = []
+    for tick, work_ms in enumerate([250, 10, 10, 10]):
+        pace.begin()
+        clock.time_ns += work_ms * MS
+        waits = len(clock.slept_until)
+        pace.hold(tick)
+        lags_ms.append(len(clock.slept_until) == waits)
+    assert lags_ms == [True, True, False, False]
+    assert clock.slept_until == [ORIGIN_NS + 300 * MS, ORIGIN_NS + 400 * MS]
+    assert (pace.missed_ticks, pace.worst_lag_ns) == (2, 150 * MS)
+    assert len(said) == 1
+    assert "does not keep up with 1 x real time: at tick 0 the loop is 150.0 ms behind" in said[0]
+
+
+def test_a_lag_is_told_at_once_but_not_every_tick() -> None:
+    clock, pace, said = paced()
+    for tick in range(60):  # 12 s of wall time
+        pace.begin()
+        clock.time_ns += 200 * MS
+        pace.hold(tick)
+    assert pace.missed_ticks == 60
+    assert [text.split("at tick ")[1].split()[0] for text in said] == ["0", "25", "50"]
+
+
+def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
+    clock, pace, _ = paced()
+    free, backend = (LocalBackend(assignment(group(spec("Counter"), [0, 1]))) for _ in range(2))
+    held = PacedBackend(backend, pace)
+    free.start()
+    held.start()
+    for tick in range(2):
+        expected = free.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
+        got = held.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
+        assert got.linear_mps.tolist() == expected.linear_mps.tolist()
+    assert clock.slept_until == [ORIGIN_NS + 100 * MS, ORIGIN_NS + 200 * MS]
+    assert (held.report().factor, held.report().missed_ticks, held.report().late_answers) == (1.0, 0, {})
+
+
+def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
+    clock, pace, said = paced()
+    pace.begin()
+    pace.hold(0)
+    clock.time_ns += 3600 * NS_PER_S
+    pace.begin_anew(1, 2.0, 3600 * NS_PER_S)
+    assert pace.begin() == ORIGIN_NS + 100 * MS  # when it would be without the pause
+    pace.hold(1)
+    pace.hold(2)
+    assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [150 * MS, 200 * MS]
+    assert (pace.missed_ticks, said) == (0, [])
+
+
+def test_a_loop_that_was_frozen_goes_on_from_there_instead_of_catching_up() -> None:
+    clock, pace, said = paced()
+    pace.begin()
+    pace.hold(0)
+    clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z within tick 1
+    pace.hold(1)
+    assert pace.begin() == ORIGIN_NS + 200 * MS  # what is measured by it, such as watchdogs, has not seen the pause
+    pace.hold(2)
+    assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [200 * MS]
+    assert (pace.missed_ticks, pace.lag_ns, pace.worst_lag_ns) == (1, 0, 3600 * NS_PER_S - 100 * MS)
+    assert said == ["real time: the loop stood still for 3599.9 s in tick 1, and goes on from there"]
+
+
+def test_nor_does_one_that_was_frozen_in_its_sleep() -> None:
+    clock, pace, said = paced()
+    pace.begin()
+    clock.sleep_until = lambda at_ns: setattr(clock, "time_ns", at_ns + 60 * NS_PER_S)
+    pace.hold(0)
+    assert pace.over_ns(1) == clock.time_ns + 100 * MS
+    assert said == ["real time: the loop stood still for 60.0 s in tick 0, and goes on from there"]

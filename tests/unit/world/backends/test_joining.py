@@ -1,23 +1,33 @@
-"""The hand-shake with runners, in lockstep and in real time: what does not fit is counted and changes nothing."""
+"""Runners that join: handshakes, allocations, and the inbox."""
 
+import queue
 import re
-from typing import Any
+from collections.abc import Generator
+from typing import Any, get_args
 
 import msgpack
 import numpy as np
 import pytest
+import zenoh
 
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import MAX_JOIN_BYTES
+from swarmwire.comms.wire.join import MAX_JOIN_BYTES, JoinLimits
+from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint
+from swarmwire.world.backends.allocation import MOVES, Allocation, Move, State
+from swarmwire.world.backends.inbox import RunnerInbox
 from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group
+from tests.support.waiting import until
 from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
 
 Made = Lockstep | RealTime
+STATES, EVERY_MOVE = get_args(State), get_args(Move)
+PAIRS = [(state, move) for state in STATES for move in EVERY_MOVE]
+FLOOD = 5000
 
 
 @pytest.fixture(params=[two, two_in_real_time], ids=["lockstep", "real time"])
@@ -167,3 +177,112 @@ def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made
     assert roster.is_building("a")
     ready(roster, "b")
     assert not roster.is_building("b")
+
+
+def slot(state: State) -> Allocation:
+    its = assignment(group("unused:Agent", [0]))
+    return Allocation(its, its.groups[0].rows, "somebody", state)
+
+
+@pytest.mark.parametrize(("state", "move"), PAIRS)
+def test_a_move_of_the_table_leads_where_it_says_and_any_other_raises_and_changes_nothing(state, move) -> None:
+    it = slot(state)
+    before = vars(it).copy()
+    if move in MOVES[state]:
+        it.move(move)
+        assert vars(it) == before | {"state": MOVES[state][move]}
+    else:
+        with pytest.raises(RuntimeError, match=f"{state} has no move '{move}'"):
+            it.move(move)
+        assert vars(it) == before
+
+
+def test_every_state_stands_in_the_table_and_can_be_reached() -> None:
+    assert set(MOVES) == set(STATES)
+    reached = set(STATES[:1])
+    while more := {to for state in reached for to in MOVES[state].values()} - reached:
+        reached |= more
+    assert reached == set(STATES)
+    assert {move for moves in MOVES.values() for move in moves} == set(EVERY_MOVE)
+
+
+@pytest.fixture
+def session(tmp_path) -> Generator[zenoh.Session]:
+    with closed_after(open_world(unix_endpoint(f"{tmp_path}/w"), 10.0)) as session:
+        yield session
+
+
+def filled(session: zenoh.Session, limits: JoinLimits, *puts: tuple[str, bytes]) -> RunnerInbox:
+    """An inbox that was told all of this, in this order."""
+    inbox, received = RunnerInbox(limits), list[zenoh.Sample]()
+    subscriber = session.declare_subscriber("answer/*", received.append)
+    for runner, payload in puts:
+        session.put(f"answer/{runner}", payload, congestion_control=zenoh.CongestionControl.BLOCK)
+    until(lambda: len(received) == len(puts))
+    subscriber.undeclare()
+    for sample in received:
+        inbox.put(sample)
+    return inbox
+
+
+def taken(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
+    items = [inbox.get() for _ in range(inbox.qsize())]
+    return [(str(item.key_expr), item.payload.to_bytes()) for item in items if isinstance(item, zenoh.Sample)]
+
+
+def test_a_flood_of_one_runner_keeps_no_other_out(session):
+    puts = [("b", b"first"), *[("a", b"x")] * FLOOD, ("b", b"last")]
+    inbox = filled(session, JoinLimits(waiting=3), *puts)
+    assert taken(inbox) == [("answer/b", b"first"), *[("answer/a", b"x")] * 3, ("answer/b", b"last")]
+    assert inbox.counts() == {"flooded_frames": FLOOD - 3}
+
+
+def test_who_floods_is_known_by_name(session):
+    inbox = filled(session, JoinLimits(waiting=1, flood=2), *[("a", b"x")] * 4, *[("b", b"x")] * 3)
+    assert inbox.rate_limited() == {"a"}
+
+
+def test_what_was_taken_makes_room(session):
+    inbox = filled(session, JoinLimits(waiting=2), *[("a", b"x")] * 2)
+    item = inbox.get()
+    inbox.put(item)
+    assert inbox.qsize() == 2
+    assert inbox.counts() == {}
+
+
+def test_few_that_are_large_are_bounded_too_and_one_is_always_taken(session):
+    inbox = filled(session, JoinLimits(waiting_bytes=10), ("a", b"x" * 11), ("a", b"x"), ("b", b"x" * 10), ("b", b"x"))
+    assert [len(payload) for _, payload in taken(inbox)] == [11, 10]
+    assert inbox.counts() == {"flooded_frames": 2}
+
+
+def asked_by(session: zenoh.Session, limits: JoinLimits, *runners: str) -> RunnerInbox:
+    """An inbox that each of them asked in turn, and that answered those that it let in."""
+    inbox = RunnerInbox(limits)
+    asked = session.declare_queryable("join/*", zenoh.handlers.Callback(inbox.put, indirect=False))
+    for runner in runners:
+        replies = session.get(f"join/{runner}", timeout=10.0)
+        if inbox.qsize():
+            query = inbox.get(timeout=10.0)
+            assert isinstance(query, zenoh.Query)
+            with query:
+                query.reply(query.key_expr, b"yes")
+        list(replies)
+    asked.undeclare()
+    return inbox
+
+
+def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
+    inbox = asked_by(session, JoinLimits(requests=2), *("a", "a", "b") * 2)
+    assert inbox.counts() == {"flooded_requests": 2}
+
+
+def test_who_asks_under_ever_new_names_is_remembered_so_often_and_no_more(session):
+    inbox = asked_by(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
+    assert inbox.counts() == {"flooded_requests": 2}
+    assert len(inbox._requests) == len(inbox._dropped_of) == 2
+
+
+def test_nothing_in_time_is_an_empty_queue():
+    with pytest.raises(queue.Empty):
+        RunnerInbox().get(timeout=0.0)
