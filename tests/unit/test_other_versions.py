@@ -27,7 +27,7 @@ from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.record.origin import read_origin
 from swarmwire.deploy.tuning.tuning import read_tuning
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.real_log.about import read_about_robot
+from swarmwire.metrics.real_log.robot_log import read_about_robot
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.agent.runners import assigned_robots

@@ -14,6 +14,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.tick_view import TickView
 
 Kind = Literal["level", "count", "time"]
+Need = Literal["poses", "contacts", "graph", "airtime", "latency"]  # latency: on air
 Measure = Callable[[TickView], FloatArray | float]  # to (arenas,), or one number for all; NaN: nothing to measure
 
 
@@ -32,6 +33,9 @@ class Metric(ABC):
     unit: ClassVar[str] = ""
     kind: ClassVar[Kind] = "level"
     standard: ClassVar[bool] = False  # measured in every run; others where a scenario lists them
+    needs: ClassVar[tuple[Need, ...]] = (
+        "poses",
+    )  # data that logs of real robots may lack; without them it is left out
     bounds: ClassVar[tuple[float, float | None]]  # least and largest value of a tick; None: no largest
 
     @abstractmethod

@@ -10,7 +10,6 @@ from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric, Sampled
-from swarmwire.metrics.registry import METRICS, register
 from swarmwire.metrics.swarm.order import Order
 from swarmwire.metrics.tick_view import Components, TickView, agreement
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
@@ -84,21 +83,6 @@ def test_a_metric_with_parameters_is_given_as_an_object():
     [found] = seen(Metrics(["order", Turned(above_rad=1.0)]), of, {"pose": poses([0.0, 2.0, 3.0])})
     assert list(found) == ["order", "turned"]
     assert found["turned"]["final"] == 2.0
-
-
-def test_a_registered_metric_is_measured_by_name(monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.registry.METRICS", dict(METRICS))
-    register(Turned)
-    assert [metric.name for metric in Metrics(["turned"]).metrics] == ["turned"]
-
-
-@pytest.mark.parametrize("taken", ["order", "link_pdr"])
-def test_a_name_that_is_taken_is_refused(taken):
-    class Other(Turned):
-        name = taken
-
-    with pytest.raises(BadInput, check=lambda error: error.key == f"metrics.{taken}"):
-        register(Other)
 
 
 @pytest.mark.parametrize(

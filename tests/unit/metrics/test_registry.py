@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
-from swarmwire.metrics.custom_metrics import own_kind
-from swarmwire.metrics.listed import Item, listed
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.plug_ins import GROUP, PlugIn, plug_ins
-from swarmwire.metrics.registry import METRICS, standard
+from swarmwire.metrics.registry import (
+    GROUP,
+    METRICS,
+    MetricEntry,
+    PlugIn,
+    custom_metric_class,
+    plug_ins,
+    select_metrics,
+    standard,
+)
 from tests.support.metrics.packages import CODE, install
 from tests.support.metrics.truths import static, truth
 
@@ -25,20 +31,20 @@ def east(tmp_path: Path) -> str:
 
 
 def item(spec, place=0, **params):
-    return Item(f"metrics.{place}.metric" if params else f"metrics.{place}", spec, params)
+    return MetricEntry(f"metrics.{place}.metric" if params else f"metrics.{place}", spec, params)
 
 
 def stop(spec):
-    return Item("stop.metric", spec, None)
+    return MetricEntry("stop.metric", spec, None)
 
 
 def names(*items, **options):
-    return [metric.name for metric in listed(items, "s.toml", **options).metrics]
+    return [metric.name for metric in select_metrics(items, "s.toml", **options).metrics]
 
 
 def refused(*items):
     with pytest.raises(BadInput) as caught:
-        listed(items, "s.toml")
+        select_metrics(items, "s.toml")
     return caught.value
 
 
@@ -58,14 +64,14 @@ def test_without_the_standard_ones_there_is_what_is_listed(east):
 
 
 def test_a_standard_one_that_is_listed_keeps_its_place_and_takes_the_parameters():
-    found = listed([item("fragmentations", hold_s=3)], "s.toml").metrics
+    found = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
     assert [metric.name for metric in found] == standard()
     assert METRICS["fragmentations"](hold_s=3.0) in found
-    assert listed([item("order")], "s.toml") == listed([], "s.toml")
+    assert select_metrics([item("order")], "s.toml") == select_metrics([], "s.toml")
 
 
 def test_a_class_takes_parameters_and_is_told_as_code(east):
-    found = listed([item(east, from_m=2)], "s.toml", with_standard=False)
+    found = select_metrics([item(east, from_m=2)], "s.toml", with_standard=False)
     assert [(metric.name, metric.from_m) for metric in found.metrics] == [("east", 2.0)]
     assert found.code == (east,)
 
@@ -73,7 +79,7 @@ def test_a_class_takes_parameters_and_is_told_as_code(east):
 def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed(east):
     assert names(stop("order"), with_standard=False) == ["order"]
     assert names(item(east), stop("east"), with_standard=False) == ["east"]
-    [only] = listed([item("fragmentations", hold_s=3), stop("fragmentations")], "", with_standard=False).metrics
+    [only] = select_metrics([item("fragmentations", hold_s=3), stop("fragmentations")], "", with_standard=False).metrics
     assert only == METRICS["fragmentations"](hold_s=3.0)
     assert names(stop("order"), stop("order")) == standard()
 
@@ -112,7 +118,7 @@ def site(tmp_path, monkeypatch):
 
 def test_a_package_brings_metrics_by_name(site):
     install(site, "compass_metrics", {"east": "East"})
-    found = listed([item("east", from_m=1)], "s.toml", with_standard=False)
+    found = select_metrics([item("east", from_m=1)], "s.toml", with_standard=False)
     assert [metric.from_m for metric in found.metrics] == [1.0]
     assert found.code == ("compass_metrics:East",)
     assert names(stop("east"), with_standard=False) == ["east"]
@@ -142,7 +148,7 @@ def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site, package
 
 def test_a_name_of_swarmwires_own_stays_its_own(site):
     install(site, "taken_metrics", {"order": "East"})
-    assert type(listed([item("order")], "s.toml", with_standard=False).metrics[0]) is METRICS["order"]
+    assert type(select_metrics([item("order")], "s.toml", with_standard=False).metrics[0]) is METRICS["order"]
 
 
 def test_what_packages_bring_is_known_by_name_before_anything_is_imported(tmp_path, monkeypatch):
@@ -201,7 +207,7 @@ def spec_of(kind: type) -> str:
 
 
 def test_a_good_one_is_measured():
-    assert _measure(own_kind(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
+    assert _measure(custom_metric_class(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
 
 
 @pytest.mark.parametrize(
@@ -209,20 +215,20 @@ def test_a_good_one_is_measured():
 )
 def test_a_class_that_is_no_metric_is_refused(kind, hint):
     with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: .*{hint}"):
-        own_kind(spec_of(kind), "s.toml", "metrics.0")
+        custom_metric_class(spec_of(kind), "s.toml", "metrics.0")
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         *(("name", value) for value in ("two words", "order", "x_m", "link_pdr")),
-        *(("unit", 3), ("kind", "sum"), ("bounds", (None, 1.0))),
+        *(("unit", 3), ("kind", "sum"), ("needs", ("range",)), ("bounds", (None, 1.0))),
     ],
 )
 def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
     monkeypatch.setattr(Good, name, value)
     with pytest.raises(BadInput) as refused:
-        own_kind(spec_of(Good), "s.toml", "metrics.0")
+        custom_metric_class(spec_of(Good), "s.toml", "metrics.0")
     assert (refused.value.where, refused.value.key) == ("s.toml", "metrics.0")
     assert all(told in refused.value.expected for told in ("Good: ", name, repr(value)))
 

@@ -31,8 +31,7 @@ from swarmwire.deploy.catalogue.schema import (
 )
 from swarmwire.deploy.radio.probe import radio_of
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.plug_ins import GROUP, PlugIn, plug_ins
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.registry import GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.scenario_file import scenario_schema
 

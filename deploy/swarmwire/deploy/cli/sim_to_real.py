@@ -40,7 +40,7 @@ def sim_to_real_command(
     from swarmwire.metrics.real_log.measured_log import measured_log
     from swarmwire.metrics.real_log.real_logs import read_real_logs
     from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
-    from swarmwire.metrics.sim_to_real.sim_to_real_csv import write_sim_to_real
+    from swarmwire.metrics.sim_to_real.texts import write_sim_to_real
 
     for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
         if path is not None:
@@ -53,7 +53,7 @@ def sim_to_real_command(
     print_sim_to_real(found, told, Console(highlight=False))
     if to is not None:
         from swarmwire.metrics.report.page import write_report
-        from swarmwire.metrics.sim_to_real.sim_to_real_report import sim_to_real_report
+        from swarmwire.metrics.sim_to_real.report import sim_to_real_report
 
         write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), to)
         typer.echo(f"written: {to}")

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from swarmwire.deploy.terminal.rows import print_rows
 from swarmwire.metrics.sim_to_real.comparison import SimToReal
-from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
+from swarmwire.metrics.sim_to_real.texts import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,

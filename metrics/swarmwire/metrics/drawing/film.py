@@ -10,8 +10,7 @@ from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.registry import LINK_PDR
-from swarmwire.metrics.run_folder.layout import MetricInfo
-from swarmwire.metrics.run_folder.ticks import MOVABLE
+from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
 
 if TYPE_CHECKING:
     import polars as pl

@@ -39,6 +39,7 @@ class AgeOfInformation(Metric):
     )
     unit = "s"
     standard = True
+    needs = ()
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -29,6 +29,7 @@ class ComponentCount(Metric):
     name = "components"
     help = "connected components of the radio graph over robots alive"
     standard = True
+    needs = ("graph",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -51,6 +52,7 @@ class LargestComponent(Metric):
     name = "largest_component"
     help = "share of the robots alive that are in the radio graph's largest component"
     standard = True
+    needs = ("graph",)
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
@@ -83,6 +85,7 @@ class AlgebraicConnectivity(Sampled):
         "second smallest eigenvalue of the radio graph's Laplacian over robots alive, not divided by their number: "
         "0 in pieces"
     )
+    needs = ("graph",)
     bounds = (0.0, None)
 
     def sample(self, static: Static) -> Measure:
@@ -154,6 +157,7 @@ class Articulation(Sampled):
 
     name = "articulation"
     help = "robots alive whose loss would split their component of the radio graph"
+    needs = ("graph",)
     bounds = (0.0, None)
 
     def sample(self, static: Static) -> Measure:

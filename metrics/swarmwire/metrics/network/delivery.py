@@ -26,6 +26,8 @@ RECEIVED = int(Fate.RECEIVED)
 class OfWindow(Metric):
     """A metric of what happened in the last while."""
 
+    needs = ()
+
     window_s: float = parameter(
         1.0, help="what counts is so old at most; rounded up to whole ticks", unit="s", above=0.0
     )
@@ -123,6 +125,7 @@ class Throughput(Metric):
     help = "payload received by all robots together, a broadcast once for each, in bit/s"
     unit = "bit/s"
     standard = True
+    needs = ()
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -158,6 +161,7 @@ class Airtime(Metric):
     name = "airtime"
     help = "share of the time that a robot's radio has packets on air, mean over robots alive"
     standard = True
+    needs = ("airtime",)
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

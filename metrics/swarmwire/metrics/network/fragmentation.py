@@ -31,6 +31,8 @@ NEVER = -1
 class OfFragmentation(Metric):
     """A metric of fragmentation events."""
 
+    needs = ("graph",)
+
     hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
 
 

@@ -101,6 +101,7 @@ class LatencyOnAir(_Latency):
     """Mean latency on air: received_at - sent_at."""
 
     name = "latency_air"
+    needs = ("latency",)
     help = "time from sending to hearing, mean over packets received in the last window_s, in s"
 
     def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:

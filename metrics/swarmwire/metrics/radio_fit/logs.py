@@ -9,12 +9,10 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.losses import LossSequences
-from swarmwire.metrics.real_log.clock_offsets import in_step
 from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
-from swarmwire.metrics.real_log.log_table import LogTable
-from swarmwire.metrics.real_log.poses import posed_span_s, poses_at
-from swarmwire.metrics.real_log.real_logs import RealLogs
-from swarmwire.metrics.real_log.robot_log import RobotLog, received_packets
+from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
+from swarmwire.metrics.real_log.robot_log import LogTable, RobotLog, received_packets
+from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
 from swarmwire.metrics.table_file import MeasuredTable
 
 NETWORK_COLUMNS = ("t_s", "tx", "rx", "seq")

@@ -10,11 +10,19 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.metric import Metric, Need
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.real_log.not_in_log import WORLD, why_not
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.truths import real_run
+
+WORLD = "world"  # a robot's kind of radio: that of a run
+LACKS: dict[Need, str] = {
+    "contacts": "contacts are not in the log",
+    "graph": "a real network knows no range, so there is no radio graph in the log",
+    "airtime": "times on air are not in the log",
+    "latency": "the robots' radio was that of a run, whose latencies robots know to the agent alone: see latency_agent",
+    "poses": "poses are not in the log: no tracker",
+}
 
 
 @dataclass(frozen=True)
@@ -60,3 +68,9 @@ def measured_log(
         left_out={name: lack for name, lack in lacks.items() if lack is not None},
         notes=run.notes,
     )
+
+
+def why_not(metric: Metric, *, has_poses: bool, has_air: bool = False) -> str | None:
+    """The data that a log lacks for this metric; None: none. `has_air`: packets went over a run's radio."""
+    there: set[Need] = {*(("poses",) if has_poses else ()), *(() if has_air else ("latency",))}
+    return next((LACKS[need] for need in metric.needs if need not in there), None)

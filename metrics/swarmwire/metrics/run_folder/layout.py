@@ -21,6 +21,19 @@ SUMMARY_FORMAT = 1  # of summary.json
 RUN_FORMAT = 1  # of run.json
 TABLES_FORMAT = 1  # of static.json, which has it, and of the tables
 
+# Columns of the table `ticks`
+POSE = ("x_m", "y_m", "heading_rad")  # arena frame
+VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
+COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
+SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
+MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
+ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
+VALUE = "value"  # a list with a number per robot, float64; only once a robot has told one
+MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
+RADIO = ("sent", "received", "in_range")  # packets; receivers; receivers: since the tick before
+KEYS = ("tick", "time_s", "arena", "seed")
+TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO)  # names that a metric cannot have
+
 
 @dataclass(frozen=True)
 class MetricInfo:

@@ -14,22 +14,24 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.layout import (
+    COMMAND,
+    KEYS,
+    MOTION,
+    MOVABLE,
+    POSE,
+    RADIO,
+    ROBOT_COLUMNS,
+    SIDEWAYS,
+    VALUE,
+    VELOCITY,
+)
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks, per_arena
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 
 if TYPE_CHECKING:
     import polars as pl
 
-POSE = ("x_m", "y_m", "heading_rad")  # arena frame
-VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
-COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
-SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
-MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
-ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
-VALUE = "value"  # a list with a number per robot, float64; only once a robot has told one
-MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
-RADIO = ("sent", "received", "in_range")  # packets; receivers; receivers: since the tick before
-KEYS = ("tick", "time_s", "arena", "seed")
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 CHUNK_BYTES = 4_000_000
 MAX_TICKS = 4096  # in a chunk, however small the swarm

@@ -26,6 +26,7 @@ class Collisions(Metric):
     help = "contacts between two robots that began, a lasting one once"
     kind = "count"
     standard = True
+    needs = ("contacts",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -41,6 +42,7 @@ class WallContacts(Metric):
     help = "contacts of a robot with a wall or an obstacle that began, a lasting one once"
     kind = "count"
     standard = True
+    needs = ("contacts",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -73,6 +75,7 @@ class CollisionRate(Metric):
     name = "collision_rate"
     help = "contacts between robots per robot-hour so far, each counted for both robots, in 1/h"
     unit = "1/h"
+    needs = ("contacts",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -34,6 +34,7 @@ class Oscillation(Metric):
     name = "oscillation"
     help = "changes of the commanded turning side per robot-minute so far, in 1/min"
     unit = "1/min"
+    needs = ()
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -27,6 +27,7 @@ class ConsensusError(Metric):
 
     name = "consensus_error"
     help = "root mean square deviation from their mean of the values that robots alive told, in the values' unit"
+    needs = ()
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -63,6 +64,7 @@ class ConsensusBias(Metric):
 
     name = "consensus_bias"
     help = "mean of the values that robots alive told last - mean of those told first, in the values' unit"
+    needs = ()
     bounds = (-np.inf, None)
 
     def begin(self, static: Static) -> Measure:

@@ -8,8 +8,7 @@ import pytest
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.real_log.measured_log import measured_log
-from swarmwire.metrics.real_log.not_in_log import LACKING, WITHOUT_POSES, why_not
+from swarmwire.metrics.real_log.measured_log import measured_log, why_not
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.truths import real_run
 from swarmwire.metrics.registry import METRICS
@@ -112,17 +111,12 @@ def test_every_metric_is_measured_as_in_the_run_or_left_out_since_the_log_lacks_
         assert np.nanmean(found) == pytest.approx(np.nanmean(of_run[name]), rel=0.05, abs=0.05)
 
 
-@pytest.mark.parametrize("name", sorted(WITHOUT_POSES))
+@pytest.mark.parametrize("name", [name for name in METRICS if why_not(METRICS[name](), has_poses=False) is None])
 def test_what_is_measured_without_poses_needs_none(name, real):
     metric, unknown = METRICS[name](), np.full_like(real._motion.pose, np.nan)
     blind = replace(real, _motion=replace(real._motion, pose=unknown, velocity=unknown))
     with_poses, without = (measures(real.static, of.truths(), [metric]) for of in (real, blind))
     np.testing.assert_array_equal(with_poses, without)
-
-
-def test_reasons_are_of_metrics_that_there_are():
-    assert set(LACKING) | WITHOUT_POSES <= set(METRICS)
-    assert not set(LACKING) & WITHOUT_POSES
 
 
 def test_without_a_tracker_the_radio_is_measured_and_nothing_else(tmp_path):

@@ -14,13 +14,13 @@ from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.sim_to_real.comparison import (
     MetricRow,
     RadioRow,
+    RadioValue,
     SimToReal,
     Spread,
     compare_sim_to_real,
 )
 from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns, runs_of_folder
-from swarmwire.metrics.sim_to_real.radio_values import RadioValue
-from swarmwire.metrics.sim_to_real.sim_to_real_texts import (
+from swarmwire.metrics.sim_to_real.texts import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,

@@ -1,15 +1,35 @@
-"""A sim-to-real comparison as people read it: cells of its tables, its verdict in a line, and what the numbers mean."""
+"""A sim-to-real comparison for people (tables, verdict, meanings) and for programs (CSV)."""
 
+import csv
 import math
 from collections import defaultdict
 from collections.abc import Mapping
+from pathlib import Path
 
+from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.summary import interval_text, number_text
 
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
 RADIO_COLUMNS = ("radio", "emulated", "log", "within")  # and of that of the radio
 WITHIN = {True: "yes", False: "no", None: "–"}
+CSV_COLUMNS = (
+    "name",
+    "what",
+    "unit",
+    "kind",
+    "runs",
+    "emulated_q05",
+    "emulated_q50",
+    "emulated_q95",
+    "log",
+    "distance",
+    "spread",
+    "ks",
+    "difference_low",
+    "difference_high",
+    "within",
+)
 
 
 def metric_cells(row: MetricRow) -> tuple[str, ...]:
@@ -107,3 +127,54 @@ def _by_reason(lacks: Mapping[str, str]) -> dict[str, list[str]]:
     for name, why in lacks.items():
         found[why].append(name)
     return found
+
+
+def write_sim_to_real(of: SimToReal, to: Path) -> None:
+    """Write a row per metric and number of the radio; BadInput unless the path is that of a .csv that can be written.
+
+    Empty: unknown. `what` is metric or radio; of what was not in the log or not compared, all numbers are empty.
+    """
+    check_output_path(to, (".csv",))
+    with output_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+        writer: csv.DictWriter[str] = csv.DictWriter(file, list(CSV_COLUMNS), restval="")
+        writer.writeheader()
+        writer.writerows(_rows(of))
+
+
+def _rows(of: SimToReal) -> list[dict[str, str]]:
+    rows: list[dict[str, str]] = []
+    for row in of.rows:
+        about = {"name": row.metric.name, "what": "metric", "unit": row.metric.unit, "kind": row.metric.kind}
+        numbers = {
+            "runs": len(row.runs),
+            "emulated_q05": row.emulated.low,
+            "emulated_q50": row.emulated.median,
+            "emulated_q95": row.emulated.high,
+            "log": row.log,
+            "distance": row.distance,
+            "spread": row.reach,
+            "ks": row.ks,
+            "difference_low": row.difference.low,
+            "difference_high": row.difference.high,
+        }
+        rows.append(about | _number_texts(numbers) | {"within": _word(row.within)})
+    for row in of.radio:
+        about = {"name": row.of.name, "what": "radio", "unit": row.of.unit, "kind": "total"}
+        numbers = {
+            "runs": row.runs,
+            "emulated_q05": row.emulated.low,
+            "emulated_q50": row.emulated.median,
+            "emulated_q95": row.emulated.high,
+            "log": row.of.log,
+        }
+        rows.append(about | _number_texts(numbers) | {"within": _word(row.within)})
+    rows += [{"name": name, "what": "not in the log"} for name in of.not_in_log]
+    return rows + [{"name": name, "what": "not compared"} for name in of.not_compared]
+
+
+def _number_texts(numbers: dict[str, float]) -> dict[str, str]:
+    return {name: "" if math.isnan(value) else str(value) for name, value in numbers.items()}
+
+
+def _word(within: bool | None) -> str:
+    return "" if within is None else "yes" if within else "no"
