@@ -7,7 +7,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.metrics.statistics.sample import number_sample
-from swarmwire.metrics.statistics.summary import Summary, interval_text, number_text, summary
+from swarmwire.metrics.statistics.summary import Summary, interval_text, summary
+from swarmwire.metrics.text import number_text
 
 LOSS, LATENCY = "radio.loss", "radio.latency_s"
 CAMPAIGNS = ("lennard-jones",)

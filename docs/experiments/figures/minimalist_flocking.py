@@ -14,8 +14,9 @@ import polars as pl
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
-from swarmwire.metrics.statistics.summary import interval_text, number_text, quartiles_text, summary
+from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier, resampled_quantiles
+from swarmwire.metrics.text import number_text
 
 COUNT = "robots.swarm.count"
 SEPARATION, LATERAL, REAR = (f"robots.swarm.params.{name}_diameters" for name in ("separation", "lateral", "rear"))

@@ -14,8 +14,9 @@ from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.metrics.campaign.point_values import value_text
 from swarmwire.metrics.campaign.response import FINAL, LINK_PDR, Response
 from swarmwire.metrics.statistics.sample import Sample
-from swarmwire.metrics.statistics.summary import number_text, quantile_text
+from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.text import number_text
 
 MAX_POINTS = 20  # that are shown
 MAX_RESPONSES = 4

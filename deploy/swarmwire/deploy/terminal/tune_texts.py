@@ -8,8 +8,9 @@ from swarmwire.deploy.tuning.goal import SHARES, Goal
 from swarmwire.deploy.tuning.trial import Trial
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
-from swarmwire.metrics.statistics.summary import UNKNOWN_TEXT, interval_text, number_text, quantile_text, summary
+from swarmwire.metrics.statistics.summary import interval_text, quantile_text, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
 def statistic_text(trial: Trial, goal: Goal) -> str:

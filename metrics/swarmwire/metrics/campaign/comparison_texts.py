@@ -6,7 +6,8 @@ from swarmwire.metrics.campaign.comparison import Comparison, Row
 from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.metrics.campaign.point_values import point_text
 from swarmwire.metrics.campaign.selection import Selection
-from swarmwire.metrics.statistics.summary import interval_text, number_text, quartiles_text
+from swarmwire.metrics.statistics.summary import interval_text, quartiles_text
+from swarmwire.metrics.text import number_text
 
 # Heads of a comparison's table.
 COLUMNS = ("response", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")

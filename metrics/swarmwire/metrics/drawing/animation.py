@@ -31,6 +31,11 @@ TRAIL_S = 5.0
 MAX_TRAIL_POINTS = 64
 _STRIP_IN = 1.15  # height of the metrics where they stand below the arena
 _LEGEND_WIDTH_IN = LONG_SIDE_IN - 0.3
+COLORS = 64
+EVEN_COLORS = 24  # of these, of areas
+_SAME = 6  # steps of a colour that make no difference
+_MS_STEP = 10  # a GIF counts time in hundredths of a second
+_QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for visually lossless
 
 
 class FilmFigure:
@@ -148,12 +153,6 @@ def _entries(film: Film) -> list[Any]:
     return entries
 
 
-COLORS = 64
-EVEN_COLORS = 24  # of these, of areas
-_SAME = 6  # steps of a colour that make no difference
-_MS_STEP = 10  # a GIF counts time in hundredths of a second
-
-
 def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray], frames_per_s: float) -> None:
     """Write frames (height, width, 3) as a film that repeats for ever, with the colours that the samples need.
 
@@ -202,9 +201,6 @@ def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
     for frame in frames:
         # Without dithering, so that what stands still is equal from frame to frame and costs nothing.
         yield Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-
-
-_QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for visually lossless
 
 
 def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> None:

@@ -40,6 +40,11 @@ from swarmwire.metrics.drawing.style import (
     add_facts,
 )
 
+_VIEW_IN, _UNDER_IN, _EDGE_IN, _HEAD_IN = 3.55, 0.25, 0.14, 0.4
+_CAPTION_LETTERS, _CAPTION_ROW_IN = 118, 0.14
+_CURVE_IN = 0.75
+_VALUES_AT_IN = 0.95  # of facts, from their names
+
 
 def facts_of(body: Body) -> list[tuple[str, str]]:
     """Name and value of each; a fact without a name goes on with the one above."""
@@ -119,12 +124,6 @@ def _count(number: int, what: str) -> str:
 
 def _length(metres: float) -> str:
     return f"{100.0 * metres:.3g} cm" if metres < 1.0 else f"{metres:.3g} m"
-
-
-_VIEW_IN, _UNDER_IN, _EDGE_IN, _HEAD_IN = 3.55, 0.25, 0.14, 0.4
-_CAPTION_LETTERS, _CAPTION_ROW_IN = 118, 0.14
-_CURVE_IN = 0.75
-_VALUES_AT_IN = 0.95  # of facts, from their names
 
 
 def draw_body(body: Body, to: Path, size_px: int) -> None:

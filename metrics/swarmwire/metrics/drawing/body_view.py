@@ -32,6 +32,11 @@ from swarmwire.metrics.palette import robot_color
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
 _FADES_FROM, _FADING = 0.6, 10  # of the view, where rays that leave it begin to fade; and in so many steps
 _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
+_COLOR = robot_color(0)
+_ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
+_BELOW = -0.035  # where legend and bar are, as a share of the view's height
+_MIN_LINE_PT = 0.9  # of a legend
+_MIN_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def draw_parts(axes: Any, body: Body) -> None:
@@ -112,13 +117,6 @@ def _turned(ahead_m: ArrayLike, left_m: ArrayLike) -> tuple[FloatArray, FloatArr
     c, s = math.cos(math.pi / 2), math.sin(math.pi / 2)
     ahead, left = np.asarray(ahead_m, np.float64), np.asarray(left_m, np.float64)
     return c * ahead - s * left, s * ahead + c * left
-
-
-_COLOR = robot_color(0)
-_ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
-_BELOW = -0.035  # where legend and bar are, as a share of the view's height
-_MIN_LINE_PT = 0.9  # of a legend
-_MIN_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def draw_from_above(axes: Any, body: Body) -> None:

@@ -11,6 +11,13 @@ from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.style import LONG_SIDE_IN, PAPER
 
 MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
+PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
+_EDGE_IN, _GAP_IN = 0.14, 0.2
+_TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
+_PANEL_BESIDE_IN = 1.95
+_FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
+_MIN_WIDTH_IN = 3.9
+_BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
 
 
 def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
@@ -55,15 +62,6 @@ def save(figure: Any, to: Path) -> None:
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
     with output_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
         figure.savefig(part, dpi=figure.dpi, metadata=undated)
-
-
-PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
-_EDGE_IN, _GAP_IN = 0.14, 0.2
-_TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
-_PANEL_BESIDE_IN = 1.95
-_FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
-_MIN_WIDTH_IN = 3.9
-_BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
 
 
 @dataclass(frozen=True)

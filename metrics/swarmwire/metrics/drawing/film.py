@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 
 NO_STATE = -1
+MAX_BY_DEFAULT = 300  # frames
+MAX_FRAMES = 20_000
+_SPEEDS = (1, 2, 4, 5, 8, 10)  # times a power of ten
 
 
 class Recorded(Protocol):
@@ -120,11 +123,6 @@ def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
         )
         found[LINK_PDR] = np.divide(received, in_range, out=np.full(len(received), np.nan), where=in_range > 0)
     return found
-
-
-MAX_BY_DEFAULT = 300  # frames
-MAX_FRAMES = 20_000
-_SPEEDS = (1, 2, 4, 5, 8, 10)  # times a power of ten
 
 
 @dataclass(frozen=True)

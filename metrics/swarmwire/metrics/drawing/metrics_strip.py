@@ -16,6 +16,11 @@ from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 
 Facts = Mapping[str, MetricInfo]
 UNKNOWN: Facts = {}
+MAX_PLOTS = 4
+PREFERRED = ("target_best", "target_mean", "order", "largest_component", LINK_PDR, "min_gap", "collisions")
+USUAL_PLOTS = 3
+_MAX_POINTS = 1500  # of a curve: more than a plot has pixels
+_HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
 
 
 def told_of(name: str, facts: Facts) -> MetricInfo:
@@ -48,13 +53,6 @@ def titled(name: str, facts: Facts = UNKNOWN) -> str:
     unit = told_of(name, facts).unit
     words = name.replace("_", " ")
     return f"{words} ({unit})" if unit else words
-
-
-MAX_PLOTS = 4
-PREFERRED = ("target_best", "target_mean", "order", "largest_component", LINK_PDR, "min_gap", "collisions")
-USUAL_PLOTS = 3
-_MAX_POINTS = 1500  # of a curve: more than a plot has pixels
-_HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
 
 
 def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> list[str]:

@@ -35,6 +35,15 @@ if TYPE_CHECKING:
 
 
 _BEYOND = 1.5  # of the distance at which the last packet was received: how far the picture goes
+_DELIVERY_HEIGHT_IN = 3.9
+_COVERAGE_HEIGHT_IN, _EDGE_IN = 3.75, 0.3
+_MAP_IN = 2.55  # longer side of the arena
+_MAP_TOP_IN = 0.64  # below the upper edge
+_COLORS, _OF_DISK = "viridis", 0.55
+_SCALE_TICKS = 5
+_STRENGTH_ABOVE = 0.6  # opacity of the map, so that it does not shout down what stands on it
+_TITLE: Look = {"loc": "left", "fontsize": TEXT_PT, "color": SOFT, "pad": 4}
+_LEGEND: Look = {"fontsize": SMALL_PT, "frameon": False, "labelcolor": SOFT, "loc": "best"}
 
 
 def received_bins(table: "pl.DataFrame") -> "pl.DataFrame":
@@ -78,9 +87,6 @@ def _edges_m(table: "pl.DataFrame") -> FloatArray:
     return np.append(table["from_m"].to_numpy(), table["to_m"][-1])
 
 
-_DELIVERY_HEIGHT_IN = 3.9
-
-
 def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
     """Write the picture of one arena. BadInput for a path, size or arena that cannot be, or a run without the table."""
     static = run.static
@@ -97,14 +103,6 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
     draw_ratio(upper, table, static.range_m)
     draw_intended(lower, table)
     save(figure, to)
-
-
-_COVERAGE_HEIGHT_IN, _EDGE_IN = 3.75, 0.3
-_MAP_IN = 2.55  # longer side of the arena
-_MAP_TOP_IN = 0.64  # below the upper edge
-_COLORS, _OF_DISK = "viridis", 0.55
-_SCALE_TICKS = 5
-_STRENGTH_ABOVE = 0.6  # opacity of the map, so that it does not shout down what stands on it
 
 
 def draw_coverage(
@@ -134,10 +132,6 @@ def draw_coverage(
             strength.axhline(sensitivity_dbm, color=SOFT, lw=0.9, ls=(0, (4, 3)), label="sensitivity")
     delivery.legend(*explained.get_legend_handles_labels(), **_LEGEND)  # where curves leave room
     save(figure, to)
-
-
-_TITLE: Look = {"loc": "left", "fontsize": TEXT_PT, "color": SOFT, "pad": 4}
-_LEGEND: Look = {"fontsize": SMALL_PT, "frameon": False, "labelcolor": SOFT, "loc": "best"}
 
 
 def _draw_map(figure: Any, static: Static, found: CoverageMap, sensitivity_dbm: float | None) -> None:

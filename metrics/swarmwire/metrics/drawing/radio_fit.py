@@ -32,6 +32,8 @@ _DECADE = 10.0  # of the farthest distance over the nearest, from which on the a
 _MAX_POINTS = 4000
 _LONGEST_SHARE = 0.999  # of bursts, that the axis reaches to
 _BAND = 1.645  # deviations: nine of ten packets
+_BINS, _LATENCY_BINS = 30, 60
+_LATEST = 0.995  # of the latencies, that the axis reaches to
 
 
 def draw_radio_fit(fit: RadioFit, title: str, to: Path, size_px: int) -> None:
@@ -118,10 +120,6 @@ def say(axes: Any, text: str) -> None:
     """A text in place of a drawing."""
     axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT_PT, color=SOFT)
-
-
-_BINS, _LATENCY_BINS = 30, 60
-_LATEST = 0.995  # of the latencies, that the axis reaches to
 
 
 def draw_network_fit(fit: NetworkFit, title: str, to: Path, size_px: int) -> None:

@@ -34,6 +34,9 @@ from swarmwire.metrics.drawing.style import (
 from swarmwire.metrics.palette import Color, robot_color
 
 DARKEST = 0.45  # of the page's white: how a shade of 0 is shown
+_BAR_BELOW_IN = 0.1
+_GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
+_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend, and of what stands before a text
 
 
 def draw_floor(axes: Any, floor: Floor, static: Static, outline: Any) -> None:
@@ -62,10 +65,6 @@ def draw_floor(axes: Any, floor: Floor, static: Static, outline: Any) -> None:
 def shown(shade: Any) -> Any:
     """How bright a shade 0 … 1, or an array of them, is drawn."""
     return DARKEST + (1.0 - DARKEST) * shade
-
-
-_BAR_BELOW_IN = 0.1
-_GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
 
 
 def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
@@ -145,9 +144,6 @@ def _draw_light(axes: Any, x_m: float, y_m: float, side_m: float) -> None:
         axes.add_patch(glow)
     core = {"facecolor": LIGHT, "edgecolor": LIGHT_EDGE, "linewidth": 0.8, "zorder": 1.3}
     axes.add_patch(Circle((x_m, y_m), 0.009 * side_m, **core))
-
-
-_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend, and of what stands before a text
 
 
 def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> list[Any]:

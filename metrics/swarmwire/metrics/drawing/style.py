@@ -33,6 +33,7 @@ STATE_COLORS: tuple[Color, ...] = (
 OTHER_STATE: Color = (205, 208, 214)  # of robots in none of the states that have a colour
 
 _SHADE = 0.58  # how dark a colour's outline is beside it
+ROW_IN = 0.185
 
 
 def rgb(color: Color) -> tuple[float, float, float]:
@@ -58,9 +59,6 @@ def plain_axes(figure: Any, place: tuple[float, float, float, float], title: str
     axes.tick_params(which="both", labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     axes.set_title(title, loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
     return axes
-
-
-ROW_IN = 0.185
 
 
 def add_facts(

@@ -13,6 +13,17 @@ from swarmwire.metrics.drawing.style import DEAD, INK, LINK, OTHER_STATE, STATE_
 from swarmwire.metrics.palette import robot_color
 from swarmwire.metrics.torus import link_lines
 
+_HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
+_SHADOW_AT = (0.65, -0.8)  # from the centre of a disc, in its radii
+_SHADOW_RADII = (1.2, 1.05, 0.85)  # discs over one another make it soft
+_SHADOW_OPACITY = 0.13  # of each of them
+_FLOOR_ORDER, _AIR_ORDER = 4.0, 5.5
+_LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
+_FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first
+_CROWD = 200  # robots; in greater swarms trails are of one part and few points
+_CROWD_POINTS = 7
+_NOBODY = np.empty((0, 2, 2))
+
 
 def in_range(
     position_m: AnyArray,
@@ -68,13 +79,6 @@ def _touches_polygon(corners: FloatArray, start: FloatArray, end: FloatArray) ->
     return enter <= leave
 
 
-_HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
-_SHADOW_AT = (0.65, -0.8)  # from the centre of a disc, in its radii
-_SHADOW_RADII = (1.2, 1.05, 0.85)  # discs over one another make it soft
-_SHADOW_OPACITY = 0.13  # of each of them
-_FLOOR_ORDER, _AIR_ORDER = 4.0, 5.5
-
-
 class Discs:
     """The discs of some of a swarm's rows, the first at the bottom, with lines that tell where they head."""
 
@@ -120,13 +124,6 @@ class Discs:
         self._discs.set_facecolor(fill[self._rows])
         self._discs.set_edgecolor(rim[self._rows])
         self._headings.set_color(rim[self._rows])
-
-
-_LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
-_FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first
-_CROWD = 200  # robots; in greater swarms trails are of one part and few points
-_CROWD_POINTS = 7
-_NOBODY = np.empty((0, 2, 2))
 
 
 class Swarm:

@@ -38,10 +38,15 @@ class Latencies:
 
     def of(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
         """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
-        acts_at_ns = -(-tick // self._act_every_ticks) * self._act_every_ticks * NS_PER_S // self._rate_hz
         ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns
-        received, air_ns, agent_ns = _latencies_ns(*ended, acts_at_ns)
+        at_ns = acts_at_ns(tick, self._act_every_ticks, self._rate_hz)
+        received, air_ns, agent_ns = _latencies_ns(*ended, at_ns)
         return finished.arena.take(received), air_ns, agent_ns
+
+
+def acts_at_ns(tick: int | IntArray, act_every_ticks: IntArray, rate_hz: int) -> IntArray:
+    """The start of the first tick, from `tick` on, at which each agent acts, (k,)."""
+    return -(-tick // act_every_ticks) * act_every_ticks * NS_PER_S // rate_hz
 
 
 @njit()

@@ -18,6 +18,14 @@ EVEN = 1000  # quantiles of a fitted delay that packets are held against
 FOLDS = 10  # parts of the packets by which errors are told
 MIN_SHAPE, MAX_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
 SYMMETRIC = 3.0  # deviations that a normal delay's mean is above 0 at least: nothing is cut off
+_Z = float(ndtri(1.0 - TAIL))
+_SHARES: FloatArray = (np.arange(EVEN) + 0.5) / EVEN
+MIN_PACKETS = 100
+PERCENTS = (50.0, 90.0, 99.0)
+OTHER_SHAPE = 0.1  # Kolmogorov and Smirnov's distance from which on the delay is said not to be uniform
+NOT_UNIFORM = 0.05  # that distance from which on other distributions are tried
+KOLMOGOROV = 1.36  # 5 % of uniform samples are farther from their law than this over the root of their number
+CLEARLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -128,17 +136,7 @@ def _pareto(low: float, middle: float, high: float) -> _Law | None:
     return _Law(constant, mean_s, deviation_s, constant + least_s * (1.0 - _SHARES) ** (-1.0 / shape))
 
 
-_Z = float(ndtri(1.0 - TAIL))
-_SHARES: FloatArray = (np.arange(EVEN) + 0.5) / EVEN
 _LAWS = {"normal": _normal, "lognormal": _lognormal, "pareto": _pareto}
-
-
-MIN_PACKETS = 100
-PERCENTS = (50.0, 90.0, 99.0)
-OTHER_SHAPE = 0.1  # Kolmogorov and Smirnov's distance from which on the delay is said not to be uniform
-NOT_UNIFORM = 0.05  # that distance from which on other distributions are tried
-KOLMOGOROV = 1.36  # 5 % of uniform samples are farther from their law than this over the root of their number
-CLEARLY = 0.5
 
 
 @dataclass(frozen=True)

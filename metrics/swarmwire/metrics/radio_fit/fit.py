@@ -12,6 +12,10 @@ from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit, fit_pat
 from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, fit_shadowing, places_of
 
 BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter from which the missing RSSI are worth a word
+MIN_PACKETS = 100
+MIN_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
+STRAY = 0.01  # share of the packets beyond the range that may arrive nevertheless
+NEIGHBOURS = 0.1  # delivered both ways at least: an edge of the emulator's radio graph, unless told
 
 
 @dataclass(frozen=True)
@@ -114,11 +118,6 @@ def _lost_far_out(log: RadioLog) -> float:
     return lost / (lost + float((far & log.received).sum()))
 
 
-MIN_PACKETS = 100
-MIN_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
-STRAY = 0.01  # share of the packets beyond the range that may arrive nevertheless
-
-
 @dataclass(frozen=True)
 class RangeFit:
     """What distances tell."""
@@ -167,9 +166,6 @@ def _log_likelihood_of(successes: FloatArray, count: FloatArray, most: float) ->
 
 def _entropy(count: FloatArray, share: FloatArray) -> FloatArray:
     return np.where(count > 0, count * np.log(np.maximum(share, 1e-300)), 0.0)
-
-
-NEIGHBOURS = 0.1  # delivered both ways at least: an edge of the emulator's radio graph, unless told
 
 
 @dataclass(frozen=True)

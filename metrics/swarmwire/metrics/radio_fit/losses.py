@@ -13,6 +13,14 @@ from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.metrics.radio_fit.path_loss import Estimate, standard_errors
 
 STRETCH = 1000
+MIN_PACKETS, MIN_LOST = 100, 10
+MAX_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds
+BURSTY_Z = -3.0  # of the runs test: false alarm 1 in 700
+WIDEST, WIDEST_LOGIT = 8.0, 9.0  # how far logarithms of durations may go from the start, and logits from 0
+IMPOSSIBLE = 1e300  # the cost where the likelihood is 0
+STEP = 0.02  # of the same, for the curvature
+NAMES = ("bad_s", "good_s", "loss_bad", "loss_good")
+KINDS = {2: "bursts that lose all", 3: "bursts that lose a share", 4: "bursts, and single losses between"}
 
 
 @dataclass(frozen=True)
@@ -118,16 +126,6 @@ def runs_z(sequences: LossSequences) -> float:
     variance = both * (both - packets) / (packets**2 * np.maximum(packets - 1.0, 1.0))
     total = float(variance.sum())
     return float((runs - both / packets - 1.0).sum()) / math.sqrt(total) if total > 0.0 else math.nan
-
-
-MIN_PACKETS, MIN_LOST = 100, 10
-MAX_PACKETS = 200_000  # that the search for bursts goes through some hundred times: a few seconds
-BURSTY_Z = -3.0  # of the runs test: false alarm 1 in 700
-WIDEST, WIDEST_LOGIT = 8.0, 9.0  # how far logarithms of durations may go from the start, and logits from 0
-IMPOSSIBLE = 1e300  # the cost where the likelihood is 0
-STEP = 0.02  # of the same, for the curvature
-NAMES = ("bad_s", "good_s", "loss_bad", "loss_good")
-KINDS = {2: "bursts that lose all", 3: "bursts that lose a share", 4: "bursts, and single losses between"}
 
 
 @dataclass(frozen=True)

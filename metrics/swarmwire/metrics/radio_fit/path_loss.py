@@ -8,15 +8,19 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 
+CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+MIN_PACKETS = 10
+MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
+MIN_CLUSTERS = 10
+# Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
+MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
+
 
 class Estimate(NamedTuple):
     """A value and its standard error, in the unit that its name tells."""
 
     value: float
     standard_error: float  # NaN: the data do not tell
-
-
-CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
 
 
 def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: float) -> FloatArray:
@@ -35,13 +39,6 @@ def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: f
         return np.full(count, np.nan)
     variance = np.diag(np.linalg.inv(bend))
     return np.where(variance > 0.0, np.sqrt(np.abs(variance)), np.nan)
-
-
-MIN_PACKETS = 10
-MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
-MIN_CLUSTERS = 10
-# Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
-MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
 
 
 @dataclass(frozen=True)

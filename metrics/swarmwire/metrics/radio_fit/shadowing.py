@@ -13,6 +13,18 @@ from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit, design
 
 SAME_PLACE_M = 0.05
 MAX_PLACES = 300
+WAVES = 2048  # within 0.02 of the exact covariance for links up to 15 correlation distances long
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+STEPS = 24
+FINEST_SHARE, COARSEST_SHARE = 0.004, 0.6  # correlation distances that are tried, over the extent of the places
+WORKING_SHARE, WORKING_NOISE = 0.05, 0.5  # the working covariance: delta over the extent, and noise over sigma
+MIN_PLACES = 30
+DRAWN = 200  # fields for the standard errors, which they give to 5 %
+FALSE_ALARM = 0.01
+FIELD, NOISE = purpose("fitted field"), purpose("fitted noise")
+KEY = derive_key("radio fit")
+BINS = 16
+FARTHEST = 5.0  # correlation distances
 
 
 @dataclass(frozen=True)
@@ -47,10 +59,6 @@ def places_of(log: RadioLog) -> Places:
     return Places(mean_ends[in_order], mean_rssi[in_order], packets[in_order])
 
 
-WAVES = 2048  # within 0.02 of the exact covariance for links up to 15 correlation distances long
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-
-
 def link_features(ends_m: FloatArray, correlation_m: float) -> FloatArray:
     """F (n, 2 WAVES) for links with these ends (n, 4: x, y of either), sigma = 1: their covariance is F F'."""
     wave = np.arange(WAVES)
@@ -71,11 +79,6 @@ def link_covariance(ends_m: FloatArray, correlation_m: float) -> FloatArray:
     """The covariance (n, n) of links, sigma = 1; on its diagonal 1 - delta/d (1 - exp(-d/delta))."""
     features = link_features(ends_m, correlation_m)
     return features @ features.T
-
-
-STEPS = 24
-FINEST_SHARE, COARSEST_SHARE = 0.004, 0.6  # correlation distances that are tried, over the extent of the places
-WORKING_SHARE, WORKING_NOISE = 0.05, 0.5  # the working covariance: delta over the extent, and noise over sigma
 
 
 class FieldFits(NamedTuple):
@@ -159,13 +162,6 @@ def _peak(height: FloatArray, best: IntArray) -> tuple[FloatArray, FloatArray]:
     return place, inside.astype(np.float64)
 
 
-MIN_PLACES = 30
-DRAWN = 200  # fields for the standard errors, which they give to 5 %
-FALSE_ALARM = 0.01
-FIELD, NOISE = purpose("fitted field"), purpose("fitted noise")
-KEY = derive_key("radio fit")
-
-
 @dataclass(frozen=True)
 class ShadowingFit:
     """The field's sigma and delta, the noise beside it, and what they mean for the line of path loss."""
@@ -211,10 +207,6 @@ def _with_errors(places: Places, moments: FieldMoments, found: FieldFits, noise:
         Estimate(noise_db, float(again.noise_db.std())),
         (float(lines[0].std()), float(lines[1].std())),
     )
-
-
-BINS = 16
-FARTHEST = 5.0  # correlation distances
 
 
 class Correlogram(NamedTuple):

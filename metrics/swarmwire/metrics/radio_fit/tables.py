@@ -21,6 +21,9 @@ WORDS = {
     "loss_bad": "bursts: loss within",
     "loss_good": "bursts: loss between",
 }
+DIGITS = 4
+EVERYWHERE_M = 1000.0  # where no distance is known: the losses are those of all links, however long
+QUICK_BPS = 1_000_000_000  # latencies that were measured hold the time on air, too
 
 
 class Row(NamedTuple):
@@ -74,9 +77,6 @@ def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
         yield "root mean square", f"{float(np.sqrt(np.mean(residual_db**2))):.2f} dB"
         for share, value in zip(QUANTILES, np.quantile(residual_db, QUANTILES).tolist(), strict=True):
             yield f"{share:.0%} below", f"{value:+.2f} dB"
-
-
-DIGITS = 4
 
 
 def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
@@ -133,10 +133,6 @@ def network_rows(fit: NetworkFit) -> Iterator[Row]:
         return
     yield Row("latency", fit.latency.latency_s, "s")
     yield Row("jitter", fit.latency.jitter_s, "s")
-
-
-EVERYWHERE_M = 1000.0  # where no distance is known: the losses are those of all links, however long
-QUICK_BPS = 1_000_000_000  # latencies that were measured hold the time on air, too
 
 
 def network_table(fit: NetworkFit) -> dict[str, Any]:

@@ -7,12 +7,18 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.style import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
-from swarmwire.metrics.report.in_words import short, shortened
 from swarmwire.metrics.report.page import COLUMN_IN, blank_figure
+from swarmwire.metrics.text import short, shortened
 
 HEIGHT_IN, FOOT_IN = 2.25, 0.37
 LETTERS_PT = SMALL_PT + 0.5
 _LEFT_IN, _RIGHT_IN, _HEAD_IN = 0.46, 0.08, 0.3
+_DECADES = 2.0  # between the fifth and the ninety-fifth of a hundred values, from which on
+_LETTERS = 44  # that fit below a column's figure side by side
+_FEWEST = 5  # groups for which there is room, so that two do not look like barrels
+_LONGEST = 14
+_MAX_TURNED = 18
+_FROM, _TO = 0.05, 0.82  # of the map: its end is too light for lines on white
 
 
 def column_axes(
@@ -41,9 +47,6 @@ def plain_legend(axes: Any, **where: Any) -> None:
     axes.legend(fontsize=LETTERS_PT, frameon=False, labelcolor=INK, handlelength=1.6, borderaxespad=0.2, **where)
 
 
-_DECADES = 2.0  # between the fifth and the ninety-fifth of a hundred values, from which on
-
-
 def fits_log(values: FloatArray) -> bool:
     """Whether values (n,) are all above 0 and spread over so much that a linear axis would hide most of them."""
     known = values[np.isfinite(values)]
@@ -64,12 +67,6 @@ def set_log(axis: Any) -> None:
     axis.set_major_locator(LogLocator(subs=subs, numticks=8))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
-
-
-_LETTERS = 44  # that fit below a column's figure side by side
-_FEWEST = 5  # groups for which there is room, so that two do not look like barrels
-_LONGEST = 14
-_MAX_TURNED = 18
 
 
 def room_below_in(labels: Sequence[str]) -> float:
@@ -107,9 +104,6 @@ def _is_number(label: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-_FROM, _TO = 0.05, 0.82  # of the map: its end is too light for lines on white
 
 
 def ordered_colors(count: int) -> list[Any]:

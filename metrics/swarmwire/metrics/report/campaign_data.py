@@ -35,6 +35,16 @@ _KNOWN = {
     "radio.intended": "receivers meant",
     "radio.in_range": "receivers in range",
 }
+_DIGITS = 3  # of a number whose spread is not known
+_DIGITS_OF_SPREAD = 2
+_MAX_DIGITS = 5
+_MAX_DECIMALS = 6
+_PLAIN_UP_TO = 1e7
+_OTHERS = re.compile(r"[^A-Za-z0-9._-]+")
+MAX_LEVELS = 16  # of numbers, beyond which they are put together
+_BINS = 8
+MAX_SLICES = 4
+_NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 
 
 def response_title(response: Response) -> str:
@@ -50,26 +60,9 @@ def response_title(response: Response) -> str:
     return f"{words}{unit}{_ENDINGS[ending]}" if ending else f"{words}{unit}"
 
 
-def sentence(text: str) -> str:
-    """The text with its first letter large."""
-    return text[:1].upper() + text[1:]
-
-
 def short_value(value: Value) -> str:
     """A parameter's value; six digits of a number that need not be whole."""
     return value_text(value, 6)
-
-
-def listed(words: list[str]) -> str:
-    """`a, b and c`."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
-
-
-_DIGITS = 3  # of a number whose spread is not known
-_DIGITS_OF_SPREAD = 2
-_MAX_DIGITS = 5
-_MAX_DECIMALS = 6
-_PLAIN_UP_TO = 1e7
 
 
 @dataclass(frozen=True)
@@ -108,16 +101,9 @@ def _decimals(value: float, digits: int) -> int:
     return digits - 1 - math.floor(math.log10(value))
 
 
-_OTHERS = re.compile(r"[^A-Za-z0-9._-]+")
-
-
 def figure_name(*of: str) -> str:
     """What it shows, joined: `survival-aggregation_time_s-radio.loss`."""
     return "-".join(_OTHERS.sub("-", part) for part in of)
-
-
-MAX_LEVELS = 16  # of numbers, beyond which they are put together
-_BINS = 8
 
 
 @dataclass(frozen=True)
@@ -171,9 +157,6 @@ def _is_number(value: Value) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-MAX_SLICES = 4
-
-
 @dataclass(frozen=True)
 class Slice:
     """Some of the design points."""
@@ -213,9 +196,6 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
         )
         for place in product(*choices)
     ]
-
-
-_NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 
 
 class Samples:

@@ -12,10 +12,8 @@ from swarmwire.metrics.report.campaign_data import (
     Samples,
     figure_name,
     levels_of,
-    listed,
     response_title,
     rounding_of,
-    sentence,
 )
 from swarmwire.metrics.report.charts_models import (
     FittedShape,
@@ -24,7 +22,6 @@ from swarmwire.metrics.report.charts_models import (
     scaling_curve,
     survival_curves,
 )
-from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
 from swarmwire.metrics.statistics.survival import kaplan_meier
@@ -37,9 +34,13 @@ from swarmwire.metrics.statistics.trends import (
     relative_to_unharmed,
     scaling,
 )
+from swarmwire.metrics.text import listed, number, sentence
 
 MAX_CURVES = 6
 _MAX_PARAMETERS = 2
+_LOSSES = ("share", "loss")  # last words of parameters that say how much is lost
+_GRID = 60
+_COUNT = re.compile(r"robots\.[^.]+\.count")
 
 
 def survival_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
@@ -79,10 +80,6 @@ def _curve(samples: Samples, response: Response, label: str, points: tuple[int, 
     cut_off = sample.value[~sample.observed]
     end_s = float(sample.value.max()) if len(sample) else 0.0
     return SurvivalCurve(label, estimate.time, estimate.survival, cut_off, end_s)
-
-
-_LOSSES = ("share", "loss")  # last words of parameters that say how much is lost
-_GRID = 60
 
 
 def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
@@ -173,9 +170,6 @@ def _words(response: Response, levels: Levels, fits: Degradation, fit: Fit) -> t
     slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
     shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)
     return (response.column, levels.path, fit.form, *shown, better)
-
-
-_COUNT = re.compile(r"robots\.[^.]+\.count")
 
 
 def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:

@@ -8,25 +8,17 @@ from swarmwire.metrics.campaign.about import About, Value
 from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
 from swarmwire.metrics.campaign.formats import FAILED
 from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.report.campaign_data import (
-    Levels,
-    Samples,
-    figure_name,
-    levels_of,
-    listed,
-    response_title,
-    sentence,
-    short_value,
-)
+from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title, short_value
 from swarmwire.metrics.report.charts import MAX_POINTS, Group, distributions
-from swarmwire.metrics.report.in_words import counted, shortened
 from swarmwire.metrics.report.page import Figure, Listing, Section, Table, as_svg
+from swarmwire.metrics.text import counted, listed, sentence, shortened
 
 _MAX_VALUES = 24  # of a parameter, named one by one
 _MAX_ERRORS = 20
 _LONGEST_ERROR = 240
 _MAX_POINTS = 6
 _DURATION = "duration_s"  # the path of how long a run lasts
+MAX_PARAMETERS = 3
 
 
 def what_was_run(folder: CampaignFolder) -> Section:
@@ -135,9 +127,6 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
 def _points(points: list[int]) -> str:
     named = ", ".join(map(str, points[:_MAX_POINTS]))
     return named if len(points) <= _MAX_POINTS else f"{named}, … ({len(points)})"
-
-
-MAX_PARAMETERS = 3
 
 
 def distribution_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:

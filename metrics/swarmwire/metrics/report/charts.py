@@ -18,7 +18,7 @@ from swarmwire.metrics.report.axes import (
     set_categories,
     set_log,
 )
-from swarmwire.metrics.report.in_words import short, shortened
+from swarmwire.metrics.text import short, shortened
 
 MAX_POINTS = 40  # of a group, beyond which shapes are drawn
 _FEWEST_IN_SHAPE = 10
@@ -26,6 +26,11 @@ _HALF_WIDTH = 0.36  # of a group, in groups
 _BOX_HALF_WIDTH = 0.11
 _GRID = 64  # values at which a density is taken
 _GOLDEN = 0.6180339887498949
+_APART = 0.012  # of the axis, between the points of several lines
+_COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
+_ROW_IN, _MIN_IN, _MAX_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
+_MAX_WRITTEN = 7  # columns and rows of cells into which values are written
+_BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
 @dataclass(frozen=True)
@@ -114,9 +119,6 @@ def _draw_limit(axes: Any, groups: Sequence[Group], limit: float) -> None:
         axes.margins(y=0.12)
 
 
-_APART = 0.012  # of the axis, between the points of several lines
-
-
 @dataclass(frozen=True)
 class Jump:
     """Where the response changes most, and the interval in which that place lies."""
@@ -200,12 +202,6 @@ def _draw_jump(axes: Any, jump: Jump) -> None:
     axes.axvline(jump.at, color=ACCENT, lw=1.0, zorder=1)
     at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top", "color": ACCENT}
     axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), (3, 7), fontsize=LETTERS_PT, **at)
-
-
-_COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
-_ROW_IN, _MIN_IN, _MAX_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
-_MAX_WRITTEN = 7  # columns and rows of cells into which values are written
-_BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
 def heat_map(

@@ -10,6 +10,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.style import ACCENT, CURVE, GRID, INK, SOFT, Look
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log
 
+_LEGEND_IN = 0.72
+_MAX_CORNERS, _MAX_TICKS = 300, 60
+
 
 @dataclass(frozen=True)
 class FittedShape:
@@ -55,10 +58,6 @@ def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: floa
         set_log(axes.xaxis)
     axes.set_xticks(robots, [f"{count:g}" for count in robots])
     return figure
-
-
-_LEGEND_IN = 0.72
-_MAX_CORNERS, _MAX_TICKS = 300, 60
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,22 @@ from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import new_figure
 from swarmwire.metrics.drawing.style import LONG_SIDE_IN
 
+COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
+_DPI_SIZE_PX = 1280  # only what is drawn as pixels within a figure depends on it
+_HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)
+_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
+_STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
+_NAMED = re.compile(r'\sid="([^"]*)"')
+_DRAWN = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
+_SPACE = re.compile(r"\n\s*|\s*<!--.*?-->")
+_LONG = re.compile(r"(\d\.\d\d)\d+")
+_USED = re.compile(r'(?:xlink:href="#|url\(#)([^")]*)')
+_NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
+_CODE = re.compile(r"`([^`]*)`")
+PAGE = "report.html"  # in the folder that it is of
+FIGURES = "figures"
+_SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -63,19 +79,6 @@ class Report:
         return tuple(part for section in self.sections for part in section.parts if isinstance(part, Figure))
 
 
-COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
-
-_DPI_SIZE_PX = 1280  # only what is drawn as pixels within a figure depends on it
-_HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)
-_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
-_STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
-_NAMED = re.compile(r'\sid="([^"]*)"')
-_DRAWN = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
-_SPACE = re.compile(r"\n\s*|\s*<!--.*?-->")
-_LONG = re.compile(r"(\d\.\d\d)\d+")
-_USED = re.compile(r'(?:xlink:href="#|url\(#)([^")]*)')
-
-
 def blank_figure(width_in: float, height_in: float) -> Any:
     """An empty matplotlib figure for `as_svg`; BadInput without matplotlib."""
     return new_figure(width_in, height_in, round(_DPI_SIZE_PX * max(width_in, height_in, LONG_SIDE_IN) / LONG_SIDE_IN))
@@ -105,10 +108,6 @@ def _with_own_ids(text: str, name: str) -> str:
     used = set(_USED.findall(text))
     kept = _NAMED.sub(lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", text)
     return _USED.sub(lambda found: found[0].replace(f"#{found[1]}", f"#{name}-{found[1]}"), kept)
-
-
-_NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
-_CODE = re.compile(r"`([^`]*)`")
 
 
 def page(report: Report) -> str:
@@ -176,11 +175,6 @@ def _breakable(text: str) -> Any:
     from markupsafe import Markup, escape
 
     return Markup(".<wbr>").join(map(escape, text.split(".")))
-
-
-PAGE = "report.html"  # in the folder that it is of
-FIGURES = "figures"
-_SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 
 def write_report(report: Report, to: Path) -> list[Path]:

@@ -5,12 +5,12 @@ from typing import Any
 
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.page import Listing, Report, Section, Table
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_metrics import measured
 from swarmwire.metrics.report.run_radio import radio
 from swarmwire.metrics.report.run_timeline import what_happened
+from swarmwire.metrics.text import counted, number
 
 _MAX_LINES = 300  # of the scenario
 _ENDED = {

@@ -13,13 +13,16 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.report.in_words import counted
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors
+from swarmwire.metrics.text import counted
 
 if TYPE_CHECKING:
     import polars as pl
+
+MAX_POINTS = 800  # of a curve: about what a figure has dots for across
+ARENA = 0  # whose pictures are drawn
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,6 @@ def _end(lane: Lane, still_open: list[tuple[int, list[str]]], row: dict[str, Any
     lane.spans[place] = Span(lane.spans[place].from_s, row["time_s"])
 
 
-MAX_POINTS = 800  # of a curve: about what a figure has dots for across
-
-
 def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
     """The places to draw of a curve (T,), rising: all, or of each stretch the least and the greatest value.
 
@@ -95,9 +95,6 @@ def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
             continue
         kept |= {first + int(known[stretch[known].argmin()]), first + int(known[stretch[known].argmax()])}
     return np.array(sorted(kept))
-
-
-ARENA = 0  # whose pictures are drawn
 
 
 @dataclass(frozen=True)

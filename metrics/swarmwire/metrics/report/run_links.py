@@ -8,15 +8,24 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.style import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.report.in_words import counted, share, short, shortened
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
+from swarmwire.metrics.text import counted, share, short, shortened
 
 if TYPE_CHECKING:
     import polars as pl
 
 
 _BINS = 25
+MAX_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
+MAX_LETTERS = 11  # of a name
+_LETTERS_ACROSS = 44
+_PALE = 0.5  # ratios from which on dark letters are read better
+_LEFT_IN, _RIGHT_IN, _TOP_IN, _BAR_IN = 0.62, 0.1, 0.26, 0.07
+_FOOT_IN, _NAME_IN = 0.5, 0.055  # below names, and of each of their letters
+MAX_SQUARES = 60  # robots that a matrix is drawn of
+MIN_PACKETS = 10  # in range, of a link that the histogram counts
+NAME = "links"
 
 
 def link_histogram(link_pdr: FloatArray) -> Any:
@@ -32,14 +41,6 @@ def link_histogram(link_pdr: FloatArray) -> Any:
     axes.set_xlabel("share received of the packets in range", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     axes.set_ylabel("links (sender to receiver)", fontsize=SMALL_PT, color=SOFT, labelpad=2)
     return figure
-
-
-MAX_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
-MAX_LETTERS = 11  # of a name
-_LETTERS_ACROSS = 44
-_PALE = 0.5  # ratios from which on dark letters are read better
-_LEFT_IN, _RIGHT_IN, _TOP_IN, _BAR_IN = 0.62, 0.1, 0.26, 0.07
-_FOOT_IN, _NAME_IN = 0.5, 0.055  # below names, and of each of their letters
 
 
 def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
@@ -89,11 +90,6 @@ def _write(axes: Any, link_pdr: FloatArray) -> None:
         ratio = link_pdr[sender, receiver]
         color = PAPER if ratio < _PALE else INK
         axes.text(receiver, sender, f"{100 * ratio:.0f}", ha="center", va="center", fontsize=5.5, color=color)
-
-
-MAX_SQUARES = 60  # robots that a matrix is drawn of
-MIN_PACKETS = 10  # in range, of a link that the histogram counts
-NAME = "links"
 
 
 def links(run: RunData) -> Figure | str:

@@ -8,13 +8,14 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.metrics_strip import is_count, told_of
 from swarmwire.metrics.registry import LINK_PDR
-from swarmwire.metrics.report.in_words import number, share
 from swarmwire.metrics.report.page import Section, Table
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.run_folder.layout import MetricInfo
+from swarmwire.metrics.text import number, share
 
 STATISTICS = ("final", "mean", "min", "max")
 _KINDS = {"level": "", "count": "adds up", "time": "a time"}
+_ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "link PDR", "trajectory")
 
 
 def measured(run: RunData) -> Section:
@@ -84,9 +85,6 @@ def _arenas(run: RunData) -> list[str | Table]:
         Table(head, across, "Final values across the arenas."),
         Table(("seed", *_ARENA_HEAD), tuple(map(_arena_row(run), range(arenas))), "All arenas.", folded=arenas > 12),
     ]
-
-
-_ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "link PDR", "trajectory")
 
 
 def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:

@@ -22,14 +22,18 @@ from swarmwire.metrics.drawing.scene import (
 from swarmwire.metrics.drawing.style import INK, PAPER, SMALL_PT, SOFT, shade
 from swarmwire.metrics.drawing.swarm import Swarm
 from swarmwire.metrics.palette import robot_color
-from swarmwire.metrics.report.in_words import counted, number
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import ARENA, RunData
+from swarmwire.metrics.text import counted, number
 from swarmwire.metrics.torus import whole_path
 
 MAX_PATHS = 1000
 MAX_POINTS = 30_000  # of all paths together: half a megabyte of a figure
 _MIN_TICKS = 24
+TIME_PARTS = 6
+_EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MAX_HIGH_IN = 0.08, 0.24, 0.16, 0.19, 4.4
+_CROWD = 200  # robots, from which on lines are thinner
+_DRAWN_ROBOTS = 1000  # more discs than these are drawn as pixels
 
 
 @dataclass(frozen=True)
@@ -72,12 +76,6 @@ def _evenly(count: int, most: int) -> IntArray:
     if count <= most:
         return np.arange(count)
     return np.unique(np.round(np.linspace(0, count - 1, most)).astype(np.int64))
-
-
-TIME_PARTS = 6
-_EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MAX_HIGH_IN = 0.08, 0.24, 0.16, 0.19, 4.4
-_CROWD = 200  # robots, from which on lines are thinner
-_DRAWN_ROBOTS = 1000  # more discs than these are drawn as pixels
 
 
 def trajectories(

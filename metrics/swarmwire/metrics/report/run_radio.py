@@ -11,17 +11,25 @@ from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
 from swarmwire.metrics.drawing.style import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
+from swarmwire.metrics.network.latency import acts_at_ns
 from swarmwire.metrics.network.radio_tally import PERCENTS
-from swarmwire.metrics.report.in_words import number, share, short
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links
+from swarmwire.metrics.text import number, share, short
 
 if TYPE_CHECKING:
     import polars as pl
 
 
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}
+_HEIGHT_IN = 2.75
+_BINS = 48
+_WIDE = 30.0  # of the latest over the earliest, from which on the axis is logarithmic
+_LATEST = 99.9  # percent: where the axis ends, since a single packet may be very late
+_DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
+COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
+TITLE = "The radio"
 
 
 def fates(run: RunData) -> list[str | Table]:
@@ -62,21 +70,6 @@ def _ms(value_s: float | None) -> str:
     return number(None if value_s is None else 1e3 * value_s)
 
 
-_HEIGHT_IN = 2.75
-
-
-def delivery_by_distance(table: "pl.DataFrame", range_m: float | None) -> Any:
-    """The figure of the rows of one arena's `radio_distances` that are worth showing, one at least."""
-    figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
-    upper = plain_axes(figure, (0.11, 0.5, 0.86, 0.41), "share of the receivers that received")
-    lower = plain_axes(figure, (0.11, 0.14, 0.86, 0.2), "receivers that packets were meant for")
-    draw_ratio(upper, table, range_m)
-    draw_intended(lower, table)
-    upper.tick_params(labelbottom=False)
-    lower.yaxis.set_major_formatter(short)
-    return figure
-
-
 def distances(run: RunData) -> Figure | str:
     """The figure, or why there is none."""
     table = run.table("radio_distances")
@@ -97,10 +90,16 @@ def distances(run: RunData) -> Figure | str:
     return Figure("delivery-by-distance", as_svg(figure, "delivery-by-distance"), caption)
 
 
-_BINS = 48
-_WIDE = 30.0  # of the latest over the earliest, from which on the axis is logarithmic
-_LATEST = 99.9  # percent: where the axis ends, since a single packet may be very late
-_DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
+def delivery_by_distance(table: "pl.DataFrame", range_m: float | None) -> Any:
+    """The figure of at least one row of an arena's `radio_distances`."""
+    figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
+    upper = plain_axes(figure, (0.11, 0.5, 0.86, 0.41), "share of the receivers that received")
+    lower = plain_axes(figure, (0.11, 0.14, 0.86, 0.2), "receivers that packets were meant for")
+    draw_ratio(upper, table, range_m)
+    draw_intended(lower, table)
+    upper.tick_params(labelbottom=False)
+    lower.yaxis.set_major_formatter(short)
+    return figure
 
 
 def latency_histogram(air_s: FloatArray, agent_s: FloatArray) -> Any:
@@ -131,6 +130,12 @@ def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms:
     return axes
 
 
+def receivers_act_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> IntArray:
+    """When the receivers (k,) of packets received at times (k,) act next, in ns."""
+    tick = -(-final_at_ns * static.rate_hz // NS_PER_S)
+    return acts_at_ns(tick, static.act_every_ticks[receiver], static.rate_hz)
+
+
 def percentiles(latency: FloatArray) -> list[float]:
     """p50, p90 and p99 by the nearest rank, as the summary has them."""
     return np.percentile(latency, PERCENTS, method="inverted_cdf").tolist()
@@ -144,9 +149,6 @@ def _edges(latency_ms: FloatArray) -> FloatArray:
     return np.linspace(0.0, max(1.05 * high, 1e-3), _BINS + 1)
 
 
-COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
-
-
 def latencies(run: RunData) -> Figure | str:
     """The figure, or why there is none."""
     packets = run.packets(COLUMNS)
@@ -158,7 +160,7 @@ def latencies(run: RunData) -> Figure | str:
     receiver, _, sent_ns, final_ns = (received[name] for name in COLUMNS)
     sent = sent_ns.to_numpy()
     final = final_ns.to_numpy()
-    acts = acts_at_ns(final, receiver.to_numpy(), run.static)
+    acts = receivers_act_at_ns(final, receiver.to_numpy(), run.static)
     figure = latency_histogram((final - sent) / NS_PER_S, (acts - sent) / NS_PER_S)
     caption = (
         "Latency of packets that were received: from sending to hearing, and to the first tick at which the receiver "
@@ -168,16 +170,6 @@ def latencies(run: RunData) -> Figure | str:
     if recorded < 1.0:
         caption += f" A share of {recorded:g} of the packets was recorded."
     return Figure("latency", as_svg(figure, "latency"), caption)
-
-
-def acts_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> IntArray:
-    """When the receivers (k,) could act on what they received at times (k,), in ns: at their next tick."""
-    tick = -(-final_at_ns * static.rate_hz // NS_PER_S)
-    every = static.act_every_ticks[receiver]
-    return -(-tick // every) * every * NS_PER_S // static.rate_hz
-
-
-TITLE = "The radio"
 
 
 def radio(run: RunData) -> Section:

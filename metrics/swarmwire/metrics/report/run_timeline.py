@@ -11,13 +11,36 @@ from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, is_count, limits, titled, told_of
 from swarmwire.metrics.drawing.style import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.registry import LINK_PDR, METRICS
-from swarmwire.metrics.report.in_words import number, short
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, thinned
 from swarmwire.metrics.report.run_paths import where
+from swarmwire.metrics.text import number, short
 
 LANE_IN = 0.29  # height of each
 _BAR = (0.12, 0.3)  # low and high, in shares of a lane
+_PANEL_IN, _TITLE_IN = 0.72, 0.24
+_LEFT_IN, _RIGHT_IN, _FOOT_IN, _TOP_IN = 0.36, 0.1, 0.34, 0.04
+_MAX_SHADED = 6  # spans that are shaded through all panels; of more there are lines, of many more nothing
+_MAX_LINES = 24
+MAX_PANELS = 24
+_COLUMNS = 2
+_SMALL_TITLE_IN, _SMALL_PANEL_IN, _TICKS_IN, _SMALL_FOOT_IN = 0.26, 0.5, 0.2, 0.14
+_SMALL_LEFT_IN, _APART_IN, _SMALL_RIGHT_IN = 0.38, 0.42, 0.08
+MAIN = ("order", "components", LINK_PDR)  # in the panels of the timeline, as far as they have a value
+SECOND = (  # small, where they have a value that changes
+    "target_best",
+    "target_mean",
+    "largest_component",
+    "age_of_information",
+    "throughput",
+    "collisions",
+    "wall_contacts",
+    "min_gap",
+)
+_WHOLE = ("components",)
+_MAX_LANES = 8
+_MAX_EVENTS = 200
+_TITLES = {LINK_PDR: "link_pdr: received / in range"}
 
 
 def draw_lanes(axes: Any, lanes: Sequence[Lane], ends_s: tuple[float, float]) -> None:
@@ -36,12 +59,6 @@ def draw_lanes(axes: Any, lanes: Sequence[Lane], ends_s: tuple[float, float]) ->
         axes.plot(
             lasting, [foot + 0.5 * (low + high)] * len(lasting), marker="D", ms=3.0, mew=0, ls="none", color=ACCENT
         )
-
-
-_PANEL_IN, _TITLE_IN = 0.72, 0.24
-_LEFT_IN, _RIGHT_IN, _FOOT_IN, _TOP_IN = 0.36, 0.1, 0.34, 0.04
-_MAX_SHADED = 6  # spans that are shaded through all panels; of more there are lines, of many more nothing
-_MAX_LINES = 24
 
 
 @dataclass(frozen=True)
@@ -102,12 +119,6 @@ def _mark(axes: Any, lanes: Sequence[Lane], end_s: float) -> None:
             axes.axvspan(span.from_s, min(span.until_s, end_s), color=ACCENT, alpha=0.08, lw=0, zorder=0.4)
 
 
-MAX_PANELS = 24
-_COLUMNS = 2
-_SMALL_TITLE_IN, _SMALL_PANEL_IN, _TICKS_IN, _SMALL_FOOT_IN = 0.26, 0.5, 0.2, 0.14
-_SMALL_LEFT_IN, _APART_IN, _SMALL_RIGHT_IN = 0.38, 0.42, 0.08
-
-
 def small_panels(time_s: FloatArray, curves: Sequence[Curve]) -> Any:
     """The figure of these curves over `time_s` (T,); of more than `MAX_PANELS` the first."""
     shown = list(curves)[:MAX_PANELS]
@@ -129,23 +140,6 @@ def small_panels(time_s: FloatArray, curves: Sequence[Curve]) -> Any:
         if place + _COLUMNS >= len(shown):
             axes.set_xlabel("time in s", fontsize=SMALL_PT, color=SOFT, labelpad=1)
     return figure
-
-
-MAIN = ("order", "components", LINK_PDR)  # in the panels of the timeline, as far as they have a value
-SECOND = (  # small, where they have a value that changes
-    "target_best",
-    "target_mean",
-    "largest_component",
-    "age_of_information",
-    "throughput",
-    "collisions",
-    "wall_contacts",
-    "min_gap",
-)
-_WHOLE = ("components",)
-_MAX_LANES = 8
-_MAX_EVENTS = 200
-_TITLES = {LINK_PDR: "link_pdr: received / in range"}
 
 
 def what_happened(run: RunData) -> Section:

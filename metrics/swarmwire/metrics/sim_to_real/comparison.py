@@ -21,7 +21,7 @@ from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRun
 from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
-from swarmwire.metrics.statistics.summary import number_text
+from swarmwire.metrics.text import number_text
 
 Radio = Mapping[str, Any]
 MIN_RUNS = 3  # that have a spread

@@ -19,7 +19,7 @@ from swarmwire.metrics.sim_to_real.texts import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.statistics.summary import number_text
+from swarmwire.metrics.text import number_text
 
 _HEIGHT_IN = 2.1
 _BINS = 40

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
-from swarmwire.metrics.statistics.summary import interval_text, number_text
+from swarmwire.metrics.statistics.summary import interval_text
+from swarmwire.metrics.text import number_text
 
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
 RADIO_COLUMNS = ("radio", "emulated", "log", "within")  # and of that of the radio

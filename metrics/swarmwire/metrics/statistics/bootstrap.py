@@ -25,6 +25,8 @@ MIN_RESAMPLES = 400  # of very large samples, where intervals are narrow anyhow
 DRAWS = 2_000_000  # per statistic, at most, as long as there are more than the fewest
 KEY = derive_key("statistics")
 DRAW = purpose("bootstrap")
+BLOCKS = 10
+MIN_TICKS = 5  # of a block
 
 
 @lru_cache(maxsize=16)
@@ -80,10 +82,6 @@ def _middle(n: int, sample: int) -> tuple[IntArray, IntArray]:
     """Places, in rising order of all values, of the two (or one) in the middle of each resample."""
     below = np.cumsum(drawn(n, sample), axis=1)
     return np.argmax(below > (n - 1) // 2, axis=1), np.argmax(below > n // 2, axis=1)
-
-
-BLOCKS = 10
-MIN_TICKS = 5  # of a block
 
 
 def block_means(series: FloatArray) -> FloatArray:

@@ -16,6 +16,9 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
 from swarmwire.metrics.statistics.sample import LEVEL, Interval
 
+MORE_PARAMETERS = 2  # of a step than of a constant
+ROUNDING = 1e-12  # relative, of values and of sums of squares
+
 
 @dataclass(frozen=True)
 class PointSums:
@@ -41,10 +44,6 @@ def _weighted(table: FloatArray, weight: FloatArray, row: int | slice = slice(No
     value = np.where(there, table, 0.0)
     count, total, squares = (weight @ of.T for of in (there.astype(np.float64), value, value**2))
     return PointSums(count[row], total[row], squares[row])
-
-
-MORE_PARAMETERS = 2  # of a step than of a constant
-ROUNDING = 1e-12  # relative, of values and of sums of squares
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,9 @@ from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval, r
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier, log_rank, paired_p, resampled_quantiles, surely_less
 
+Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
+MIN_PAIRS = 2
+
 
 def cliffs_delta(first: Sample, second: Sample) -> float:
     """P(first > second) - P(first < second) over all pairs, -1 to 1 (Cliff, Psychol. Bull. 114, 1993); NaN of none.
@@ -71,10 +74,6 @@ def _shares(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, Float
     value = np.sort(np.concatenate([a, b]))
     below = [np.searchsorted(np.sort(of), value, "right") / len(of) for of in (a, b)]
     return value, below[0], below[1]
-
-
-Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
-MIN_PAIRS = 2
 
 
 @dataclass(frozen=True)

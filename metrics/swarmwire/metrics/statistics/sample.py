@@ -10,6 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 Kind = Literal["number", "time"]  # a time may lie beyond its run's end: right-censored
+LEVEL = 0.95  # how sure, unless told
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,6 @@ def by_seed(samples: Sequence[Sample]) -> FloatArray:
     for row, sample in zip(table, samples, strict=True):
         row[np.searchsorted(seeds, sample.seed)] = sample.value
     return table
-
-
-LEVEL = 0.95  # how sure, unless told
 
 
 class Interval(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means, resampled_medians
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
 @dataclass(frozen=True)
@@ -65,23 +66,6 @@ def _times(sample: Sample, level: float) -> Summary:
         curve.restricted_mean_interval(limit),
         limit,
     )
-
-
-UNKNOWN_TEXT = "–"  # in place of a number
-
-
-def number_text(value: float, sign: bool = False) -> str:
-    """A number with three digits, or all before its point.
-
-    >>> number_text(0.12345), number_text(12345.6), number_text(0.5, sign=True), number_text(-0.0)
-    ('0.123', '12346', '+0.5', '0')
-    """
-    if math.isnan(value):
-        return UNKNOWN_TEXT
-    if value == 0.0:
-        return "0"
-    signed = "+" if sign else ""
-    return f"{value:{signed}.0f}" if 1000.0 <= abs(value) < 1e9 else f"{value:{signed}.3g}"
 
 
 def quantile_text(value: float, limit: float) -> str:

@@ -18,6 +18,11 @@ from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import FATES, MARK, SERIES
 
 Plotted = Metric | MetricSeries  # a name, a unit and bounds
+_WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
+_OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
+_EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
+_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
+_PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
 
 
 class Measured(Protocol):
@@ -32,10 +37,6 @@ class Measured(Protocol):
     def latest(self) -> Mapping[str, FloatArray]:
         """By name, per arena, (arenas,)."""
         ...
-
-
-_WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
-_OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
 
 
 class RerunSeries:
@@ -72,11 +73,6 @@ class RerunSeries:
         rec.log(entity, rr.SeriesLines(names=names, colors=colors, widths=widths), static=True)
         self._names[entity] = names
         self._there.update(names)
-
-
-_EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
-_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
-_PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
 
 
 class RerunPlots:

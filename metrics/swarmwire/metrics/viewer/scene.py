@@ -21,6 +21,20 @@ _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must no
 _LOST_ORDER = 1.5  # above the links, below the robots
 
 _COLORS = np.zeros(len(Fate), np.uint32)
+LONGER_SIDE_PX = 512
+_DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1; the viewer is dark
+_FLOOR_ORDER = -1.0
+_LEDS = 5.0  # drawn above the robots
+_OPAQUE = 0xFF
+_TRAIL_ALPHA = 170
+_TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
+_HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
+_MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
+_CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
+LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
+THINNED_LINKS_EVERY_TICKS = 10
+_LINK_COLOR = (130, 145, 180, 50)
+_LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
 for _fate, _color in FATES.items():
     _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 
@@ -47,11 +61,6 @@ def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m
     rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)
 
 
-LONGER_SIDE_PX = 512
-_DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1; the viewer is dark
-_FLOOR_ORDER = -1.0
-
-
 def log_floor(rec: Any, static: Static) -> None:
     """Log it, if the run has one."""
     import rerun as rr
@@ -73,10 +82,6 @@ def _raster(static: Static) -> ByteArray:
     x = (np.arange(columns) + 0.5) * width / columns - width / 2
     y = (np.arange(rows) + 0.5) * height / rows - height / 2
     return (_DARKEST + (_BRIGHTEST - _DARKEST) * shades_over(ground, x, y)).astype(np.uint8)
-
-
-_LEDS = 5.0  # drawn above the robots
-_OPAQUE = 0xFF
 
 
 class RerunLeds:
@@ -114,13 +119,6 @@ class RerunLeds:
         at_m = np.stack([x_m, y_m], axis=1).astype(np.float32)
         colors = ((rgb[robot, which] << 8) | _OPAQUE).astype(np.uint32)
         rows.add("world/leds", rr.Points2D.columns, positions=at_m, colors=colors)
-
-
-_TRAIL_ALPHA = 170
-_TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
-_HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
-_MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
-_CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
 
 
 class RerunRobots:
@@ -181,13 +179,6 @@ def _points(pose: NDArray[np.float32]) -> Any:
     import rerun as rr
 
     return rr.Points2D.columns(positions=np.ascontiguousarray(pose[:, :2]))
-
-
-LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
-THINNED_LINKS_EVERY_TICKS = 10
-
-_LINK_COLOR = (130, 145, 180, 50)
-_LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
 
 
 class RerunArena:

@@ -22,6 +22,11 @@ ASKS = (
     "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9); "
     "os.getppid() == int(sys.argv[1]) or os._exit(1); os.execv(sys.argv[2], sys.argv[2:])"
 )
+PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
+_PAUSE_NS = NS_PER_S // 20
+_SAME_IN_A_ROW = 4
+_NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # how the viewer says that it has no Vulkan
+_Found = TypeVar("_Found")
 
 
 def program() -> Path:
@@ -60,13 +65,6 @@ def is_open(port: int) -> bool:
     """Whether somebody listens at this port of the loopback."""
     with socket.socket() as probe:
         return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
-_PAUSE_NS = NS_PER_S // 20
-_SAME_IN_A_ROW = 4
-_NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # how the viewer says that it has no Vulkan
-_Found = TypeVar("_Found")
 
 
 class NoGraphics(SwarmwireError):

@@ -36,6 +36,10 @@ FATES: dict[Fate, Color] = {
 }  # out of range is no colour: such receivers are counted, never listed
 
 _LAST_LETTER = "\u024f"  # of Latin with its extensions
+DEAD_CLASS = 0
+LEGEND_LINES = 6  # as many as the layout has room for
+_LONGEST_LINE = 28  # characters
+_LABELLED = 1.0  # radius in ui points of the dot that a line of the legend hangs on
 
 
 def packed(color: Color, alpha: int) -> int:
@@ -47,12 +51,6 @@ def packed(color: Color, alpha: int) -> int:
 def shown(text: str) -> str:
     """The text with `?` for letters that the viewer's only font may lack: drawing without a screen, it ends at one."""
     return "".join(letter if " " <= letter <= _LAST_LETTER else "?" for letter in text)
-
-
-DEAD_CLASS = 0
-LEGEND_LINES = 6  # as many as the layout has room for
-_LONGEST_LINE = 28  # characters
-_LABELLED = 1.0  # radius in ui points of the dot that a line of the legend hangs on
 
 
 class RerunClasses:

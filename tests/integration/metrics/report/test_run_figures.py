@@ -12,7 +12,7 @@ from swarmwire.metrics.report.page import as_svg
 from swarmwire.metrics.report.run_data import Lane, Span, lanes_of, thinned
 from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_links
 from swarmwire.metrics.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
-from swarmwire.metrics.report.run_radio import acts_at_ns, delivery_by_distance, latency_histogram, percentiles
+from swarmwire.metrics.report.run_radio import delivery_by_distance, latency_histogram, percentiles, receivers_act_at_ns
 from swarmwire.metrics.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
@@ -173,7 +173,7 @@ def test_packets_tell_when_their_receivers_act_as_the_summary_does(tmp_path, rad
     record(tmp_path, of, seen, packets=1.0)
     received = RunFolder(tmp_path).packets().filter(pl.col("fate") == "received")
     final, sent, receiver = (received[name].to_numpy() for name in ("final_at_ns", "sent_at_ns", "receiver"))
-    assert sorted(acts_at_ns(final, receiver, of) - sent) == sorted(agent_ns)
+    assert sorted(receivers_act_at_ns(final, receiver, of) - sent) == sorted(agent_ns)
     assert len(agent_ns) > 20
 
 

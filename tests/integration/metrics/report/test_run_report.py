@@ -10,13 +10,13 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.report import run_timeline
-from swarmwire.metrics.report.in_words import number
 from swarmwire.metrics.report.page import Listing, Table, blank_figure
 from swarmwire.metrics.report.run import run_report
 from swarmwire.metrics.report.run_data import Span, read_run
 from swarmwire.metrics.report.run_metrics import of_metrics
 from swarmwire.metrics.run_folder.layout import MetricInfo
 from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.text import number
 from tests.support.metrics.radio_runs import DISK, ticks
 from tests.support.metrics.recorded import links, wandering
 from tests.support.metrics.report.run_folders import run_folder

@@ -14,7 +14,8 @@ from swarmwire.metrics.statistics.bootstrap import (
     resampled_medians,
 )
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
-from swarmwire.metrics.statistics.summary import interval_text, number_text, quartiles_text, summary
+from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary
+from swarmwire.metrics.text import number_text
 from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, times, treated
 
 
