@@ -15,7 +15,7 @@ from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel_view import panel_view
+from swarmwire.deploy.terminal.panel import panel_view
 from swarmwire.world.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]

@@ -23,8 +23,7 @@ from swarmwire.deploy.arguments import (
 )
 from swarmwire.deploy.assemble_result import assemble_result
 from swarmwire.deploy.backends import Backends
-from swarmwire.deploy.control.control_server import ControlServer
-from swarmwire.deploy.control.status import Status
+from swarmwire.deploy.control.control_server import ControlServer, Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.endpoint import check_socket, new_run_id
 from swarmwire.deploy.gateways.gateways import GatewaysGiven, as_gateways

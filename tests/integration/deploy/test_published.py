@@ -18,8 +18,7 @@ from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.deploy.live import published
-from swarmwire.deploy.live.following import RunGone, following
-from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.following import Live, RunGone, following, read_live
 from swarmwire.deploy.live.published import Published
 from swarmwire.metrics.measure import Metrics
 from tests.support.clocks import StillClock

@@ -16,7 +16,7 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.control.run_finder import Announced, found_runs
 from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.live.live_file import read_live
+from swarmwire.deploy.live.following import read_live
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.live.following import following
-from swarmwire.deploy.live.live_file import read_live
+from swarmwire.deploy.live.following import read_live
 
 clock, seen = WallClock(), 0
 with following(read_live(Path(sys.argv[1]))) as run:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.following import Live, read_live
 from tests.support.deploy.commands import ROOT
 from tests.support.deploy.watching import WATCHER
 from tests.tools.soak.supervised import PYTHON, Supervised, family

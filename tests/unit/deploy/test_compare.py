@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
-from swarmwire.deploy.terminal.comparison_table import print_comparison
+from swarmwire.deploy.terminal.tables import print_comparison
 from swarmwire.metrics.campaign.comparison import compare
 from swarmwire.metrics.campaign.selection import select
 from tests.support.deploy.commands import called

@@ -14,7 +14,7 @@ from swarmwire.deploy import simulation as simulation_module
 from swarmwire.deploy.controls import LOOK_NS, Controls
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.deploy.terminal.bindings import BINDINGS, press
+from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.commands import LOSSY

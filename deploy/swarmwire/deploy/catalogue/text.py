@@ -10,7 +10,7 @@ from rich.text import Text
 
 from swarmwire.deploy.catalogue.kinds import KINDS, Kind
 from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable
-from swarmwire.deploy.terminal.rows import aligned
+from swarmwire.deploy.terminal.tables import aligned
 
 WIDEST_VALUE = 28  # columns of a terminal
 SAID_BY_VALUE = ("a number", "a table")

@@ -174,7 +174,7 @@ def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
     from rich.console import Console
 
     from swarmwire.deploy.certificates.register import text_of
-    from swarmwire.deploy.terminal.rows import print_rows
+    from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [
         (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], text_of(of.valid_until), state)

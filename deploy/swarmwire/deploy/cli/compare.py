@@ -33,7 +33,7 @@ def compare_command(
     # Imported here: polars and scipy take a second, which --help should not.
     from rich.console import Console
 
-    from swarmwire.deploy.terminal.comparison_table import print_comparison
+    from swarmwire.deploy.terminal.tables import print_comparison
     from swarmwire.metrics.campaign.comparison import compare
     from swarmwire.metrics.campaign.comparison_csv import write_comparison
     from swarmwire.metrics.campaign.selection import at as at_points

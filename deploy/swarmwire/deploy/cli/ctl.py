@@ -164,7 +164,7 @@ def _told(chosen: Chosen) -> list[tuple[dict[str, Any], str | None]]:
 def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
     from rich.console import Console
 
-    from swarmwire.deploy.terminal.rows import print_rows
+    from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [
         (
@@ -182,7 +182,7 @@ def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
 
 
 def _print_one(status: dict[str, Any], folder: str | None) -> None:
-    from swarmwire.deploy.terminal.rows import aligned
+    from swarmwire.deploy.terminal.tables import aligned
 
     runners: dict[str, Any] = status["runners"] or {}
     groups = ", ".join(f"{count} {name}" for name, count in status["groups"].items())

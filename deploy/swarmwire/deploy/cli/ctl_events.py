@@ -221,7 +221,7 @@ def events_command(context: typer.Context) -> None:
     """
     from rich.console import Console
 
-    from swarmwire.deploy.terminal.rows import print_rows
+    from swarmwire.deploy.terminal.tables import print_rows
 
     with control_of(context.obj) as control:
         events = control.status()["events"]

@@ -12,7 +12,7 @@ from swarmwire.deploy.cli.options import USUAL_SIZE_PX, AsJson, Overrides, Seed,
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.deploy.radio.coverage_probe import CoverageProbe
+    from swarmwire.deploy.radio.coverage import CoverageProbe
     from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 
 
@@ -54,8 +54,7 @@ def fit_command(
     """
     from rich.console import Console
 
-    from swarmwire.deploy.radio.fit_report import print_fit
-    from swarmwire.deploy.radio.fit_toml import radio_fit_toml
+    from swarmwire.deploy.radio.fit import print_fit, radio_fit_toml
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.canvas import check_picture
 
@@ -119,8 +118,7 @@ def _network(path: Path, within_m: float | None) -> "NetworkFit | None":
 def _tell_network(fit: "NetworkFit", file: Path, to: Path | None, write: Path | None, size: int) -> None:
     from rich.console import Console
 
-    from swarmwire.deploy.radio.fit_toml import network_fit_toml
-    from swarmwire.deploy.radio.network_report import print_network_fit
+    from swarmwire.deploy.radio.fit import network_fit_toml, print_network_fit
 
     text = network_fit_toml(fit, file)
     print_network_fit(fit, str(file), Console(highlight=False, markup=False))
@@ -232,8 +230,7 @@ def _probe_scenario(
     from rich.console import Console
 
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.radio.coverage_probe import probe_coverage
-    from swarmwire.deploy.radio.coverage_report import coverage_json, print_coverage
+    from swarmwire.deploy.radio.coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.metrics.drawing.canvas import check_picture
 
     if to is not None:

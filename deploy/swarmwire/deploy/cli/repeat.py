@@ -38,7 +38,7 @@ def repeat_command(
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.repetition import RepeatedRun
-    from swarmwire.deploy.terminal.shown import progress
+    from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.campaign.formats import ABOUT
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
@@ -53,7 +53,7 @@ def repeat_command(
     if (folder / ABOUT).exists():
         raise BadInput(str(folder), "", "expected --run NUMBER with it: this is a campaign's folder")
     repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
-    repeated.simulation.watch(progress(repeated.simulation, console))
+    repeated.simulation.watch(run_progress(repeated.simulation, console))
     with leaving_when_hung_up(repeated.simulation.interrupt), compiling_told(console):
         repetition = repeated.run()
     _print(repetition, console)
@@ -68,10 +68,10 @@ def repeat_command(
 def _repeat_of_campaign(repeated: "CampaignRun", out: Path | None, console: Console) -> None:
     """Run it again, tell how it came out, and leave with the exit code that says so."""
     from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.terminal.shown import progress
+    from swarmwire.deploy.terminal.progress import run_progress
 
     simulation = repeated.simulation
-    simulation.watch(progress(simulation, console))
+    simulation.watch(run_progress(simulation, console))
     with leaving_when_hung_up(simulation.interrupt), compiling_told(console):
         again = repeated.again()
     arena = again.result.arenas[0]

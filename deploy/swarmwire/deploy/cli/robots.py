@@ -257,7 +257,7 @@ def _print_states(states: "list[RobotState]") -> None:
     from rich.console import Console
 
     from swarmwire.deploy.fleet.result import Result, result_lines
-    from swarmwire.deploy.terminal.rows import print_rows
+    from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [_row(state) for state in states if not state.fault]
     if rows:

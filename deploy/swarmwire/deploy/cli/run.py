@@ -122,13 +122,12 @@ def run_shown(
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.page.beside import PageBeside
     from swarmwire.deploy.running import finished
+    from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result
-    from swarmwire.deploy.terminal.robots_told import RobotsTold
-    from swarmwire.deploy.terminal.shown import progress
 
     simulation.watch(Announced(folder))
     simulation.watch(RobotsTold(simulation, console))
-    simulation.watch(progress(simulation, console))
+    simulation.watch(run_progress(simulation, console))
     with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
         for wanted, beside in ((view, live), (ui, page)):
             if wanted:

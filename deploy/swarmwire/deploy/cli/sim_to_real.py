@@ -35,7 +35,7 @@ def sim_to_real_command(
     from rich.console import Console
 
     from swarmwire.deploy.sim_to_real import differing_settings, read_emulation
-    from swarmwire.deploy.terminal.sim_to_real_table import print_sim_to_real
+    from swarmwire.deploy.terminal.tables import print_sim_to_real
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.real_log.measured_log import measured_log
     from swarmwire.metrics.real_log.real_logs import read_real_logs

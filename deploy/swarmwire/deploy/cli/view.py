@@ -12,10 +12,9 @@ from swarmwire.comms.extras import UI, VIEW
 from swarmwire.deploy.cli.ctl import Chosen
 from swarmwire.deploy.cli.options import Ca, Certificate, Certs, Endpoint, Insecure, Key, Name, Port, WithParent
 from swarmwire.deploy.cli.process import standard_input_closed
-from swarmwire.metrics.run_folder.layout import RECORDING
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.live.showing import RadioModel
+    from swarmwire.deploy.live.viewer import ViewOptions
 
 
 def view_command(
@@ -30,33 +29,32 @@ def view_command(
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.interrupt import Interrupt
-    from swarmwire.deploy.live.showing import RadioModel
-    from swarmwire.deploy.live.viewer_program import has_screen
+    from swarmwire.deploy.live.viewer import ViewOptions, has_screen
 
     VIEW.need("view")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     with Interrupt() as interrupt:
-        way = RadioModel(
+        options = ViewOptions(
             clock=WallClock(),
             say=lambda text: typer.echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             web=web or port is not None or not has_screen(),
             port=port,
         )
-        _show(run, way)
+        _show(run, options)
 
 
-def _show(run: Path, way: "RadioModel") -> None:
+def _show(run: Path, options: "ViewOptions") -> None:
     """Show a run that goes on; if it is over by now, or was before, its recording."""
-    from swarmwire.deploy.live.following import RunGone
-    from swarmwire.deploy.live.live_file import read_live
-    from swarmwire.deploy.live.showing import show_live, show_recording
+    from swarmwire.deploy.live.following import RunGone, read_live
+    from swarmwire.deploy.live.viewer import show_live, show_recording
+    from swarmwire.metrics.run_folder.layout import RECORDING
 
     live = read_live(run) if run.is_dir() else None
     recording = run / RECORDING if run.is_dir() else run
     if live is not None:
         try:
-            show_live(live, way)
+            show_live(live, options)
         except RunGone:
             if not recording.is_file():
                 raise
@@ -64,7 +62,7 @@ def _show(run: Path, way: "RadioModel") -> None:
             return
     if not recording.is_file():
         raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording")
-    show_recording(recording, way)
+    show_recording(recording, options)
 
 
 ELSEWHERE = 0  # in place of a process of this machine
@@ -97,8 +95,8 @@ def ui_command(
     from swarmwire.deploy.control.remote_control import only_run_at
     from swarmwire.deploy.control.run_finder import find_run
     from swarmwire.deploy.interrupt import Interrupt
-    from swarmwire.deploy.live.live_file import Live
-    from swarmwire.deploy.live.showing import RadioModel
+    from swarmwire.deploy.live.following import Live
+    from swarmwire.deploy.live.viewer import ViewOptions
     from swarmwire.deploy.page.showing_page import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
@@ -110,10 +108,10 @@ def ui_command(
     else:
         live = Live(endpoint, run or only_run_at(endpoint, network), ELSEWHERE)
     with Interrupt() as interrupt:
-        way = RadioModel(
+        options = ViewOptions(
             clock=WallClock(),
             say=lambda text: typer.echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             port=port,
         )
-        show_page(live, way, network, begin=with_parent)
+        show_page(live, options, network, begin=with_parent)

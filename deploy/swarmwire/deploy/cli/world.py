@@ -100,7 +100,7 @@ def world_command(
     from swarmwire.deploy.record.new_folder import default_folder
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.deploy.terminal.gathering import Gathering
+    from swarmwire.deploy.terminal.progress import Gathering
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:

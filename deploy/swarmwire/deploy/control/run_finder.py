@@ -16,7 +16,7 @@ from swarmwire.comms.config import did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static
-from swarmwire.deploy.live.live_file import goes_on, read_live
+from swarmwire.deploy.live.following import goes_on, read_live
 from swarmwire.metrics.atomic import write_text
 
 OF_OTHERS = 0o077  # bits of a folder's mode that let others than its owner at it

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.terminal.rows import aligned
+from swarmwire.deploy.terminal.tables import aligned
 
 
 class HostFailed(SwarmwireError):

@@ -1,15 +1,17 @@
-"""How much of a run is shown: so many ticks a second of wall time, and of large swarms fewer links and sensors.
+"""Which part of a run is shown: so many ticks a second of wall time, and of large swarms fewer links and sensors.
 
 What adds up from tick to tick (counts of packets, contacts, events) is shown in full with the next tick that is; of the
-links that ended, those of that tick alone.
+links that ended, those of that tick alone. Tallies over several ticks are shown as of one, since plots count in ticks.
 """
 
 from dataclasses import dataclass, replace
 
-from swarmwire.comms.arrays import FloatArray
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.run_views import ObservedTick, readings_within, truth_of
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 FRAMES_PER_S = 30
 LINKS_PER_S = 5  # in large swarms, where links are most of a frame
@@ -81,3 +83,18 @@ class Sampling:
             shown = replace(shown, readings=readings_within(shown.readings, slice(self._selected, self._selected + 1)))
         self._serial += 1
         return ObservedTick(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
+
+
+class Evened:
+    """Mean tallies per tick in whole numbers: what rounding leaves over comes with a later one."""
+
+    def __init__(self) -> None:
+        self._owed: FloatArray | None = None
+
+    def per_tick(self, tally: PacketCounts, ticks: int) -> PacketCounts:
+        """The tally of one of these ticks."""
+        counts: IntArray = np.vstack([tally.sent, tally.intended, tally.in_range, tally.fates.T])
+        owed = counts / ticks + (0.0 if self._owed is None else self._owed)
+        whole = np.floor(owed + 1e-9).astype(np.int64)  # thirds add up to a little less than one
+        self._owed = owed - whole
+        return PacketCounts(whole[0], whole[1], whole[2], whole[3:].T)

@@ -1,12 +1,13 @@
-"""A radio without a scenario of its own: a preset, with values set by path."""
+"""A radio without a run: a preset with values set by path, and checks of a table [radio] on its own."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.deploy.radio.around import checked_radio
+from swarmwire.world.scenario_file import scenario_from
 
 
 def radio_of(preset: str, settings: Sequence[str]) -> Radio:
@@ -16,4 +17,18 @@ def radio_of(preset: str, settings: Sequence[str]) -> Radio:
     radio = checked_radio({"preset": preset}, "radio", settings)
     if radio.trace is not None:
         raise BadInput("radio", "radio.trace", "expected none: links are measured between robots of a scenario")
+    return radio
+
+
+def checked_radio(table: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Radio:
+    """The radio of a table after overrides such as "radio.loss=0.1"; BadInput as for a scenario."""
+    around = {
+        "format": 1,
+        "name": "a radio",
+        "duration_s": 1.0,
+        "arena": {"size_m": [2.0, 2.0]},
+        "robots": {"nodes": {"body": "epuck", "count": 1, "agent": "none:None"}},
+    }
+    radio = scenario_from({**around, "radio": table}, where, overrides).radio
+    assert radio is not None
     return radio

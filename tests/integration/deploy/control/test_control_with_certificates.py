@@ -16,9 +16,8 @@ from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.control import remote_control
-from swarmwire.deploy.control.control_server import ControlServer
+from swarmwire.deploy.control.control_server import ControlServer, Status
 from swarmwire.deploy.control.remote_control import controlling, only_run_at
-from swarmwire.deploy.control.status import Status
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.live.following import RunGone
 from swarmwire.metrics.measure import Metrics

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.live.live_file import read_live
+from swarmwire.deploy.live.following import read_live
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY, started
 from tests.support.waiting import until

@@ -4,8 +4,7 @@ import pytest
 
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling, only_run_at
-from swarmwire.deploy.live.following import RunGone
-from swarmwire.deploy.live.live_file import read_live
+from swarmwire.deploy.live.following import RunGone, read_live
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.deploy.commands import LOSSY

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
-from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.record.recording import Recording
 from swarmwire.deploy.running import finished
 from swarmwire.deploy.simulation import Simulation

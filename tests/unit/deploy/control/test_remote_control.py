@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.control.remote_control import Refused
-from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.control.going import at_tick, going

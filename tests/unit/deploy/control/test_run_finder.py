@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.control import run_finder
 from swarmwire.deploy.control.run_finder import Announced, FoundRun, find_run, found_runs, runs_folder
-from swarmwire.deploy.live.live_file import Live
+from swarmwire.deploy.live.following import Live
 from tests.support.metrics.truths import static
 
 NOBODY = 2**22 + 1  # more than Linux gives out

@@ -19,8 +19,7 @@ pytest.importorskip("fastapi", reason="needs the extra [ui]")
 
 from fastapi.testclient import TestClient
 
-from swarmwire.deploy.page.app import FILES, Shown, page_app
-from swarmwire.deploy.page.serving import serving
+from swarmwire.deploy.page.server import FILES, Shown, page_app, serving
 
 PORT = 12345
 HOST = f"127.0.0.1:{PORT}"

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord
-from swarmwire.deploy.page.seen import MAX_PLACES, MAX_WHO, Seen
+from swarmwire.deploy.page.news import MAX_PLACES, MAX_WHO, Seen
 from tests.support.metrics.truths import static, tally, truth
 
 OF = static(robots=4)
