@@ -93,7 +93,7 @@ def test_a_view_that_is_killed_leaves_no_viewer_and_no_file(folder, tmp_path, mo
     with viewing(folder / "run.rrd") as (process, _):
         [child] = family(process)
         process.kill()
-        until(lambda: not viewer.is_running() or viewer.status() == psutil.STATUS_ZOMBIE)
+        until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
     assert not list(temporary.iterdir())
 
 
