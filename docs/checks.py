@@ -26,8 +26,7 @@ from swarmwire.agent import behaviours
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-from swarmwire.deploy.campaign.plan import planned
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
@@ -91,12 +90,15 @@ def behaviour_pages() -> Problems:
 
 def _whole_campaign(name: str, places: Places) -> Problems:
     file = places.campaigns / f"{name}.toml"
-    table = campaign_table(file)
-    plan = planned(asked_in(file, table or {}))
+    campaign = campaign_file(file)
+    if campaign is None:
+        yield f"{file}: is a scenario, not a campaign"
+        return
+    plan = plan_of(spec_in(file, campaign))
     [data] = digests(degradation_of(name, places), places).values()
     levels = [plan.vary()[path] for path in plan.vary()]
     same = [sorted(data[LOSS].unique()), sorted(data[LATENCY].unique())] == levels
-    if not same or set(data["seed"]) != set(plan.asked.seeds) or len(data) != len(plan.points) * len(plan.asked.seeds):
+    if not same or set(data["seed"]) != set(plan.spec.seeds) or len(data) != len(plan.points) * len(plan.spec.seeds):
         yield f"{places.data / name}.parquet: is not of the whole campaign {file.name}"
 
 

@@ -43,10 +43,11 @@ def picture_command(asked: Names = None) -> None:
 def degrade_command(asked: Names = None, workers: Workers = None) -> None:
     """Sweep what is missing of the campaign, digest it, and draw the figure and the numbers from the digest."""
     from docs.experiments.running import run
-    from swarmwire.deploy.campaign.sweeping import Means
+    from swarmwire.deploy.campaign.sweep import ExecutionOptions
 
     for name in asked or names(HERE):
-        typer.echo(run(degradation_of(name, HERE), HERE, None, Means(workers=workers), Console(highlight=False)))
+        options = ExecutionOptions(workers=workers)
+        typer.echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
 
 
 @app.command("draw")

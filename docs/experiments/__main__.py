@@ -79,10 +79,10 @@ def run_command(
     kill, what is missing is run.
     """
     from docs.experiments.running import run
-    from swarmwire.deploy.campaign.sweeping import Means
+    from swarmwire.deploy.campaign.sweep import ExecutionOptions
 
     console = Console(highlight=False)
-    typer.echo(run(find_experiment(name, HERE), HERE, seeds, Means(workers=workers), console))
+    typer.echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from docs.experiments.places import Places
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.atomic import output_file
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.folder import CampaignFolder
 
 if TYPE_CHECKING:
     import polars as pl

@@ -19,14 +19,14 @@ from swarmwire.comms.wire import control_frames, frames, observer_frames
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.radio_bridge import BridgeInfo
 from swarmwire.deploy import RunFolder
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.campaign_file import campaign_table
+from swarmwire.deploy.campaign.spec import campaign_file
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.record.origin import read_origin
-from swarmwire.deploy.tuning.tuning import read_tuning
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.tuning.spec import read_tuning
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import read_campaign
 from swarmwire.metrics.real_log.robot_log import read_about_robot
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
@@ -34,7 +34,7 @@ from tests.support.agent.runners import assigned_robots
 
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": ("scenario.toml", load_scenario),
-    "campaign file": ("campaign.toml", campaign_table),
+    "campaign file": ("campaign.toml", campaign_file),
     "fleet": ("fleet.toml", read_fleet),
     "robot settings": ("robot.toml", lambda at: read_settings(at, {})),
     "summary": ("summary.json", lambda at: RunFolder(at.parent).summary),

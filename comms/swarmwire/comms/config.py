@@ -6,6 +6,7 @@ errors. `did_you_mean` names the known keys in an error about an unknown one.
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field
@@ -23,6 +24,7 @@ T = TypeVar("T")
 
 FORMAT_KEY = "format"  # in a file: the version of its format
 MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # in msgpack
+MISSING_FIELD = re.compile(r"Object missing required field `(\w+)`")  # as msgspec says it
 TOO_DEEP = "lists or tables within one another, too many to be meant"
 
 
@@ -154,7 +156,22 @@ def converted(kind: type[T], value: object, where: str) -> T:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         fault, _, path = str(error).partition(" - at `$")
-        raise BadInput(where, path.strip(".`"), f"{fault[0].lower()}{fault[1:]}") from None
+        missing = MISSING_FIELD.fullmatch(fault)
+        key = path.rstrip("`") + (f".{missing[1]}" if missing else "")
+        expected = "is missing: expected a value" if missing else f"{fault[0].lower()}{fault[1:]}"
+        raise BadInput(where, key.strip("."), expected) from None
+
+
+def read_json(kind: type[T], path: Path, known: int) -> T:
+    """The JSON object of a file as an instance of a typed class; BadInput unless it is one, of the known format."""
+    try:
+        found = from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(str(path.parent), path.name, f"expected a readable file: {error.strerror}") from None
+    except ValueError as error:  # no JSON, or no UTF-8
+        raise BadInput(str(path), "", f"expected JSON: {error}") from None
+    check_format(found, known, str(path))
+    return converted(kind, found, str(path))
 
 
 def check_plain(value: object, where: str, key: str) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.deploy.kernel_cache import keep_kernels
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
+    from swarmwire.deploy.campaign.sweep import Sweep, resume, sweep
     from swarmwire.deploy.gateways.gateways import Gateways
     from swarmwire.deploy.listening import Listening
     from swarmwire.deploy.record.recording import Recording
@@ -45,11 +45,11 @@ _PLACES = {
     "Repetition": "swarmwire.deploy.repetition",
     "RunFolder": "swarmwire.metrics.run_folder.reader",
     "Simulation": "swarmwire.deploy.simulation",
-    "Sweep": "swarmwire.deploy.campaign.sweeping",
+    "Sweep": "swarmwire.deploy.campaign.sweep",
     "repeat": "swarmwire.deploy.repetition",
-    "resume": "swarmwire.deploy.campaign.sweeping",
+    "resume": "swarmwire.deploy.campaign.sweep",
     "run": "swarmwire.deploy.running",
-    "sweep": "swarmwire.deploy.campaign.sweeping",
+    "sweep": "swarmwire.deploy.campaign.sweep",
 }  # all else is part of a result
 
 keep_kernels()

@@ -7,8 +7,8 @@ from typing import Any
 
 from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.live_events import LiveEventsRecord
-from swarmwire.deploy.record.scenario_copy import CopiedFile
 from swarmwire.metrics.atomic import write_text
+from swarmwire.metrics.campaign.spec import CopiedFile
 from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.registry import RunnerEvent

@@ -12,11 +12,10 @@ from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.agents import agent_specs
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.measuring import measuring
-from swarmwire.metrics.campaign.formats import ABOUT
-from swarmwire.metrics.campaign.selection import select
+from swarmwire.metrics.campaign.select import select
+from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RobotLog

@@ -15,7 +15,7 @@ from docs.experiments.experiment import find_experiment, names
 from docs.experiments.places import HERE
 from docs.experiments.running import run
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.sweeping import Means
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from tests.support.deploy.campaign.small import InThisProcess
 
 
@@ -23,7 +23,9 @@ def ran(places, seeds=None) -> tuple[str, str]:
     """The numbers, and what was said meanwhile."""
     said = io.StringIO()
     experiment = find_experiment("two-received", places)
-    return run(experiment, places, seeds, Means(executor=InThisProcess()), Console(file=said)), said.getvalue()
+    return run(
+        experiment, places, seeds, ExecutionOptions(executor=InThisProcess()), Console(file=said)
+    ), said.getvalue()
 
 
 def test_a_run_sweeps_digests_draws_and_tells(places):

@@ -10,10 +10,10 @@ import polars as pl
 from docs.experiments.digest import digest_of
 from docs.experiments.experiment import Experiment, find_experiment
 from docs.experiments.places import HERE
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-from swarmwire.deploy.campaign.plan import planned
-from swarmwire.deploy.campaign.sweeping import Means, begin_sweep
-from swarmwire.deploy.campaign.vary import vary_from
+from swarmwire.deploy.arguments import seed_list
+from swarmwire.deploy.campaign.design import vary_from
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep
 from tests.support.deploy.campaign.small import InThisProcess
 
 
@@ -57,12 +57,12 @@ def _digest(
     overrides: Sequence[str],
 ) -> pl.DataFrame:
     file = HERE.campaigns / f"{campaign}.toml"
-    table = campaign_table(file)
-    assert table is not None, file
-    asked = asked_in(file, {**table, "seeds": seeds if isinstance(seeds, int) else list(seeds)})
-    varied = tuple(vary_from(of.path, vary[of.path], of.path) if of.path in vary else of for of in asked.varied)
-    plan = planned(replace(asked, varied=varied, overrides=(*asked.overrides, *overrides)))
-    done = begin_sweep(plan, folder / campaign, "a miniature", Means(executor=InThisProcess(1)))
+    found = campaign_file(file)
+    assert found is not None, file
+    spec = replace(spec_in(file, found), seeds=seed_list(seeds))
+    varied = tuple(vary_from(of.path, vary[of.path], of.path) if of.path in vary else of for of in spec.varied)
+    plan = plan_of(replace(spec, varied=varied, overrides=(*spec.overrides, *overrides)))
+    done = begin_sweep(plan, folder / campaign, "a miniature", ExecutionOptions(executor=InThisProcess(1)))
     assert done.is_over
     assert not done.failed
     return digest_of(experiment, folder / campaign)

@@ -140,11 +140,11 @@ class Hour:
             self._until(lambda world=world: world.pid is None, END_S, "the world to end")
             runners = place.runners
             self._until(lambda runners=runners: all(one.pid is None for one in runners), END_S, "runners to end")
-            for name, one in place.onlookers.items():
+            for name, one in place.observers.items():
                 if name.startswith("page"):
                     one.send(signal.SIGINT)
-            others = list(place.onlookers.values())
-            self._until(lambda others=others: all(one.pid is None for one in others), END_S, "onlookers to end")
+            others = list(place.observers.values())
+            self._until(lambda others=others: all(one.pid is None for one in others), END_S, "observers to end")
         self._tell("harness", "ended", "")
 
     def _step(self, now_ns: int) -> None:
@@ -182,10 +182,10 @@ class Hour:
                 continue
             whose = place.kind.name
             pids = {"world": place.world.pid, "runner": place.runners[0].pid, "runner 2": place.runners[1].pid}
-            for name, one in place.onlookers.items():
+            for name, one in place.observers.items():
                 if name.endswith("calm"):
                     pids[name.partition("-")[0]] = one.pid
-            if "page-calm" in place.onlookers:
+            if "page-calm" in place.observers:
                 pids["viewer"] = next(iter(place.viewers_of("page-calm")), None)
             named = {f"{whose} {who}": pid for who, pid in pids.items()}
             at_s = to_s(now_ns - self._started_ns)
@@ -225,7 +225,7 @@ def counts_of(hour: Hour) -> Mapping[str, Any]:
             "runner processes started": sum(one.starts for one in place.runners),
             "exit codes": {
                 "runners": _tallied([code for one in place.runners for code in one.codes]),
-                **{name: _tallied(one.codes) for name, one in place.onlookers.items()},
+                **{name: _tallied(one.codes) for name, one in place.observers.items()},
             },
             "world": place.world.codes,
         }

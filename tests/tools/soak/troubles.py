@@ -46,7 +46,7 @@ class Troubles:
             self.refused: 1,
             self.paused: 1,
         }
-        if place.onlookers:
+        if place.observers:
             self._kinds |= {
                 self.onlooker_killed: 4,
                 self.onlooker_frozen: 2,
@@ -171,8 +171,8 @@ class Troubles:
         return [touched[int(i)] for i in self._rng.choice(len(touched), count, replace=False)]
 
     def _onlooker(self) -> Supervised:
-        names = sorted(name for name in self._place.onlookers if not name.endswith("calm"))
-        return self._place.onlookers[names[int(self._rng.integers(len(names)))]]
+        names = sorted(name for name in self._place.observers if not name.endswith("calm"))
+        return self._place.observers[names[int(self._rng.integers(len(names)))]]
 
     def _order(self, table: Mapping[str, Any], *, may_refuse: bool = False) -> int | None:
         number = self._ask(f"order {table}", lambda run: run.event(table), may_refuse=may_refuse)

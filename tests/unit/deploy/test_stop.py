@@ -5,8 +5,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.deploy.campaign.responses import responses_of
-from swarmwire.deploy.campaign.row import row_of
+from swarmwire.deploy.campaign.columns import responses_of, row_of
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario

@@ -16,7 +16,7 @@ from cryptography import x509
 
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.taken import taken
+from swarmwire.deploy.campaign.store import locked
 from swarmwire.deploy.certificates.authority import Authority, certificate_pem, key_pem, write_key
 from swarmwire.deploy.certificates.register import (
     AUTHORITY,
@@ -145,7 +145,7 @@ def _write_revoked(folder: Path, authority: Authority, register: Register, now: 
 def _written(folder: Path) -> Generator[None]:
     """Keep the folder for this process while the block lasts; BadInput if it is no folder, or cannot be written."""
     try:
-        with taken(folder, "folder of certificates"):
+        with locked(folder, "folder of certificates"):
             yield
     except FileNotFoundError:
         raise no_authority(folder) from None

@@ -34,10 +34,9 @@ def compare_command(
     from rich.console import Console
 
     from swarmwire.deploy.terminal.tables import print_comparison
-    from swarmwire.metrics.campaign.comparison import compare
-    from swarmwire.metrics.campaign.comparison_csv import write_comparison
-    from swarmwire.metrics.campaign.selection import at as at_points
-    from swarmwire.metrics.campaign.selection import select
+    from swarmwire.metrics.campaign.compare import compare, write_comparison
+    from swarmwire.metrics.campaign.select import at as at_points
+    from swarmwire.metrics.campaign.select import select
 
     first, second = at_points([select(a), select(b)], at or [])
     found = compare(first, second, response or [])

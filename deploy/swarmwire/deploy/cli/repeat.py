@@ -11,7 +11,7 @@ from swarmwire.deploy.cli.options import Links, Packets, Quiet, Runners
 from swarmwire.deploy.cli.process import DIFFERENT, INTERRUPTED, leaving_when_hung_up
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.run_again import CampaignRun
+    from swarmwire.deploy.campaign.repeat import CampaignRun
     from swarmwire.deploy.repetition import Repetition
 
 
@@ -34,12 +34,12 @@ def repeat_command(
     holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.campaign.run_again import CampaignRun
+    from swarmwire.deploy.campaign.repeat import CampaignRun
     from swarmwire.deploy.compiling import compiling_told
     from swarmwire.deploy.record.recording import Recording, packet_share
     from swarmwire.deploy.repetition import RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
-    from swarmwire.metrics.campaign.formats import ABOUT
+    from swarmwire.metrics.campaign.spec import ABOUT
 
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)

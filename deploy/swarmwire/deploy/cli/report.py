@@ -43,8 +43,8 @@ def report_command(
 
 def _report(folder: Path, responses: list[str]) -> "Report":
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
-    from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-    from swarmwire.metrics.campaign.formats import ABOUT
+    from swarmwire.metrics.campaign.folder import CampaignFolder
+    from swarmwire.metrics.campaign.spec import ABOUT
     from swarmwire.metrics.report.campaign import campaign_report
     from swarmwire.metrics.report.run import run_report
     from swarmwire.metrics.run_folder.layout import STATIC

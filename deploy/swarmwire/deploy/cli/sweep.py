@@ -3,7 +3,7 @@
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,10 +15,7 @@ from swarmwire.deploy.cli.options import Overrides, Quiet
 from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.plan import Plan
-    from swarmwire.deploy.campaign.sweeping import Means, Sweep
-    from swarmwire.deploy.campaign.watcher import Watcher
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.campaign.spec import Plan
 
 Vary = Annotated[
     list[str] | None,
@@ -49,12 +46,12 @@ def sweep_command(
         Path | None, typer.Option(help="The campaign's folder, new or empty. Default: campaigns/<scenario>-<UTC>.")
     ] = None,
     name: Annotated[str | None, typer.Option(help="What the campaign is called. Default: as the scenario.")] = None,
-    on: Annotated[
-        str, typer.Option(help="Who works: local, or another executor, such as dask://host:8786.", metavar="EXECUTOR")
+    executor: Annotated[
+        str, typer.Option(help="Who works: local, or a cluster, such as dask://host:8786.", metavar="EXECUTOR")
     ] = "local",
     workers: Annotated[
         int | None,
-        typer.Option(help="Worker processes, or threads of a cluster at most. Default: one for each core; all."),
+        typer.Option(help="Worker processes, of a cluster at most. Default: one for each core; all."),
     ] = None,
     batch: Annotated[
         int | None, typer.Option(help="Arenas in one world at most; 1: none together. Default: about 50.")
@@ -69,8 +66,8 @@ def sweep_command(
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="With --resume: also run again what failed.")
     ] = False,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="With --resume: also by another version of the code, or on another CPU.")
+    force: Annotated[
+        bool, typer.Option("--force", help="With --resume: also by another version of the code, or on another CPU.")
     ] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -84,12 +81,13 @@ def sweep_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.arguments import seed_list
-    from swarmwire.deploy.campaign.sweeping import Means
+    from swarmwire.deploy.campaign.start import default_folder
+    from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep, resume_sweep
     from swarmwire.deploy.interrupt import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
     from swarmwire.deploy.terminal.sweep_report import print_sweep
 
-    said = {
+    given = {
         "design": design,
         "points": points,
         "design_seed": design_seed,
@@ -98,36 +96,29 @@ def sweep_command(
         "record_seeds": None if record_seeds is None else seed_list(record_seeds, "--record-seeds"),
         "series": None if series else False,
     }
-    plan = _plan(source, vary or [], seeds, overrides or [], {key: of for key, of in said.items() if of is not None})
+    plan = _plan(source, vary or [], seeds, overrides or [], {key: of for key, of in given.items() if of is not None})
     console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
-    work = Work(Means(on, workers, batch), sweep_progress(console), interrupt)
+    options = ExecutionOptions(executor, workers, batch, sweep_progress(console), interrupt)
     with leaving_when_hung_up(interrupt):
-        if resume is None:
-            done = _begun(plan, source, out, work)
+        if resume is not None:
+            done = resume_sweep(resume, options, retry_failed=retry_failed, force=force, plan=plan)
+        elif plan is None or source is None:
+            raise BadInput("SCENARIO", "", "is missing: expected a scenario or a campaign, or --resume with a folder")
         else:
-            done = _resumed(resume, plan, work, retry_failed=retry_failed, anyway=anyway)
+            command = shlex.join(["swarmwire", *sys.argv[1:]])
+            done = begin_sweep(plan, out or default_folder(source.stem), command, options)
     print_sweep(done, console, program())
     if not done.is_over:
         raise typer.Exit(INTERRUPTED)
 
 
-@dataclass(frozen=True)
-class Work:
-    """With what a campaign is run, and who looks on."""
-
-    means: "Means"
-    watcher: "Watcher"
-    interrupt: "Interrupt"
-
-
 def _plan(
-    source: Path | None, vary: Sequence[str], seeds: str | None, overrides: Sequence[str], said: Mapping[str, Any]
+    source: Path | None, vary: Sequence[str], seeds: str | None, overrides: Sequence[str], given: Mapping[str, Any]
 ) -> "Plan | None":
-    """The campaign that is asked for, checked; options go before what a campaign's file says. None: none is."""
+    """The campaign that options and file describe, checked; options override the file. None: neither is there."""
     from swarmwire.deploy.arguments import SEEDS, seed_list
-    from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-    from swarmwire.deploy.campaign.plan import Asked, planned
-    from swarmwire.deploy.campaign.vary import vary_of
+    from swarmwire.deploy.campaign.design import vary_of
+    from swarmwire.deploy.campaign.spec import SweepSpec, campaign_file, plan_of, spec_in
 
     if source is None:
         if vary or seeds or overrides:
@@ -135,38 +126,13 @@ def _plan(
                 "SCENARIO", "", "expected the scenario of --vary, --seeds and --set; a --resume takes none of these"
             )
         return None
-    table = campaign_table(source)
+    file = campaign_file(source)
     varied = tuple(vary_of(text) for text in vary)
-    if table is None:
+    if file is None:
         if seeds is None:
             raise BadInput("--seeds", "", f"is missing: expected {SEEDS}")
-        return planned(replace(Asked(source, seed_list(seeds), varied, overrides=tuple(overrides)), **said))
-    of_file = asked_in(source, table if seeds is None else {**table, "seeds": seeds})
+        return plan_of(replace(SweepSpec(source, seed_list(seeds), varied, overrides=tuple(overrides)), **given))
+    spec = spec_in(source, file, seeds)
     new = {of.path for of in varied}
-    kept = tuple(of for of in of_file.varied if of.path not in new)
-    return planned(replace(of_file, varied=(*kept, *varied), overrides=(*of_file.overrides, *overrides), **said))
-
-
-def _begun(plan: "Plan | None", source: Path | None, out: Path | None, work: Work) -> "Sweep":
-    from swarmwire.deploy.campaign.campaign_start import default_folder
-    from swarmwire.deploy.campaign.sweeping import begin_sweep
-
-    if plan is None or source is None:
-        raise BadInput("SCENARIO", "", "is missing: expected a scenario or a campaign, or --resume with a folder")
-    command = shlex.join(["swarmwire", *sys.argv[1:]])
-    folder = out or default_folder(source.stem)
-    return begin_sweep(plan, folder, command, work.means, work.watcher, work.interrupt)
-
-
-def _resumed(folder: Path, plan: "Plan | None", work: Work, *, retry_failed: bool, anyway: bool) -> "Sweep":
-    from swarmwire.deploy.campaign.sweeping import resume_sweep
-
-    return resume_sweep(
-        folder,
-        work.means,
-        retry_failed=retry_failed,
-        anyway=anyway,
-        plan=plan,
-        watcher=work.watcher,
-        interrupt=work.interrupt,
-    )
+    kept = tuple(of for of in spec.varied if of.path not in new)
+    return plan_of(replace(spec, varied=(*kept, *varied), overrides=(*spec.overrides, *overrides), **given))

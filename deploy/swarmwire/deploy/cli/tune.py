@@ -4,7 +4,7 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -15,11 +15,10 @@ from swarmwire.deploy.cli.options import Overrides, Quiet
 from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.tuning.plan import TuningPlan
+    from swarmwire.deploy.tuning.spec import TuningPlan
 
 TRIALS, SEEDS, CHECK_SEEDS = 100, "20", "50"
-BATCH, SAMPLER, SAMPLER_SEED = 4, "tpe", 1
-DEFAULTS: dict[str, Any] = {"trials": TRIALS, "batch": BATCH, "sampler": SAMPLER, "sampler_seed": SAMPLER_SEED}
+PARALLEL_TRIALS, SAMPLER, SAMPLER_SEED = 4, "tpe", 1
 
 
 def tune_command(
@@ -58,9 +57,9 @@ def tune_command(
         str | None, typer.Option(help=f"What proposes parameters: tpe or random. Default: {SAMPLER}.")
     ] = None,
     sampler_seed: Annotated[int | None, typer.Option(help=f"Seed of the sampler. Default: {SAMPLER_SEED}.")] = None,
-    batch: Annotated[
+    parallel_trials: Annotated[
         int | None,
-        typer.Option(help=f"Trials that are proposed together, and run at the same time. Default: {BATCH}."),
+        typer.Option(help=f"Trials that are proposed together, and run at the same time. Default: {PARALLEL_TRIALS}."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="The tuning's folder, new or empty. Default: tunings/<scenario>-<UTC>.")
@@ -70,8 +69,8 @@ def tune_command(
         Path | None,
         typer.Option(help="Go on with the tuning in this folder; with --trials up to so many.", metavar="DIR"),
     ] = None,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="With --resume: also by another version of the code, or on another CPU.")
+    force: Annotated[
+        bool, typer.Option("--force", help="With --resume: also by another version of the code, or on another CPU.")
     ] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -86,9 +85,10 @@ def tune_command(
     Exit code 0: done; 1: all trials failed, or the folder cannot be written; 2: refused before anything was run;
     130: interrupted.
     """
-    asked = {
+    given = {
         "SCENARIO": scenario, "--search": search, "--goal": goal, "--seeds": seeds, "--check-seeds": check_seeds,
-        "--set": overrides, "--sampler": sampler, "--sampler-seed": sampler_seed, "--batch": batch, "--out": out,
+        "--set": overrides, "--sampler": sampler, "--sampler-seed": sampler_seed, "--parallel-trials": parallel_trials,
+        "--out": out,
     }  # fmt: skip
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
@@ -96,29 +96,27 @@ def tune_command(
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
     from swarmwire.deploy.terminal.tune_progress import tune_progress
     from swarmwire.deploy.terminal.tune_report import print_tuned
-    from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune, resume_tune
-    from swarmwire.deploy.tuning.tuning_start import default_tuning_folder
+    from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
 
     console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
-    onlookers = Onlookers(tune_progress(console), sweep_progress(console), interrupt)
+    observers = TuneObservers(tune_progress(console), sweep_progress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is None:
-            seed_texts = (seeds or SEEDS, check_seeds or CHECK_SEEDS)
-            said = {"trials": trials, "batch": batch, "sampler": sampler, "sampler_seed": sampler_seed}
-            plan = _plan(scenario, search or [], goal, seed_texts, overrides or [], said)
-            folder = out or default_tuning_folder(plan.asked.scenario.stem)
-            tuned = begin_tune(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), workers, onlookers)
+            numbers = {"trials": trials, "parallel_trials": parallel_trials, "sampler_seed": sampler_seed}
+            plan = _plan(scenario, search or [], goal, (seeds, check_seeds), overrides or [], sampler, numbers)
+            folder = out or default_tuning_folder(plan.spec.scenario.stem)
+            tuned = begin_tune(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), workers, observers)
         else:
-            _refuse_with_resume(asked)
-            tuned = resume_tune(resume, workers, onlookers, trials=trials, anyway=anyway)
+            _refuse_with_resume(given)
+            tuned = resume_tune(resume, workers, observers, trials=trials, force=force)
     print_tuned(tuned, console, program())
     if not tuned.is_over:
         raise typer.Exit(INTERRUPTED)
 
 
-def _refuse_with_resume(asked: Mapping[str, object]) -> None:
-    """BadInput for what a tuning that was begun has in its folder."""
-    for option, value in asked.items():
+def _refuse_with_resume(given: Mapping[str, object]) -> None:
+    """BadInput for options that the folder of a tuning answers."""
+    for option, value in given.items():
         if value:
             raise BadInput(option, "", "expected --resume without it: the folder says what was asked")
 
@@ -127,29 +125,29 @@ def _plan(
     scenario: Path | None,
     search: Sequence[str],
     goal: str | None,
-    seeds: tuple[str, str],
+    seeds: tuple[str | None, str | None],
     overrides: Sequence[str],
-    said: Mapping[str, Any],
+    sampler: str | None,
+    numbers: Mapping[str, int | None],
 ) -> "TuningPlan":
-    """The tuning that is asked for, checked; `seeds` are those of the trials and the fresh ones."""
+    """The tuning that options describe, checked; `seeds` are those of the trials and the fresh ones."""
     from swarmwire.deploy.arguments import seed_list
-    from swarmwire.deploy.tuning.plan import TuningAsked, planned_tuning
-    from swarmwire.deploy.tuning.search import asked_search
-    from swarmwire.deploy.tuning.seeds import fresh_seeds
+    from swarmwire.deploy.tuning.spec import TuningSpec, fresh_seeds, search_of, tuning_plan
 
     if scenario is None:
         raise BadInput("SCENARIO", "", "is missing: expected a scenario, or --resume with a folder")
     if goal is None:
         raise BadInput("--goal", "", 'is missing: expected one such as "min aggregation_time_s.q50"')
-    of_trials = seed_list(seeds[0])
-    given = {name: of for name, of in said.items() if of is not None}
-    asked = TuningAsked(
+    trial_seeds = seed_list(seeds[0] or SEEDS)
+    given = {name: value for name, value in numbers.items() if value is not None}
+    spec = TuningSpec(
         scenario=scenario,
-        searched=tuple(map(asked_search, search)),
+        searched=tuple(map(search_of, search)),
         goal=goal,
-        seeds=of_trials,
-        check_seeds=fresh_seeds(seeds[1], of_trials),
+        seeds=trial_seeds,
+        check_seeds=fresh_seeds(seeds[1] or CHECK_SEEDS, trial_seeds),
+        sampler=sampler or SAMPLER,
         overrides=tuple(overrides),
-        **{**DEFAULTS, **given},
+        **{"trials": TRIALS, "parallel_trials": PARALLEL_TRIALS, "sampler_seed": SAMPLER_SEED, **given},
     )
-    return planned_tuning(asked)
+    return tuning_plan(spec)

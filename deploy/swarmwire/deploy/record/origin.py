@@ -14,8 +14,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.record import machine
 from swarmwire.deploy.record.known_fields import known_fields
 from swarmwire.deploy.record.modules import changed_modules, module_digests
-from swarmwire.deploy.record.scenario_copy import CopiedFile, changed_files, copy_scenario
+from swarmwire.deploy.record.scenario_copy import changed_files, copy_scenario
 from swarmwire.metrics.atomic import write_text
+from swarmwire.metrics.campaign.spec import CopiedFile
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, MetricInfo, metric_info, metric_infos
 from swarmwire.world.scenario.scenario import Scenario

@@ -10,7 +10,6 @@ their digests (`modules`).
 """
 
 import hashlib
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,22 +19,13 @@ import tomli_w
 from swarmwire.comms.config import from_toml
 from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.radio.link_trace_file import trace_path
+from swarmwire.metrics.campaign.spec import CopiedFile
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
 FILES = "files"
-
-
-@dataclass(frozen=True)
-class CopiedFile:
-    """A file that a run needs to be repeated, as it was when the run began."""
-
-    path: str  # within the run folder
-    sha256: str
-    # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
-    what: str
 
 
 def copy_scenario(

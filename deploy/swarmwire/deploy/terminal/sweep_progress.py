@@ -4,15 +4,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from swarmwire.comms.clock import Clock, WallClock, to_s
-from swarmwire.deploy.campaign.campaign import Campaign
-from swarmwire.deploy.campaign.task import TaskResult
-from swarmwire.deploy.campaign.watcher import Watcher
-from swarmwire.metrics.campaign.formats import FAILED
+from swarmwire.deploy.campaign.sweep import Observer
+from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.metrics.campaign.spec import FAILED, Campaign
 
 SHARE = 0.1  # a line each time that so much more is done
 
 
-def sweep_progress(console: Console) -> Watcher:
+def sweep_progress(console: Console) -> Observer:
     """A bar with time left in a terminal, else plain lines."""
     clock = WallClock()
     if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
@@ -51,7 +50,7 @@ class Figures:
 
 
 class SweepBar:
-    """Watcher that draws a bar."""
+    """Observer that draws a bar."""
 
     def __init__(self, clock: Clock, console: Console) -> None:
         self._figures = Figures(clock)
@@ -83,7 +82,7 @@ class SweepBar:
 
 
 class SweepLines:
-    """Watcher that prints a few lines."""
+    """Observer that prints a few lines."""
 
     def __init__(self, clock: Clock, console: Console) -> None:
         self._figures, self._console = Figures(clock), console

@@ -8,11 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.deploy.campaign.sweeping import Sweep
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.formats import FAILED
-from swarmwire.metrics.campaign.point_values import value_text
-from swarmwire.metrics.campaign.response import FINAL, LINK_PDR, Response
+from swarmwire.deploy.campaign.sweep import Sweep
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import FAILED, FINAL, LINK_PDR, Response, value_text
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier

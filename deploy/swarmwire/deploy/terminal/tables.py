@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.campaign.comparison import Comparison
+    from swarmwire.metrics.campaign.compare import Comparison
     from swarmwire.metrics.sim_to_real.comparison import SimToReal
 
 Row = Sequence[str]
@@ -46,7 +46,7 @@ def _table(columns: Row, rows: Sequence[Row]) -> Table:
 
 def print_comparison(comparison: "Comparison", console: Console) -> None:
     """The rows of a comparison of campaigns, then what they mean."""
-    from swarmwire.metrics.campaign.comparison_texts import COLUMNS, cells, notes
+    from swarmwire.metrics.campaign.compare import COLUMNS, cells, notes
 
     print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
     for note in notes(comparison):

@@ -7,15 +7,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from swarmwire.comms.clock import Clock, WallClock, to_s
 from swarmwire.deploy.terminal.tune_texts import statistic_text
-from swarmwire.deploy.tuning.best_scenario import best_of
-from swarmwire.deploy.tuning.trial import Trial
-from swarmwire.deploy.tuning.trials_run import TrialsWatcher
-from swarmwire.deploy.tuning.tuning import Tuning
+from swarmwire.deploy.tuning.best import best_of
+from swarmwire.deploy.tuning.run import TrialObserver
+from swarmwire.deploy.tuning.spec import Tuning
+from swarmwire.deploy.tuning.study import Trial
 
 SHARE = 0.1  # a line each time that so much more is done
 
 
-def tune_progress(console: Console) -> TrialsWatcher:
+def tune_progress(console: Console) -> TrialObserver:
     """A bar with the best so far and the time left in a terminal, else plain lines."""
     if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
         return TuneBar(console)
@@ -31,7 +31,7 @@ def best_told(tuning: Tuning, trials: Sequence[Trial]) -> str:
 
 
 class TuneBar:
-    """Watcher that draws a bar."""
+    """Observer that draws a bar."""
 
     def __init__(self, console: Console) -> None:
         columns = (
@@ -66,7 +66,7 @@ class TuneBar:
 
 
 class TuneLines:
-    """Watcher that prints a few lines."""
+    """Observer that prints a few lines."""
 
     def __init__(self, clock: Clock, console: Console) -> None:
         self._clock, self._console, self._began_ns = clock, console, clock.now_ns()

@@ -13,10 +13,9 @@ from swarmwire.deploy.terminal.tune_texts import (
     sample_text,
     statistic_text,
 )
-from swarmwire.deploy.tuning.best_scenario import FILE
-from swarmwire.deploy.tuning.fresh_check import FreshCheck, gained
-from swarmwire.deploy.tuning.run_tuning import Tuned
-from swarmwire.deploy.tuning.trial import Trial
+from swarmwire.deploy.tuning.best import FILE, FreshCheck, gained
+from swarmwire.deploy.tuning.run import Tuned
+from swarmwire.deploy.tuning.study import Trial
 
 
 def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:

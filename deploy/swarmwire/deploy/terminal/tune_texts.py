@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from swarmwire.deploy.tuning.goal import SHARES, Goal
-from swarmwire.deploy.tuning.trial import Trial
+from swarmwire.deploy.tuning.study import Trial
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.summary import interval_text, quantile_text, summary

@@ -13,9 +13,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.task import Row
-from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.campaign.statistic import Stat, find_statistic
+from swarmwire.deploy.campaign.worker import Row
+from swarmwire.metrics.campaign.folder import response_sample
+from swarmwire.metrics.campaign.spec import Response, Stat, find_statistic
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
 
@@ -84,13 +84,9 @@ def goal_of(text: str, responses: Iterable[Response], limit_s: float) -> Goal:
 
 def sample_of(rows: Sequence[Row], response: Response) -> Sample:
     """The values of a response in rows of a point, none of which failed, by seed."""
-    found = np.array([_number(row.get(response.column)) for row in rows])
-    seed = np.array([row["seed"] for row in rows], np.int64)
-    there = np.isfinite(found)
-    if response.kind == "time":
-        end_s = np.array([row["sim_time_s"] for row in rows], np.float64)
-        return Sample(np.where(there, found, response.watched_s(end_s)), there, seed, "time")
-    return Sample(found[there], there[there], seed[there], undefined=int(np.count_nonzero(~there)))
+    value = np.array([_number(row.get(response.column)) for row in rows])
+    end_s = np.array([row["sim_time_s"] for row in rows], np.float64)
+    return response_sample(response, value, end_s, np.array([row["seed"] for row in rows], np.int64))
 
 
 def _number(cell: Any) -> float:

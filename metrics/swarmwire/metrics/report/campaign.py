@@ -4,9 +4,8 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.response import Response
-from swarmwire.metrics.campaign.statistic import find_response
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import Response, find_response
 from swarmwire.metrics.report.campaign_data import (
     Rounding,
     Samples,

@@ -13,10 +13,8 @@ from typing import TypeGuard
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.metrics.campaign.about import Point, Value
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.point_values import value_text
-from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import Point, Response, Value, value_text
 from swarmwire.metrics.statistics.sample import Sample, by_seed
 from swarmwire.metrics.statistics.summary import Summary, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier

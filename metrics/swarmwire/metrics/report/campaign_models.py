@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.report.campaign_data import (
     Levels,
     Rounding,

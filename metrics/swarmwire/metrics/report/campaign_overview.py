@@ -4,10 +4,8 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
-from swarmwire.metrics.campaign.about import About, Value
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.formats import FAILED
-from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title, short_value
 from swarmwire.metrics.report.charts import MAX_POINTS, Group, distributions
 from swarmwire.metrics.report.page import Figure, Listing, Section, Table, as_svg
@@ -64,7 +62,7 @@ def _moment(utc: str) -> str:
     return "{}-{}-{} {}:{} UTC".format(*found.groups()) if found else utc
 
 
-def _design(about: About) -> str:
+def _design(about: Campaign) -> str:
     points, seeds = len(about.points), len(about.seeds)
     return (
         f"{about.design}: {counted(points, 'point')} × {counted(seeds, 'seed')} = {counted(about.runs, 'run')}; "

@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.campaign.formats import SERIES
-from swarmwire.metrics.campaign.selection import Selection
+from swarmwire.metrics.campaign.select import Selection
+from swarmwire.metrics.campaign.spec import SERIES
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
 

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import campaign_folder, sweeping
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.run_again import CampaignRun
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.campaign import store
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.deploy.campaign.repeat import CampaignRun
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import read_campaign
 from tests.integration.deploy.campaign.test_resume import VARY, Killed, dying_at
 from tests.support.damaged import damaged
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
@@ -64,7 +65,7 @@ def at(error):
 
 def taken_up(folder):
     """What `resume` reads and joins before and after it runs what is missing."""
-    its = campaign_folder.CampaignFolder(folder, read_campaign(folder))
+    its = store.CampaignFolder(folder, read_campaign(folder))
     its.clear()
     its.finish(2)
 
@@ -116,7 +117,7 @@ def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(
 def test_series_of_another_type_are_told_by_file_and_column(half):
     first, second = sorted((half / "series").glob("part-*"))
     pl.read_parquet(second).with_columns(pl.col("order").cast(pl.String)).write_parquet(second)
-    its = campaign_folder.CampaignFolder(half, read_campaign(half))
+    its = store.CampaignFolder(half, read_campaign(half))
     assert at(refused(its.finish, 1)) == (str(second), "order")
     assert first.exists()
 

@@ -1,9 +1,6 @@
 """What fails is a row that says why, and stops nothing else."""
 
 from swarmwire.deploy import sweep
-from swarmwire.deploy.campaign.execution import execute
-from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.task import Task, TaskResult
 from tests.support.deploy.campaign.small import rows_in, series_in
 
 
@@ -58,44 +55,3 @@ def test_an_agent_that_calls_itself_for_ever_fails_alike_in_any_pack(tmp_path, s
         sweep(scenario, seeds=2, out=tmp_path / f"packed{batch}", overrides=overrides, batch=batch)
     assert "RecursionError" in rows_in(tmp_path / "packed1")[0]["error"]
     assert rows_in(tmp_path / "packed1") == rows_in(tmp_path / "packed2")
-
-
-class Losing:
-    """An executor whose workers die of some runs."""
-
-    slots, records = 2, False
-
-    def __init__(self, *deadly):
-        self.deadly, self.tasks, self.tried = set(deadly), [], []
-
-    def submit(self, task):
-        assert len(self.tasks) < self.slots
-        self.tasks.append(task)
-        self.tried.append(task.runs)
-
-    def finished(self, timeout_s):
-        task = self.tasks.pop(0)
-        if self.deadly & set(task.runs):
-            return [Finished(task, None, "gone")]
-        return [Finished(task, TaskResult(tuple({"run": run, "ended": "duration"} for run in task.runs)))]
-
-    def close(self):
-        pass
-
-
-def test_a_lost_task_is_tried_again_then_halved_and_at_last_a_failed_row():
-    losing, rows = Losing(2), []
-    tasks = [Task("x", (), 0, (0, 1, 2, 3), (1, 2, 3, 4)), Task("x", (), 1, (4,), (1,))]
-    assert execute(tasks, losing, lambda _, result: rows.extend(result.rows))
-    assert sorted((row["run"], row["ended"]) for row in rows) == [
-        (0, "duration"), (1, "duration"), (2, "failed"), (3, "duration"), (4, "duration")
-    ]  # fmt: skip
-    assert losing.tried.count((0, 1, 2, 3)) == losing.tried.count((2, 3)) == losing.tried.count((2,)) == 2
-    assert [row["error"] for row in rows if row["run"] == 2] == ["gone"]
-
-
-def test_who_stops_it_leaves_the_rest_undone():
-    losing, rows = Losing(), []
-    tasks = [Task("x", (), 0, (run,), (run + 1,)) for run in range(5)]
-    assert not execute(tasks, losing, lambda _, result: rows.extend(result.rows), lambda: len(rows) >= 2)
-    assert len(rows) == 2

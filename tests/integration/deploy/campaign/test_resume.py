@@ -7,8 +7,9 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import campaign_folder, sweeping
-from swarmwire.deploy.campaign.campaign import read_campaign
+from swarmwire.deploy.campaign import store
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": [0.0, 0.5]}
@@ -37,7 +38,7 @@ def whole(undisturbed, tmp_path, here):
 
 def dying_at(monkeypatch, count, error):
     """The write of this number, counted from 0, is the last that is tried; how many there were."""
-    write, tried = campaign_folder._write, []
+    write, tried = store._write, []
 
     def dying(path, data):
         tried.append(path)
@@ -45,7 +46,7 @@ def dying_at(monkeypatch, count, error):
             raise error
         write(path, data)
 
-    monkeypatch.setattr(campaign_folder, "_write", dying)
+    monkeypatch.setattr(store, "_write", dying)
     return tried
 
 
@@ -118,9 +119,9 @@ def test_other_code_versions_and_machines_are_refused_unless_people_insist(whole
         ("cpu", "another", "CPU.* another"),
     ):
         (whole / "campaign.json").write_text(json.dumps({**found, key: value}))
-        with pytest.raises(BadInput, match=f"^--resume {whole}: .*{told}.*--anyway"):
+        with pytest.raises(BadInput, match=f"^--resume {whole}: .*{told}.*--force"):
             resume(whole)
-        assert resume(whole, anyway=True).is_over
+        assert resume(whole, force=True).is_over
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
@@ -133,6 +134,5 @@ def test_a_folder_that_is_no_campaign_is_refused_in_a_line(tmp_path, text):
 
 
 def test_a_folder_is_for_one_process_at_a_time(whole):
-    folder = campaign_folder.CampaignFolder(whole, read_campaign(whole))
-    with folder.taken(), pytest.raises(BadInput, match="another process is at work"):
+    with store.locked(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
         resume(whole)

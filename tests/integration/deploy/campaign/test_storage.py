@@ -5,7 +5,7 @@ import errno
 import pytest
 
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign.storage import StorageFailed
+from swarmwire.deploy.campaign.store import StorageFailed
 from tests.integration.deploy.campaign.test_resume import ASKED, dying_at
 from tests.support.deploy.campaign.small import rows_in
 from tests.support.deploy.commands import called

@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 from swarmwire.deploy import RunFolder, run, sweep
-from swarmwire.deploy.campaign import sweeping
-from swarmwire.deploy.campaign.campaign import read_campaign
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
@@ -122,8 +122,8 @@ def test_where_workers_cannot_write_here_recorded_runs_are_done_on_this_machine_
     there.records = False
     for name, executor in (("there", there), ("local", local)):
         monkeypatch.setattr(executor, "submit", noting(executor.submit, name, done_by))
-    monkeypatch.setattr(sweeping, "open_executor", lambda on, *_: local if on == "local" else there)
-    sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], batch=1, on="there://")
+    monkeypatch.setattr(sweeping, "open_executor", lambda name, *_: local if name == "local" else there)
+    sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], batch=1, executor="there://")
     assert done_by == [("there", 1), ("there", 3), ("local", 2)]
     assert (there.closed, local.closed) == (True, True)
     assert [path.name for path in (tmp_path / "c" / "runs").iterdir()] == ["run-000001"]

@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from swarmwire.deploy import RunFolder
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
+from swarmwire.deploy.campaign.spec import campaign_file, spec_in
 from swarmwire.deploy.terminal import sweep_progress
 from tests.support.deploy.campaign.small import rows_in
 from tests.support.deploy.commands import called
@@ -49,7 +49,7 @@ def test_seeds_mean_the_same_to_run_to_sweep_and_in_a_campaigns_file(tmp_path, s
     asked = (scenario, "--seeds", "2", "--set", "duration_s=0.1", "--quiet", "--out")
     assert typed("run", *asked, tmp_path / "run", "--no-rrd")[0] == typed("sweep", *asked, tmp_path / "sweep")[0] == 0
     (tmp_path / "file.toml").write_text(f'format = 1\nscenario = "{scenario.name}"\nseeds = 2\nrecord_seeds = "2"\n')
-    of_file = asked_in(tmp_path / "file.toml", campaign_table(tmp_path / "file.toml"))
+    of_file = spec_in(tmp_path / "file.toml", campaign_file(tmp_path / "file.toml"))
     assert of_file.seeds == of_file.record_seeds == (1, 2)
     for written in ("run/run.json", "sweep/campaign.json"):
         assert json.loads((tmp_path / written).read_text())["seeds"] == [1, 2]
@@ -80,7 +80,7 @@ def test_a_campaigns_file_says_the_same_as_options_which_go_first(tmp_path, scen
         ("vary = { 'radio.loss' = 3 }", r"vary\.radio\.loss: "),
         ("vary = { 'radio.loss' = [] }", r"vary\.radio\.loss: "),
         ("vary = { 'radio.lss' = [1] }", r"vary\.radio\.lss: radio\.lss: "),
-        ("overrides = [3]", "overrides: "),
+        ("overrides = [3]", r"overrides\[0\]: "),
     ],
 )
 def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line, told):

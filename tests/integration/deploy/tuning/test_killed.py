@@ -13,16 +13,16 @@ from tests.support.deploy.tuning.small import scenario_in, trials_in, tuned
 KILLED = """
 import sys
 from pathlib import Path
-from swarmwire.deploy.campaign.watcher import NobodyWatches
+from swarmwire.deploy.campaign.sweep import NoObserver
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune
+from swarmwire.deploy.tuning.run import TuneObservers, begin_tune
 from tests.support.deploy.tuning.small import plan_of
 class Watcher:
     def begin(self, tuning, trials): print("begins", flush=True)
     def see(self, trial): print("trial", flush=True)
     def end(self): pass
-plan = plan_of(Path(sys.argv[1]), seeds=1, trials=5, batch=2)
-begin_tune(plan, Path(sys.argv[2]), "", 1, Onlookers(Watcher(), NobodyWatches(), Interrupt()))
+plan = plan_of(Path(sys.argv[1]), seeds=1, trials=5, parallel_trials=2)
+begin_tune(plan, Path(sys.argv[2]), "", 1, TuneObservers(Watcher(), NoObserver(), Interrupt()))
 """
 
 
@@ -48,5 +48,5 @@ def test_a_tuning_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, 
     assert code == 0
     assert there is not None
     assert int(there[1]) >= 3
-    tuned(scenario, tmp_path / "whole", seeds=1, trials=5, batch=2)
+    tuned(scenario, tmp_path / "whole", seeds=1, trials=5, parallel_trials=2)
     assert trials_in(folder).equals(trials_in(tmp_path / "whole"), null_equal=True)

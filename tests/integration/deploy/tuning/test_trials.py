@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from swarmwire.deploy import run
-from swarmwire.deploy.tuning.run_tuning import NothingFound
+from swarmwire.deploy.tuning.run import NothingFound
 from tests.support.deploy.tuning.small import AT, gone_on_with, trials_in, tuned
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -61,7 +61,7 @@ def test_where_values_are_no_good_together_that_trial_fails(tmp_path, scenario):
 def test_choices_may_be_files_which_the_folder_keeps(tmp_path, scenario):
     (tmp_path / "other.py").write_text((tmp_path / "careful.py").read_text())
     searched = "robots.pair.agent=careful.py:Careful,other.py:Careful"
-    tuned(scenario, tmp_path / "t", searched, trials=2, seeds=1, until=1, batch=1, sampler="random")
+    tuned(scenario, tmp_path / "t", searched, trials=2, seeds=1, until=1, parallel_trials=1, sampler="random")
     for file in ("careful.py", "other.py", "bowl.py"):
         (tmp_path / file).unlink()
     found = gone_on_with(tmp_path / "t", trials=5)

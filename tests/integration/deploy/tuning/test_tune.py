@@ -7,9 +7,9 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.tuning.fresh_check import gained
-from swarmwire.deploy.tuning.study_file import FILE
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.deploy.tuning.best import gained
+from swarmwire.deploy.tuning.study import FILE
+from swarmwire.metrics.campaign.folder import CampaignFolder
 from tests.support.deploy.tuning.small import gone_on_with, trials_in, tuned
 
 pytestmark = pytest.mark.usefixtures("calculated")
@@ -86,7 +86,7 @@ def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
     about = tmp_path / "t" / "tuning.json"
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "cpu": "another"}))
-    with pytest.raises(BadInput, match="CPU.* another.*--anyway"):
+    with pytest.raises(BadInput, match="CPU.* another.*--force"):
         gone_on_with(tmp_path / "t")
     about.write_text(json.dumps(found))
     (tmp_path / "t" / "scenario" / "files" / "careful.py").write_text("x = 1")

@@ -66,7 +66,7 @@ def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_
         (["bowl.toml", *GOAL, "--search", AT, "--search", AT], f"--search {AT}: .*once"),
         (["bowl.toml", "--goal", "min bawl", "--search", AT], "--goal: bawl: .*bowl"),
         (["bowl.toml", *GOAL, "--search", AT, "--trials", "0"], "--trials: expected 1 to"),
-        (["bowl.toml", *GOAL, "--search", AT, "--batch", "0"], "--batch: expected 1 to"),
+        (["bowl.toml", *GOAL, "--search", AT, "--parallel-trials", "0"], "--parallel-trials: expected 1 to"),
         (["bowl.toml", *GOAL, "--search", AT, "--sampler", "tpee"], "--sampler: .*tpe"),
         (["bowl.toml", *GOAL, "--search", AT, "--sampler-seed", "-1"], "--sampler-seed: "),
         (["bowl.toml", *GOAL, "--search", AT, "--check-seeds", "20:30"], "--check-seeds: .*20"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.page import page, write_report
 from tests.support.metrics.campaign.campaigns import write_campaign

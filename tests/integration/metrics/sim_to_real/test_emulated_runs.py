@@ -5,8 +5,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
-from swarmwire.deploy.campaign import sweeping
-from swarmwire.metrics.campaign.selection import select
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.metrics.campaign.select import select
 from swarmwire.metrics.sim_to_real.emulated_runs import runs_of_campaign, runs_of_folder
 from tests.support.deploy.campaign.small import InThisProcess
 from tests.support.deploy.commands import LOSSY

@@ -1,6 +1,6 @@
 import pytest
 
-from swarmwire.deploy.campaign import sweeping
+from swarmwire.deploy.campaign import sweep as sweeping
 from tests.support.deploy.campaign.small import InThisProcess, scenario_in
 
 

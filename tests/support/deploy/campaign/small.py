@@ -1,15 +1,17 @@
 """A scenario of two robots and few ticks, for campaigns of many runs, and what of their folders tells of no machine."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgpack
+import msgspec
 import polars as pl
 
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
-from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.run_task import run_task
-from swarmwire.deploy.campaign.task import Task, result_from, result_message, task_from, task_message
+from swarmwire.deploy.campaign.schedule import Finished
+from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.worker import Task, TaskResult, run_task
+from swarmwire.metrics.campaign.spec import read_campaign
 
 FLOCKING = "swarmwire.agent.behaviours:Flocking"
 SCENARIO = """
@@ -76,11 +78,16 @@ class InThisProcess:
         self.closed = False
 
     def submit(self, task: Task) -> None:
-        self.tasks.append(task_from(task_message(task)))
+        self.tasks.append(_sent(task, Task))
 
     def finished(self, timeout_s: float) -> list[Finished]:
         tasks, self.tasks = self.tasks[::-1], []
-        return [Finished(task, result_from(result_message(run_task(task, "here")))) for task in tasks]
+        return [Finished(task, _sent(run_task(task, "here"), TaskResult)) for task in tasks]
 
     def close(self) -> None:
         self.closed = True
+
+
+def _sent(message: Any, kind: type[Any]) -> Any:
+    """A task or a result after it went through a pipe."""
+    return msgspec.convert(msgpack.unpackb(msgpack.packb(asdict(message))), kind)

@@ -1,6 +1,6 @@
 import pytest
 
-from swarmwire.deploy.tuning import run_tuning
+from swarmwire.deploy.tuning import run
 from tests.support.deploy.campaign.small import InThisProcess
 from tests.support.deploy.tuning.small import Calculating, scenario_in
 
@@ -13,10 +13,10 @@ def scenario(tmp_path):
 @pytest.fixture
 def here(monkeypatch):
     """Tunings of this test need no processes: a second less for each."""
-    monkeypatch.setattr(run_tuning, "open_executor", lambda *_: InThisProcess())
+    monkeypatch.setattr(run, "open_executor", lambda *_: InThisProcess())
 
 
 @pytest.fixture
 def calculated(monkeypatch):
     """Tunings of this test run nothing."""
-    monkeypatch.setattr(run_tuning, "open_executor", lambda *_: Calculating())
+    monkeypatch.setattr(run, "open_executor", lambda *_: Calculating())

@@ -7,14 +7,12 @@ from typing import Any
 import polars as pl
 
 from swarmwire.deploy.arguments import seed_list
-from swarmwire.deploy.campaign.executor import Finished
-from swarmwire.deploy.campaign.task import Row, Task, TaskResult
-from swarmwire.deploy.campaign.watcher import NobodyWatches
+from swarmwire.deploy.campaign.schedule import Finished
+from swarmwire.deploy.campaign.sweep import NoObserver
+from swarmwire.deploy.campaign.worker import Row, Task, TaskResult
 from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.tuning.plan import TuningAsked, TuningPlan, planned_tuning
-from swarmwire.deploy.tuning.run_tuning import Onlookers, begin_tune, resume_tune
-from swarmwire.deploy.tuning.search import asked_search
-from swarmwire.deploy.tuning.seeds import fresh_seeds
+from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, resume_tune
+from swarmwire.deploy.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.campaign.small import InThisProcess
@@ -80,10 +78,10 @@ def scenario_in(folder: Path) -> Path:
 def plan_of(scenario: Path, *searched: str, **said: Any) -> TuningPlan:
     """The plan of a tuning for the bowl, unless something else is said."""
     seeds = seed_list(said.pop("seeds", 2))
-    usual = {"goal": "min bowl", "trials": 10, "batch": 4, "sampler": "tpe", "sampler_seed": 1}
-    searches = tuple(map(asked_search, searched or (AT,)))
+    usual = {"goal": "min bowl", "trials": 10, "parallel_trials": 4, "sampler": "tpe", "sampler_seed": 1}
+    searches = tuple(map(search_of, searched or (AT,)))
     fresh = fresh_seeds(said.pop("check_seeds", "2"), seeds)
-    return planned_tuning(TuningAsked(scenario, searches, seeds=seeds, check_seeds=fresh, **{**usual, **said}))
+    return tuning_plan(TuningSpec(scenario, searches, seeds=seeds, check_seeds=fresh, **{**usual, **said}))
 
 
 class Calculating(InThisProcess):
@@ -119,19 +117,19 @@ class Looking:
     def end(self):
         pass
 
-    def onlookers(self) -> Onlookers:
-        return Onlookers(self, NobodyWatches(), self.interrupt)
+    def observers(self) -> TuneObservers:
+        return TuneObservers(self, NoObserver(), self.interrupt)
 
 
 def tuned(scenario: Path, folder: Path, *searched: str, until: int | None = None, **said: Any) -> Any:
     """What came of a tuning (`Tuned`), ended after so many trials if that is said."""
     plan = plan_of(scenario, *searched, **said)
-    return begin_tune(plan, folder, "tune", None, Looking(until).onlookers())
+    return begin_tune(plan, folder, "tune", None, Looking(until).observers())
 
 
 def gone_on_with(folder: Path, trials: int | None = None, until: int | None = None) -> Any:
     """The same tuning, resumed."""
-    return resume_tune(folder, None, Looking(until).onlookers(), trials=trials)
+    return resume_tune(folder, None, Looking(until).observers(), trials=trials)
 
 
 def trials_in(folder: Path) -> pl.DataFrame:

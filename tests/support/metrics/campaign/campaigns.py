@@ -115,8 +115,13 @@ def _about(
         "vary": {path: list(values) for path, values in varied.items()},
         "points": [dict(point) for point in points],
         "overrides": [],
+        "point_overrides": [[] for _ in points],
         "duration_s": limit_s,
+        "robots": 10,
         "responses": responses,
+        "series": False,
+        "record_seeds": [],
+        "batch": None,
     }
 
 

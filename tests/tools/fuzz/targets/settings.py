@@ -15,8 +15,7 @@ from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy.agents import agent_specs, check_agents
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-from swarmwire.deploy.campaign.plan import planned
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
@@ -135,12 +134,12 @@ class Campaigns(TomlTarget):
         return "scenario" in table and "vary" in table
 
     def read(self, path: Path, *, deep: bool) -> str | None:
-        table = campaign_table(path)
-        if table is None:
+        file = campaign_file(path)
+        if file is None:
             return "a scenario"
-        campaign = asked_in(path, table)
+        spec = spec_in(path, file)
         if deep:
-            planned(campaign)
+            plan_of(spec)
         return None
 
 

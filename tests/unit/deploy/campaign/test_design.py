@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.design import points_of
-from swarmwire.deploy.campaign.vary import vary_of
+from swarmwire.deploy.campaign.design import points_of, vary_of
 
 
 def points(kind, *texts, count=None, seed=1, whole=()):

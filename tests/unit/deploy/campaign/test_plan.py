@@ -3,12 +3,12 @@
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.plan import Asked, planned
-from swarmwire.deploy.campaign.vary import vary_of
+from swarmwire.deploy.campaign.design import vary_of
+from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 
 
 def plan(scenario, *texts, **asked):
-    return planned(Asked(scenario, (1, 2), tuple(vary_of(text) for text in texts), **asked))
+    return plan_of(SweepSpec(scenario, (1, 2), tuple(vary_of(text) for text in texts), **asked))
 
 
 def test_a_range_over_what_the_scenario_counts_gives_whole_numbers(scenario):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.vary import Range, vary_from, vary_of
+from swarmwire.deploy.campaign.design import Range, vary_from, vary_of
 
 
 def values(text):

@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.deploy.campaign.sweeping import Sweep
-from swarmwire.deploy.campaign.task import TaskResult
+from swarmwire.deploy.campaign.sweep import Sweep
+from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.deploy.terminal.sweep_progress import SweepBar, SweepLines, sweep_progress
 from swarmwire.deploy.terminal.sweep_report import print_sweep
 from tests.support.clocks import StillClock
@@ -67,7 +67,8 @@ TIME = {"unit": "s", "kind": "time", "help": "", "listed": False, "hold_s": 0.0}
 ABOUT = {
     "format": 1, "name": "times", "scenario": "times", "command": "", "began_utc": "", "versions": {}, "cpu": "",
     "modules": {}, "files": [], "design": "grid", "seeds": [1, 2, 3, 4], "vary": {}, "points": [{}], "overrides": [],
-    "duration_s": 50.0, "responses": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
+    "duration_s": 50.0, "robots": 1, "series": False, "record_seeds": [], "batch": None, "point_overrides": [[]],
+    "responses": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
 }  # fmt: skip
 
 

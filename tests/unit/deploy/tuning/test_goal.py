@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.tuning.goal import goal_of, sample_of
-from swarmwire.metrics.campaign.response import Response
+from swarmwire.metrics.campaign.spec import Response
 
 ORDER = Response("order.final", "", "number", "")
 TIME = Response("aggregation_time_s", "s", "time", "")

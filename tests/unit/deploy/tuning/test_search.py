@@ -3,12 +3,11 @@
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.tuning.search import Search, asked_search, search_from
-from swarmwire.deploy.tuning.seeds import fresh_seeds
+from swarmwire.deploy.tuning.spec import Search, fresh_seeds, search_from, search_of
 
 
 def search(text, whole=False):
-    return search_from(asked_search(text), lambda _: whole)
+    return search_from(search_of(text), lambda _: whole)
 
 
 def test_a_range_holds_numbers_whole_ones_where_the_scenarios_are():

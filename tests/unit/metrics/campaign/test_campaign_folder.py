@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.campaign.statistic import Stat
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import Stat
 from tests.support.metrics.campaign.campaigns import write_campaign
 
 
@@ -129,7 +129,7 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
     ("changes", "key"),
     [
         ({"seeds": [1, 1]}, "seeds"),
-        ({"seeds": [True]}, "seeds"),
+        ({"seeds": [True]}, "seeds[0]"),
         ({"seeds": []}, "seeds"),
         ({"points": []}, "points"),
         ({"points": [{"radio.loss": 0.1}, {}]}, "points[1]"),
@@ -141,7 +141,7 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"responses": [{"column": "x"}]}, "responses[0].unit"),
         ({"files": [3]}, "files[0]"),
         ({"files": [{"what": "a"}]}, "files[0].path"),
-        ({"overrides": [3]}, "overrides"),
+        ({"overrides": [3]}, "overrides[0]"),
         ({"modules": []}, "modules"),
         ({"name": None}, "name"),
     ],

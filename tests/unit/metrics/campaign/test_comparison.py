@@ -6,11 +6,9 @@ import math
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.campaign.comparison import compare
-from swarmwire.metrics.campaign.comparison_csv import write_comparison
-from swarmwire.metrics.campaign.comparison_texts import COLUMNS, cells, notes
-from swarmwire.metrics.campaign.point_values import same_value, value_from
-from swarmwire.metrics.campaign.selection import at, select
+from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
+from swarmwire.metrics.campaign.select import at, select
+from swarmwire.metrics.campaign.spec import same_value, value_from
 from tests.support.metrics.campaign.campaigns import NUMBERS, TIMES, order, write_campaign
 
 TWO = {"radio.loss": [0.0, 0.1], "physics.engine": ["discs", "pymunk"]}

@@ -1,0 +1,192 @@
+"""A campaign's folder, read back: finished, ended early, or still running."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.campaign.spec import (
+    FAILED,
+    PARTS,
+    SUMMARY,
+    Campaign,
+    Point,
+    Response,
+    Statistic,
+    find_response,
+    find_statistic,
+    read_campaign,
+)
+from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
+from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SIM_TIME = "sim_time_s"
+CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
+NUMBERS = ("run", "point", "seed")
+NEEDED = (*NUMBERS, "ended", SIM_TIME)
+
+
+class CampaignFolder:
+    """What was asked for, and what came of each run, as it was on disk when first asked for.
+
+    BadInput where it is no campaign, is of another format, or a file is damaged.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Read what was asked for; BadInput unless the folder holds a campaign."""
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise BadInput(str(path), "", "expected a campaign's folder: there is none")
+        self.about: Campaign = read_campaign(self.path)
+        self._samples: dict[str, tuple[Sample, ...]] = {}
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Paths of the parameters that are varied, in the order in which they were named."""
+        return tuple(self.about.vary)
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The design points; a point's number is its place here."""
+        return self.about.points
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """What was measured of each run."""
+        return self.about.responses
+
+    @cached_property
+    def runs(self) -> "pl.DataFrame":
+        """A row per run that has ended, sorted by run: `summary.parquet`, or what parts there are so far.
+
+        Columns: run, point, seed, one of each parameter, ended, error, ticks, sim_time_s, responses, timing_wall_s, …
+        Before the first run has ended there may be no columns but the first of these.
+        """
+        import polars as pl
+
+        for _ in range(CHANGES_UNDERFOOT):
+            files = self._files()
+            try:
+                frames = [read_parquet(file) for file in files]
+            except BadInput:
+                if all(file.exists() for file in files):
+                    raise
+                continue  # it finished just now, and its parts went
+            for file, frame in zip(files, frames, strict=True):
+                _check_columns(file, frame, self.responses)
+            if not frames:
+                return pl.DataFrame(schema=dict.fromkeys(NEEDED, pl.Int64) | {"ended": pl.String, SIM_TIME: pl.Float64})
+            try:
+                return pl.concat(frames, how="diagonal_relaxed").unique("run", keep="last").sort("run")
+            except corruption_errors():
+                refuse_corrupt(files)
+                raise
+        raise BadInput(str(self.path), PARTS, "expected files that stay while they are read")
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Numbers of the runs that were asked for and have no row (yet)."""
+        there: set[int] = set(self._column("run").tolist())
+        return tuple(run for run in range(self.about.runs) if run not in there)
+
+    @property
+    def finished(self) -> bool:
+        """Whether every run that was asked for has ended, well or not."""
+        return not self.missing
+
+    def response(self, name: str) -> Response:
+        """The response of this column, or of a bare metric's last value; BadInput names those that there are."""
+        return find_response(name, self.responses, str(self.path))
+
+    def statistic(self, name: str) -> Statistic:
+        """The statistic that `COLUMN.STAT` names; BadInput if there is none."""
+        return find_statistic(name, self.responses, str(self.path))
+
+    def sample(self, column: str, point: int) -> Sample:
+        """The values of a response over the seeds of a design point, in the seeds' order as they were asked for.
+
+        A number that is null is undefined; a time that is null is right-censored at its run's end. BadInput for an
+        response or a point that there is not.
+        """
+        response = self.response(column)
+        if not 0 <= point < len(self.points):
+            raise BadInput(str(self.path), "point", f"expected 0 to {len(self.points) - 1}, got {point}")
+        if response.column not in self._samples:
+            self._samples[response.column] = self._of_all_points(response)
+        return self._samples[response.column][point]
+
+    def _of_all_points(self, response: Response) -> tuple[Sample, ...]:
+        """Read once: a report asks for every response at every point."""
+        order = np.argsort(self._column("point"), kind="stable")
+        value, end_s = self._numbers(response.column)[order], self._numbers(SIM_TIME)[order]
+        seed, well = self._column("seed")[order].astype(np.int64), self._ended_well[order]
+        edges = np.searchsorted(self._column("point")[order], np.arange(len(self.points) + 1)).tolist()
+        return tuple(
+            _sample(response, value[here], end_s[here], seed[here], well[here])
+            for here in (slice(start, end) for start, end in pairwise(edges))
+        )
+
+    @cached_property
+    def _ended_well(self) -> BoolArray:
+        """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
+        import polars as pl
+
+        return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
+
+    def _column(self, name: str) -> AnyArray:
+        return self.runs[name].to_numpy()
+
+    def _numbers(self, name: str) -> FloatArray:
+        """A column of numbers (runs,), NaN where it is null; all NaN before any run has told of it."""
+        import polars as pl
+
+        if name not in self.runs.columns:
+            return np.full(len(self.runs), np.nan)
+        return self.runs[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+
+    def _files(self) -> list[Path]:
+        """The table, and parts: those of a campaign that was taken up again are newer than the table."""
+        whole = self.path / SUMMARY
+        parts = (self.path / PARTS).glob("*.parquet")
+        found = sorted(part for part in parts if not part.name.startswith("."))  # what is being written starts so
+        return [whole, *found] if whole.exists() else found
+
+
+def _check_columns(file: Path, frame: "pl.DataFrame", responses: Iterable[Response]) -> None:
+    import polars as pl
+
+    lacking = [name for name in NEEDED if name not in frame.columns]
+    if lacking:
+        raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")
+    for name in NUMBERS:
+        if not frame.schema[name].is_integer() or frame[name].null_count():
+            raise BadInput(str(file), name, "expected a column of whole numbers")
+    for name in (SIM_TIME, *(response.column for response in responses)):
+        kind = frame.schema.get(name)
+        if kind is not None and not (kind.is_numeric() or frame[name].is_null().all()):
+            raise BadInput(str(file), name, "expected a column of numbers")
+    if frame.schema["ended"] != pl.String or frame["ended"].null_count():
+        raise BadInput(str(file), "ended", "expected how each run ended")
+
+
+def response_sample(response: Response, value: FloatArray, end_s: FloatArray, seed: IntArray) -> Sample:
+    """The values of a response in runs that ended well, at `end_s`; NaN: censored there, or undefined."""
+    if response.kind == "number":
+        return number_sample(value, seed)
+    observed = np.isfinite(value)
+    return time_sample(np.where(observed, value, response.watched_s(end_s)), observed, seed)
+
+
+def _sample(response: Response, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
+    """Of all runs of a point, of which those that ended well have a part in it."""
+    failed = int(np.count_nonzero(~well))
+    return replace(response_sample(response, value[well], end_s[well], seed[well]), failed=failed)
