@@ -25,6 +25,7 @@ from uuid import uuid4
 import distributed
 from distributed import Status, WorkerPlugin, get_worker
 from distributed.exceptions import WorkerStartTimeoutError
+from distributed.protocol.pickle import dumps
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 from distributed.worker import WORKER_ANY_RUNNING, Worker
@@ -43,6 +44,7 @@ DEFAULT_PORT = 8786  # of a dask scheduler
 CONNECT_S = 10.0
 CLOSE_S = 5.0
 NO_WORKER_S = 60.0  # without a single worker that fits, at the beginning and in between
+PREPARE_S = 120.0  # for the answers of all workers, which import swarmwire first
 POLL_S = 5.0  # between two looks at the workers
 MUTE_POLLS = 12  # in a row without an answer: with the time between them two minutes, and the scheduler is given up
 Say = Callable[[str], None]
@@ -60,7 +62,6 @@ class Client(Protocol):
     run: Callable[..., Any]
     run_on_scheduler: Callable[..., Any]
     nthreads: Callable[..., Mapping[str, int]]
-    register_plugin: Callable[..., Any]
     subscribe_topic: Callable[..., None]
     submit: Callable[..., Any]
     sync: Callable[..., Any]
@@ -143,10 +144,17 @@ class DaskExecutor:
     def _begin(self) -> None:
         """Prepare all workers; there are no files, and no campaign.json, before the first task."""
         modules = tuple(read_campaign(self._scenario.parent).modules)
+        plugin = dumps(Preparation(self._campaign, environment(modules), _files(self._scenario)))
+        call = self._client.scheduler.register_worker_plugin  # `Client.register_plugin` has no time limit
         try:
-            self._client.register_plugin(Preparation(self._campaign, environment(modules), _files(self._scenario)))
-        except Exception as error:  # of any kind: it was raised on a worker
-            raise self._failed(str(error)) from error
+            found: dict[str, Any] = self._client.sync(
+                call, plugin=plugin, name=self._campaign, idempotent=False, callback_timeout=PREPARE_S
+            )
+        except (TimeoutError, OSError):
+            raise self._failed("the scheduler does not answer") from None
+        for worker, answer in found.items():
+            if answer["status"] == "error":
+                raise self._failed(f"worker {worker}: {answer['exception_text']}")
         self._client.subscribe_topic(self._campaign, self._worker_came)
         self._begun = True
 

@@ -202,6 +202,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
 def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one_worker, monkeypatch):
     monkeypatch.setattr(dask, "POLL_S", 0.1)
     monkeypatch.setattr(dask, "CLOSE_S", 0.5)
+    monkeypatch.setattr(dask, "PREPARE_S", 1.0)
     monkeypatch.setattr(dask, "MUTE_POLLS", 3)
     frozen = one_worker.scheduler.suspend
     monkeypatch.setattr(sweeping, "execute", lambda *given: [frozen(), schedule.execute(*given)][1])
