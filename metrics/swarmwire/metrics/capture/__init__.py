@@ -1,1 +1,1 @@
-"""Captures: what was on air, as a file that Wireshark opens."""
+"""Captures of the frames on air, for Wireshark."""

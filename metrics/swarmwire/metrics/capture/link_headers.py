@@ -1,4 +1,4 @@
-"""Link headers: what stands before the payload of a frame in a capture, by the kind of radio.
+"""Link headers: the headers before the payload of a frame in a capture, by kind of radio.
 
 | link type | headers |
 | --- | --- |
@@ -52,7 +52,7 @@ class Frame:
     size_bytes: int  # payload
     payload: bytes = b""  # as far as it is known
     rssi_dbm: float | None = None  # at the receiver where it was strongest; None: unknown
-    comments: tuple[str, ...] = ()  # what it is, and what became of it where
+    comments: tuple[str, ...] = ()  # its content, and its fates
 
 
 class Link(NamedTuple):
@@ -64,7 +64,7 @@ class Link(NamedTuple):
 
 
 def link_of(radio: Radio) -> Link:
-    """The link type whose frames this radio sends."""
+    """The link type of a radio's frames."""
     if radio.is_phy and radio.frame != "plain":
         return Link(IEEE802_11_RADIOTAP, 1 << 24, partial(_headers_80211, radio))
     if radio.is_phy and radio.reception_or_default.model == "802.15.4":

@@ -24,9 +24,9 @@ MAX_OPTION = 65_535  # bytes
 
 
 def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[Frame]) -> int:
-    """Write the frames, and say how many; BadInput if nothing can be written there.
+    """Write the frames and return their number; BadInput if the file cannot be written.
 
-    Times are since the run's start, which a reader takes for 1970. A payload that is not known is not captured, but
+    Times are since the run's start, which readers show as 1970. A payload that is not known is not captured, but
     counts in the frame's length.
     """
     count = 0
@@ -43,7 +43,7 @@ def write_capture(to: Path, link: Link, name: str, description: str, frames: Ite
 def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
     """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
 
-    A frame that nobody was within reach of has no row, and is not among them; nor is what never went on air.
+    A frame without a receiver in range has no row and is left out, as are packets that never went on air.
     """
     import polars as pl
 
@@ -62,7 +62,7 @@ def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Fra
 
 def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
     to, sender = row["to"], names[row["sender"]]
-    told = f"{sender} to {'all' if to is None else names[to]}: {row['topic']}, packet {row['sequence']}"
+    title = f"{sender} to {'all' if to is None else names[to]}: {row['topic']}, packet {row['sequence']}"
     return Frame(
         on_air_at_ns=row["on_air_at_ns"],
         sender=row["sender"],
@@ -71,7 +71,7 @@ def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
         size_bytes=row["size_bytes"],
         payload=row["payload"] or b"",
         rssi_dbm=row["strongest_dbm"],
-        comments=(told, *_fates(row, names)),
+        comments=(title, *_fates(row, names)),
     )
 
 
@@ -85,7 +85,7 @@ def _fates(row: dict[str, Any], names: Sequence[str]) -> list[str]:
 
 
 def section(application: str) -> bytes:
-    """The block that a file starts with: who wrote it."""
+    """The first block of a file, with the writing application."""
     body = struct.pack("<IHHq", BYTE_ORDER, 1, 0, UNKNOWN_LENGTH)
     return _block(SECTION, body, [(USER_APPLICATION, _text(application))])
 

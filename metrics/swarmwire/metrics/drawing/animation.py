@@ -39,15 +39,15 @@ _QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for
 
 
 class FilmFigure:
-    """Draws any tick of a film; what does not move is drawn once and kept as pixels."""
+    """A figure that draws any tick of a film. Fixed parts are drawn once and kept as pixels."""
 
     def __init__(
         self, film: Film, size_px: int, metrics: Sequence[str] | None = None, trail_s: float = TRAIL_S
     ) -> None:
-        """A figure whose longer side has this many pixels, with these metrics beside the arena (None: the usual ones).
+        """A figure whose longer side has this many pixels, with these metrics beside the arena (None: default).
 
-        Behind each robot is its way of the last `trail_s`.
-        BadInput for a metric that was not recorded, or a size that nobody could look at.
+        A trail shows the path of each robot over the last `trail_s`.
+        BadInput for a metric that was not recorded, or a size out of bounds.
         """
         self._film, static, self._trail_s = film, film.static, trail_s
         names = choose(film.metrics, metrics)
@@ -68,7 +68,7 @@ class FilmFigure:
         self._strip = MetricStrip(figure, layout, film, names) if names else None
         pushed = [self._movable] if static.movable else []
         self._moving = [*pushed, *self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
-        self._still: Any = None  # pixels of what does not move
+        self._still: Any = None  # pixels of the fixed parts
 
     def frame(self, index: int) -> ByteArray:
         """The pixels of a tick, (height, width, 3); a view that the next frame overwrites."""
@@ -84,13 +84,13 @@ class FilmFigure:
         return pixels(self._figure)
 
     def save(self, index: int, to: Path) -> None:
-        """Write the picture of a tick as PNG, SVG or PDF; BadInput for another name or a folder that is not there."""
+        """Write the picture of a tick as PNG, SVG or PDF; BadInput for another suffix or a missing folder."""
         self._animate(False)
         self._show(index)
         save(self._figure, to)
 
     def _animate(self, apart: bool) -> None:
-        """Let what moves be drawn apart from the rest, or with it."""
+        """Draw the moving artists apart from the rest, or with it."""
         for artist in self._moving:
             artist.set_animated(apart)
 
@@ -167,7 +167,7 @@ def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray
 
 
 def _palette(samples: Sequence[ByteArray]) -> Any:
-    """The colours of even areas as they are, which are the most frequent, and means of those at their edges."""
+    """The exact colours of even areas, which are the most frequent, and mean colours of their edges."""
     from PIL import Image
 
     parts = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int64)
@@ -183,9 +183,9 @@ def _palette(samples: Sequence[ByteArray]) -> Any:
 
 
 def _apart(chosen: IntArray, candidates: IntArray, most: int) -> IntArray:
-    """The chosen colours, and as many candidates as there is room for that are none of them nor almost one.
+    """The chosen colours, and as many further candidates as fit that are not close to one of them.
 
-    Pillow looks colours up to within four steps, and might take what is almost a colour for it.
+    Pillow matches colours to within four steps, so that close colours would be mixed up.
     """
     for candidate in candidates:
         if len(chosen) == most:
@@ -199,7 +199,7 @@ def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
     from PIL import Image
 
     for frame in frames:
-        # Without dithering, so that what stands still is equal from frame to frame and costs nothing.
+        # Without dithering, fixed parts are equal from frame to frame and take no bytes.
         yield Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
 
 

@@ -62,12 +62,12 @@ def facts_of(body: Body) -> list[tuple[str, str]]:
     if body.leds:
         facts.append(("LEDs", f"{body.led_count}{', the last a beacon' if body.leds.beacon_height_m else ''}"))
     for name, sheet in body.sensors.items():
-        facts.extend(zip((name, *[""] * 9), _told(sheet, body.altitude_m), strict=False))
+        facts.extend(zip((name, *[""] * 9), _sensor_facts(sheet, body.altitude_m), strict=False))
     facts.extend((name, _own(sheet.kind)) for name, sheet in body.actuators.items())
     return facts
 
 
-def _told(sheet: SensorSpec, altitude_m: float) -> list[str]:
+def _sensor_facts(sheet: SensorSpec, altitude_m: float) -> list[str]:
     match sheet:
         case RayArraySpec():
             return [f"{len(sheet.angles_deg)} rays of {_length(sheet.range_m)}", *_noise(sheet.noise)]
@@ -102,7 +102,7 @@ def _told(sheet: SensorSpec, altitude_m: float) -> list[str]:
 
 
 def _own(kind: str) -> str:
-    """A class of the user's own, without the folders of its file."""
+    """The name of a custom class, without the folders of its file."""
     return f"by {kind.rpartition('/')[2]}"
 
 
@@ -158,7 +158,7 @@ def draw_body(body: Body, to: Path, size_px: int) -> None:
 
 
 def _draw_response(axes: Any, proximity: ProximitySpec) -> None:
-    """What a ray answers to the distance of what it meets."""
+    """The response of a ray over the distance of the nearest thing."""
     distance_m = np.linspace(0.0, proximity.range_m, 400)
     axes.plot(100.0 * distance_m, proximity.response.value(distance_m), color=CURVE, lw=1.4)
     axes.set_xlim(0.0, 100.0 * proximity.range_m)

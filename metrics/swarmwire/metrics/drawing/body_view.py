@@ -33,14 +33,14 @@ _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
 _FADES_FROM, _FADING = 0.6, 10  # of the view, where rays that leave it begin to fade; and in so many steps
 _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
 _COLOR = robot_color(0)
-_ROOM = 1.16  # of what is seen by what is drawn, so that numbers at the rays' ends fit
+_ROOM = 1.16  # view over drawing, so that numbers at the ends of rays fit
 _BELOW = -0.035  # where legend and bar are, as a share of the view's height
 _MIN_LINE_PT = 0.9  # of a legend
 _MIN_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def draw_parts(axes: Any, body: Body) -> None:
-    """Draw the sensors that have a place on the body, and its LEDs, into axes whose limits are set."""
+    """Draw the sensors that have a place on the body, and its LEDs; the limits of the axes are set before."""
     for sheet in body.sensors.values():
         match sheet:
             case ProximitySpec():

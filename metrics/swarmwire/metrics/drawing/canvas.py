@@ -23,7 +23,7 @@ _BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands 
 def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     """An empty figure whose longer side has this many pixels; both sides are even, as films need them.
 
-    BadInput without matplotlib, or for a size that nobody could look at.
+    BadInput without matplotlib, or for a size out of bounds.
     """
     REPORT.need("pictures")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -32,7 +32,7 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     if not MIN_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
         raise BadInput("--size", "", f"expected {MIN_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
     dpi = size_px / max(width_in, height_in, LONG_SIDE_IN)
-    # A hundredth more, since the canvas cuts off what is after the point.
+    # A hundredth more, since the canvas rounds down.
     even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]
     figure = Figure(figsize=(even[0], even[1]), dpi=dpi, facecolor=PAPER)
     FigureCanvasAgg(figure)
@@ -40,14 +40,14 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
 
 
 def pixels(figure: Any) -> ByteArray:
-    """What the canvas shows, (height, width, 3); a view that the next drawing overwrites."""
+    """The pixels of the canvas, (height, width, 3); a view that the next drawing overwrites."""
     import numpy as np
 
     return np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
 
 
 def check_picture(to: Path) -> None:
-    """Return if a picture may be written there, of the kind that the file's name says; else BadInput."""
+    """Return if a picture of the suffix's kind can be written there; else BadInput."""
     check_output_path(to, (".png", ".svg", ".pdf"))
 
 
@@ -85,14 +85,14 @@ class Layout:
         return 1.0 - _EDGE_IN / self.width_in
 
     def below_top(self, inches: float) -> float:
-        """The height, as a share, of what is so far below the upper edge."""
+        """The height, as a share, at this distance below the upper edge."""
         return 1.0 - inches / self.height_in
 
 
 def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> Layout:
-    """The layout for an arena of this size, with so much room for its axes left and below.
+    """The layout for an arena of this size, with room for its axes left and below.
 
-    `panel_in` is the height of the panel where it has to go below the arena; 0: there is none.
+    `panel_in` is the height of a panel below the arena; 0: no panel.
     """
     pad_m = 2.0 * PAD * max(size_m)
     across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
@@ -122,7 +122,7 @@ def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes
 
 
 def add_arena_axes(figure: Any, layout: Layout, size_m: tuple[float, float]) -> Any:
-    """Axes in m of the arena, to scale, without any line of their own."""
+    """Axes in m of the arena, to scale, without lines."""
     axes = figure.add_axes(layout.arena)
     pad_m = PAD * max(size_m)
     half_x, half_y = size_m[0] / 2 + pad_m, size_m[1] / 2 + pad_m

@@ -23,16 +23,16 @@ _SPEEDS = (1, 2, 4, 5, 8, 10)  # times a power of ten
 
 
 class Recorded(Protocol):
-    """What a film needs of a run folder."""
+    """The part of a run folder that a film reads."""
 
     @property
     def static(self) -> Static:
-        """What did not change."""
+        """The constants of the run."""
         ...
 
     @property
     def measured(self) -> Mapping[str, MetricInfo]:
-        """What each metric says of itself, by name."""
+        """Unit, kind and bounds of each metric, by name."""
         ...
 
     def ticks(self, arena: int | None = None) -> "pl.DataFrame":
@@ -52,7 +52,7 @@ class Film:
     metrics: dict[str, FloatArray]  # (T,) each, NaN where undefined
     state: IntArray | None = None  # (T, n) places in `state_names`, NO_STATE for none; None if no robot has any
     state_names: tuple[str, ...] = ()
-    # By name, of what the run measured.
+    # of the run's metrics, by name
     facts: Mapping[str, MetricInfo] = field(default_factory=dict[str, MetricInfo])
     movable: AnyArray | None = None  # (T, k, 3) where movable obstacles were; None: there are none
 
@@ -95,7 +95,7 @@ def _stacked(frame: "pl.DataFrame", names: tuple[str, ...]) -> AnyArray:
 
 
 def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
-    """The names of the states that robots noted, in order of their first tick, and who was in which.
+    """The names of the states that robots noted, in order of their first tick, and each robot's state.
 
     Null and the empty text are no state. Second: (T, n) places in the names or NO_STATE, or None if no robot ever noted
     a state.
@@ -183,5 +183,5 @@ def _speed(duration_s: float, frames_per_s: float) -> float:
 
 
 def _frames(duration_s: float, step_s: float) -> int:
-    """How many there are, the first and what fits after it."""
+    """The number of frames: the first, and those that fit after it."""
     return int(duration_s / step_s + 1e-6) + 1

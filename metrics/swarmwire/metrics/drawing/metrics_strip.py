@@ -24,7 +24,7 @@ _HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
 
 
 def told_of(name: str, facts: Facts) -> MetricInfo:
-    """What is known of a metric: nothing but its name, at the least."""
+    """Unit, kind and bounds of a metric, from the run or the registry; of an unknown one its name alone."""
     if name in facts:
         return facts[name]
     if name in METRICS:
@@ -56,7 +56,7 @@ def titled(name: str, facts: Facts = UNKNOWN) -> str:
 
 
 def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> list[str]:
-    """The metrics to plot: those wanted, or the first few of the usual ones that have any value.
+    """The metrics to plot: the selected ones, or the first few of the default ones that have a value.
 
     BadInput for a metric that was not recorded, or for too many.
     """
@@ -74,7 +74,7 @@ class MetricStrip:
     """The plots, in the panel of a layout: on top of one another beside the arena, side by side below it."""
 
     def __init__(self, figure: Any, layout: Layout, film: Film, names: Sequence[str]) -> None:
-        """Draw what does not move."""
+        """Draw the fixed parts."""
         every = max(1, len(film.time_s) // _MAX_POINTS)
         self._plots = [
             _Plot(figure.add_axes(place), name, film, every, last)

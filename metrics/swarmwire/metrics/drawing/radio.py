@@ -41,13 +41,13 @@ _MAP_IN = 2.55  # longer side of the arena
 _MAP_TOP_IN = 0.64  # below the upper edge
 _COLORS, _OF_DISK = "viridis", 0.55
 _SCALE_TICKS = 5
-_STRENGTH_ABOVE = 0.6  # opacity of the map, so that it does not shout down what stands on it
+_STRENGTH_ABOVE = 0.6  # opacity of the map, so that obstacles stay visible
 _TITLE: Look = {"loc": "left", "fontsize": TEXT_PT, "color": SOFT, "pad": 4}
 _LEGEND: Look = {"fontsize": SMALL_PT, "frameon": False, "labelcolor": SOFT, "loc": "best"}
 
 
 def received_bins(table: "pl.DataFrame") -> "pl.DataFrame":
-    """The bins of `radio_distances` up to somewhat beyond the last in which anybody received."""
+    """The bins of `radio_distances` up to 1.5 times the distance of the last reception."""
     import polars as pl
 
     received = table.filter(pl.col("received") > 0)["to_m"]
@@ -135,7 +135,7 @@ def draw_coverage(
 
 
 def _draw_map(figure: Any, static: Static, found: CoverageMap, sensitivity_dbm: float | None) -> None:
-    """Strength above the sensitivity, or what a disk reaches; what is out of range stays bare."""
+    """Strength above the sensitivity, or the area of a unit disk; places out of range stay bare."""
     across_m, up_m = static.arena_size_m
     per_m = _MAP_IN / max(across_m, up_m)
     width, height = across_m * per_m / LONG_SIDE_IN, up_m * per_m / _COVERAGE_HEIGHT_IN

@@ -105,7 +105,7 @@ def draw_bursts(axes: Any, sequences: LossSequences, losses: LossFit | str) -> N
     at = np.arange(1, longest + 1)
     axes.plot(at, np.where(counts > 0, counts, np.nan), "o", ms=3, color=SOFT, label="found")
     single, bursts = losses.loss.value, losses.chosen.bursts
-    # Runs of single losses are geometric: what lies above their line is bursts.
+    # Runs of single losses are geometric: counts above their line are bursts.
     axes.plot(at, len(lengths) * (1.0 - single) * single ** (at - 1.0), color=FAINT, lw=1.2, label="single losses")
     if bursts is not None:
         expected = len(lengths) * expected_runs(bursts, sequences.interval_s, longest)

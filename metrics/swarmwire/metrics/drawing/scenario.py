@@ -87,7 +87,7 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
 
 
 def _counted(obstacles: Sequence[Obstacle]) -> list[str]:
-    """How many there are of each shape, those that can be pushed apart."""
+    """The number of obstacles of each shape, movable ones apart."""
     kinds = Counter((obstacle.shape, obstacle.movable) for obstacle in obstacles)
     plural = {"cylinder": "cylinders", "box": "boxes", "polygon": "polygons"}
     return [

@@ -36,11 +36,11 @@ from swarmwire.metrics.palette import Color, robot_color
 DARKEST = 0.45  # of the page's white: how a shade of 0 is shown
 _BAR_BELOW_IN = 0.1
 _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
-_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # widths, roughly: of a letter of a legend, and of what stands before a text
+_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # approximate widths: of a letter of a legend, and of the symbol before a text
 
 
 def draw_floor(axes: Any, floor: Floor, static: Static, outline: Any) -> None:
-    """Colour `outline`, the artist that is the floor, and draw what is painted on it, within it alone."""
+    """Colour `outline`, the artist of the floor, and draw image and patches clipped to it."""
     from matplotlib.patches import Circle, Polygon
 
     outline.set_facecolor(str(shown(floor.shade)))
@@ -147,7 +147,7 @@ def _draw_light(axes: Any, x_m: float, y_m: float, side_m: float) -> None:
 
 
 def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> list[Any]:
-    """An entry per group, with the count and if wanted the name of its robots; not filled: its rim alone."""
+    """An entry per group, with its count and, for `bodies`, the name of its body; not `filled`: an outline."""
     return [
         _disc(_named(g, bodies), robot_color(i) if filled else None, robot_color(i))
         for i, g in enumerate(static.groups)
@@ -155,7 +155,7 @@ def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> 
 
 
 def state_entries(names: tuple[str, ...], others: bool) -> list[Any]:
-    """An entry per state, which has the colour of its place, and one for robots in none of them if there are such."""
+    """An entry per state in the colour of its index, and one for robots in other states if `others`."""
     entries = [_disc(name, color, color) for name, color in zip(names, STATE_COLORS, strict=False)]
     return [*entries, _disc("other", OTHER_STATE, OTHER_STATE)] if others else entries
 
@@ -188,7 +188,7 @@ def movable_entry() -> Any:
 
 
 def columns_in(entries: list[Any], width_in: float) -> int:
-    """How many columns of entries, which fill one column after the other, stand side by side in this width."""
+    """The number of columns that fit in this width; entries fill one column after the other."""
     letters = [len(entry.get_label()) for entry in entries]
     for columns in range(len(letters), 1, -1):
         full, rest = divmod(len(letters), columns)

@@ -5,7 +5,7 @@ from typing import Any
 
 from swarmwire.metrics.palette import Color
 
-Look = dict[str, Any]  # arguments of matplotlib that say how a thing looks
+Look = dict[str, Any]  # matplotlib's keyword arguments for colours, widths and the like
 
 LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels only scale them
 TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5
@@ -19,7 +19,7 @@ LINK = "#7d8aa5"
 MOVABLE_DASHES = (0, (2.5, 1.5))
 DEAD: Color = (176, 180, 188)
 CURVE = "#2f6fae"
-ACCENT = "#c2502e"  # what is to be seen first: told from the curves' blue by those who see no red or no green, too
+ACCENT = "#c2502e"  # highlights; distinct from the curves' blue also for colour-blind readers
 STATE_COLORS: tuple[Color, ...] = (
     (76, 120, 168),
     (245, 133, 24),

@@ -80,7 +80,7 @@ def _touches_polygon(corners: FloatArray, start: FloatArray, end: FloatArray) ->
 
 
 class Discs:
-    """The discs of some of a swarm's rows, the first at the bottom, with lines that tell where they head."""
+    """The discs of some of a swarm's rows, the first at the bottom, with a line for each heading."""
 
     def __init__(self, axes: Any, rows: IntArray, radius_m: FloatArray, flying: bool, thin: float) -> None:
         """Add the collections, empty, to axes in m; `radius_m` (rows,) and widths of lines `thin` times as wide.
@@ -110,7 +110,7 @@ class Discs:
         return *self._shadows, self._headings, self._discs
 
     def show(self, position_m: FloatArray, heading_rad: FloatArray) -> None:
-        """Put them where their rows of the whole swarm's (n, 2) and (n,) say."""
+        """Move them to their rows of the swarm's positions (n, 2) and headings (n,)."""
         position, heading = position_m[self._rows], heading_rad[self._rows]
         radius_m = self._radius_m[:, None]
         for shadow in self._shadows:
@@ -168,7 +168,7 @@ class Swarm:
 
     @property
     def enlargement(self) -> str:
-        """What to tell people of it; nothing if robots are drawn to scale."""
+        """A note on the enlargement; empty if robots are drawn to scale."""
         return f"robots drawn {self.enlarged:.1f} x as large" if self.enlarged > 1.05 else ""
 
     def show(
@@ -235,5 +235,5 @@ def _least_radius_m(static: Static) -> float:
 
 
 def _link_opacity(links: int) -> float:
-    """Fainter the more there are, so that they do not cover what they join."""
+    """Opacity of the links: fainter the more there are, so that robots stay visible."""
     return float(np.clip(3.5 / np.sqrt(max(links, 1)), 0.18, 0.55))

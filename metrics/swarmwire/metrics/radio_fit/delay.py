@@ -15,7 +15,7 @@ from swarmwire.metrics.statistics.difference import kolmogorov_smirnov
 
 TAIL = 0.05  # the quantiles: this, the median, and 1 - this
 EVEN = 1000  # quantiles of a fitted delay that packets are held against
-FOLDS = 10  # parts of the packets by which errors are told
+FOLDS = 10  # parts of the packets, for standard errors
 MIN_SHAPE, MAX_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
 SYMMETRIC = 3.0  # deviations that a normal delay's mean is above 0 at least: nothing is cut off
 _Z = float(ndtri(1.0 - TAIL))
@@ -34,7 +34,7 @@ class DelayFit:
 
     distribution: str  # as [radio.delays] calls it
     latency_s: Estimate
-    mean_s: Estimate  # of what varies
+    mean_s: Estimate  # of the varying part
     deviation_s: Estimate
     quantiles_s: FloatArray  # (EVEN,) of the whole delay
     apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
@@ -49,7 +49,7 @@ class _Law:
 
 
 def fit_delays(latency_s: FloatArray) -> DelayFit | None:
-    """The nearest of the distributions to the latencies of packets (n,), all known; None where none can be theirs.
+    """The distribution nearest to the latencies of packets (n,), all finite; None if none fits.
 
     Standard errors are by tenths of the packets; NaN where these are too few for a fit.
     """
@@ -84,7 +84,7 @@ def fit_delays(latency_s: FloatArray) -> DelayFit | None:
 def _fitted(fit: Callable[[float, float, float], _Law | None], latency_s: FloatArray) -> _Law | None:
     low, middle, high = np.quantile(latency_s, (TAIL, 0.5, 1.0 - TAIL)).tolist()
     law = fit(low, middle, high) if 0.0 < low < middle < high else None
-    # No packets deviate by more than the latest of them: a law that says so is of others.
+    # A sample cannot deviate by more than its largest value.
     return law if law is not None and law.deviation_s <= latency_s.max() else None
 
 
@@ -111,7 +111,7 @@ def _lognormal(low: float, middle: float, high: float) -> _Law | None:
 
 
 def _pareto(low: float, middle: float, high: float) -> _Law | None:
-    """The ratio of the quantiles' distances tells the shape; with a constant below 0, the ratio of two quantiles."""
+    """The shape follows from the ratio of the quantiles' distances; with a constant below 0, of two quantiles."""
 
     def widths(shape: float) -> tuple[float, float]:
         of_low, of_middle, of_high = ((1.0 - share) ** (-1.0 / shape) for share in (TAIL, 0.5, 1.0 - TAIL))
@@ -152,10 +152,10 @@ class LatencyFit:
 
 
 def fit_latency(latency_s: FloatArray) -> LatencyFit | str:
-    """The fit to latencies of packets (n,), of which NaN are not known; or what they lack.
+    """The fit to latencies of packets (n,), NaN: unknown; or a sentence on missing data.
 
     Of a delay uniform from a to a + j the quantiles q and 1 - q are j (1 - 2 q) apart, and the lower one is a + q j. A
-    twentieth of the packets at either end has no say. A negative constant, which no scenario takes, is 0.
+    twentieth of the packets at either end is ignored. A negative constant, which no scenario takes, is 0.
     """
     known = latency_s[np.isfinite(latency_s)]
     if len(known) < MIN_PACKETS:

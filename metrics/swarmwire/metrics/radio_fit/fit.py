@@ -15,19 +15,19 @@ BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter from whic
 MIN_PACKETS = 100
 MIN_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
 STRAY = 0.01  # share of the packets beyond the range that may arrive nevertheless
-NEIGHBOURS = 0.1  # delivered both ways at least: an edge of the emulator's radio graph, unless told
+NEIGHBOURS = 0.1  # delivered both ways at least: neighbours, as edges of the emulator's radio graph
 
 
 @dataclass(frozen=True)
 class RadioFit:
-    """What a log says of a radio. A fit that the log is too small for is the sentence that says what it lacks."""
+    """The fit of a radio to a log. A part without enough data is a sentence on the missing data."""
 
     log: RadioLog
     path_loss: PathLossFit | str
     shadowing: ShadowingFit | str
     losses: LossFit | str
     sequences: LossSequences
-    notes: tuple[str, ...]  # what may be biased
+    notes: tuple[str, ...]  # possible biases
 
     @property
     def distance_m(self) -> FloatArray:
@@ -48,13 +48,13 @@ class RadioFit:
 
 
 def fit_radio(log: RadioLog) -> RadioFit:
-    """Fit what can be fitted; never raises for too little data."""
+    """Fit each part that has enough data; never raises for too little data."""
     sequences = loss_sequences(log)
     distance_m, rssi_dbm = log.distance_m[log.received], log.rssi_dbm[log.received]
     path_loss = _path_loss(log, distance_m, rssi_dbm)
     shadowing = _shadowing(log, path_loss)
     if isinstance(path_loss, PathLossFit) and isinstance(shadowing, ShadowingFit):
-        # The fitted field knows better than clusters of packets how much the log tells of the line.
+        # Standard errors of the line by the fitted field are better than those by clusters of packets.
         at_1_m, exponent = shadowing.line_errors
         path_loss = PathLossFit(
             Estimate(path_loss.exponent.value, exponent), Estimate(path_loss.rssi_at_1_m_dbm.value, at_1_m)
@@ -120,7 +120,7 @@ def _lost_far_out(log: RadioLog) -> float:
 
 @dataclass(frozen=True)
 class RangeFit:
-    """What distances tell."""
+    """The range fitted to deliveries over distance."""
 
     range_m: Estimate
     reached: bool  # whether packets were sent from farther; else the range is at least this
@@ -128,9 +128,9 @@ class RangeFit:
 
 
 def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
-    """The step of delivery over distance (n,), of which NaN are not known; or what it lacks.
+    """The step of delivery over distance (n,), NaN: unknown; or a sentence on missing data.
 
-    The range is where two shares, one within it and one of at most a hundredth beyond, tell the losses best: maximum
+    The range is where two shares, one within it and one of at most a hundredth beyond, explain the losses best: maximum
     likelihood. Its error is the usual distance from one packet received out there to the next.
     """
     known = np.isfinite(distance_m)
@@ -153,7 +153,7 @@ def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
 
 
 def _log_likelihood(successes: FloatArray, count: FloatArray) -> FloatArray:
-    """Of so many successes at the share that tells them best."""
+    """Of these successes at their most likely share."""
     share = successes / np.maximum(count, 1)
     return _entropy(successes, share) + _entropy(count - successes, 1.0 - share)
 
@@ -185,7 +185,7 @@ class LinkDelivery:
 
 @dataclass(frozen=True)
 class NetworkFit:
-    """What a log says of a network. A fit that the log is too small for is the sentence that says what it lacks."""
+    """The fit of a network to a log. A part without enough data is a sentence on the missing data."""
 
     log: NetworkLog
     range: RangeFit | str
@@ -197,9 +197,9 @@ class NetworkFit:
 
     @property
     def neighbours(self) -> dict[str, tuple[str, ...]]:
-        """By robot: with whom it exchanged packets, a tenth of them each way at least.
+        """By robot: the robots with which it exchanged packets, a tenth of them each way at least.
 
-        Of robots whose logs are not there nothing tells what they received: the way that is known counts alone.
+        Without the log of a robot its receptions are unknown, and only the other direction counts.
         """
         pdr = {(link.sender, link.receiver): link.pdr for link in self.links}
 
@@ -212,7 +212,7 @@ class NetworkFit:
 
 
 def fit_network(log: NetworkLog) -> NetworkFit:
-    """Fit what can be fitted; never raises for too little data."""
+    """Fit each part that has enough data; never raises for too little data."""
     found = fit_range(log.distance_m, log.lost)
     sequences = log.sequences(_within(log, found))
     latency = fit_latency(log.packets.latency_s)

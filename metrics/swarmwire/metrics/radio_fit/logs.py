@@ -55,14 +55,14 @@ class RadioLog:
 
     @cached_property
     def last_distance_m(self) -> FloatArray:
-        """Distances (n,), where a lost packet's is unknown the last known of its link; NaN before any."""
+        """Distances (n,), with unknown ones replaced by the last known of the link; NaN before any."""
         row = np.arange(len(self.link))
         known: IntArray = np.maximum.accumulate(np.where(np.isfinite(self.distance_m), row, -1))
         here = (known >= 0) & (self.link[known] == self.link)
         return np.where(here, self.distance_m[known], np.nan)
 
     def within(self, distance_m: float) -> "RadioLog":
-        """The rows at most so far apart; where a link comes back after a while beyond, it counts as another link."""
+        """The rows at most this far apart; where a link comes back after a while beyond, it counts as another link."""
         near = self.last_distance_m <= distance_m
         far_since_start = np.cumsum(~near)
         # A link's rows with no far row between them stay together.
@@ -193,7 +193,7 @@ class NetworkLog:
         return bool(np.isfinite(self.distance_m).any())
 
     def within(self, distance_m: float) -> "NetworkLog":
-        """The packets that were sent at most so far."""
+        """The packets sent over at most this distance."""
         near = self.distance_m <= distance_m
         return replace(self, packets=self.packets.rows(near), distance_m=self.distance_m[near])
 
@@ -209,7 +209,7 @@ class NetworkLog:
 
 
 def is_network_table(path: Path) -> bool:
-    """Whether a file is a CSV of what was received that tells no strengths; files that cannot be read are none."""
+    """Whether a file is a CSV of received packets without strengths; False if it cannot be read."""
     if path.suffix.lower() != ".csv":
         return False
     try:
@@ -223,7 +223,7 @@ def is_network_table(path: Path) -> bool:
 def network_log_of_table(path: Path) -> NetworkLog:
     """A table of what robots received; packets before a link's first and after its last leave no trace.
 
-    Columns: t_s, tx, rx, seq; if they are there to, latency_s, distance_m. BadInput for what cannot be.
+    Columns: t_s, tx, rx, seq; optional: to, latency_s, distance_m. BadInput for invalid values.
     """
     table = LogTable(path, NETWORK_COLUMNS)
     notes = ("half a line at the end was dropped",) if table.half_line else ()
@@ -235,7 +235,7 @@ def network_log_of_table(path: Path) -> NetworkLog:
 
 
 def network_log_of_robots(logs: RealLogs) -> NetworkLog:
-    """All robots' received.csv and sent.csv, by one clock; also links from robots whose own log is not there."""
+    """All robots' received.csv and sent.csv, by one clock; also links from robots without a log."""
     logs = in_step(logs)
     by_name: dict[str, RobotLog] = dict(zip(logs.names, logs.robots, strict=True))
     robots = [by_name.get(name) for name in logs.robots[0].about.robots]

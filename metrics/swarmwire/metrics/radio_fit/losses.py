@@ -45,7 +45,7 @@ class LossSequences:
         return np.bincount(run)[1:] if len(run) else np.zeros(0, np.int64)
 
     def thinned(self, most: int) -> "LossSequences":
-        """So many packets or less: stretches of a thousand, evenly chosen, each of which starts without a past."""
+        """At most this many packets: stretches of a thousand, evenly chosen, each of which starts without a past."""
         every = -(-len(self.lost) // most)
         if every <= 1:
             return self
@@ -73,7 +73,7 @@ def log_likelihood(sequences: LossSequences, bursts: Bursts) -> float:
 
 
 def _steps(sequences: LossSequences, bursts: Bursts) -> list[FloatArray]:
-    """Each packet's matrix. A link's first packet comes from the long run, whatever was before."""
+    """Each packet's matrix. A link's first packet comes from the long run, independent of the packets before."""
     share = bursts.bad_share
     kept = np.exp(-sequences.since_s * (1.0 / bursts.bad_s + 1.0 / bursts.good_s))  # 0 for inf
     bad_from_good, bad_from_bad = share * (1.0 - kept), share + (1.0 - share) * kept
@@ -113,7 +113,8 @@ def expected_runs(bursts: Bursts, interval_s: float, longest: int) -> FloatArray
 def runs_z(sequences: LossSequences) -> float:
     """Standard normal if the losses of each link come in any order; negative where they come in bursts.
 
-    Given how many packets of a link were lost, so that links may differ in that. NaN if none can tell.
+    Given how many packets of a link were lost, so that links may differ in that. NaN if no link
+    has both losses and receptions.
     """
     links = int(sequences.link.max()) + 1
     packets = np.bincount(sequences.link, minlength=links).astype(np.float64)
@@ -130,7 +131,7 @@ def runs_z(sequences: LossSequences) -> float:
 
 @dataclass(frozen=True)
 class LossModel:
-    """One way to tell the losses."""
+    """A model of the losses."""
 
     name: str
     free: int  # parameters that were fitted
@@ -146,7 +147,7 @@ class LossModel:
 
 @dataclass(frozen=True)
 class LossFit:
-    """All models, and the one that the data speak for."""
+    """All models, and the one that fits best."""
 
     loss: Estimate  # probability that a packet is lost, if losses are single
     models: tuple[LossModel, ...]
@@ -155,7 +156,7 @@ class LossFit:
 
 
 def fit_losses(sequences: LossSequences) -> LossFit | str:
-    """The fits, or what they lack."""
+    """The fits, or a sentence on missing data."""
     packets, lost = len(sequences.lost), int(sequences.lost.sum())
     if packets < MIN_PACKETS:
         return f"needs {MIN_PACKETS} packets, got {packets}"

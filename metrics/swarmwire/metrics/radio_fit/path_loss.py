@@ -17,16 +17,16 @@ MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
 
 
 class Estimate(NamedTuple):
-    """A value and its standard error, in the unit that its name tells."""
+    """A value and its standard error, in the unit of its name."""
 
     value: float
-    standard_error: float  # NaN: the data do not tell
+    standard_error: float  # NaN: unknown
 
 
 def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: float) -> FloatArray:
     """Standard errors (n,) of parameters where `cost`, the negative log likelihood, is least; by differences of `step`.
 
-    NaN where the cost does not rise around the place: the data do not tell.
+    NaN where the cost does not rise around the place.
     """
     count = len(at)
     move = np.eye(count) * step
@@ -59,7 +59,7 @@ def design(distance_m: FloatArray) -> FloatArray:
 
 
 def why_not(distance_m: FloatArray) -> str | None:
-    """What received packets at these distances lack for a fit; None if nothing."""
+    """A sentence on the data that a fit lacks; None if these distances suffice."""
     if len(distance_m) < MIN_PACKETS:
         return f"needs {MIN_PACKETS} received packets, got {len(distance_m)}"
     span = float(distance_m.max() / distance_m.min())
@@ -69,8 +69,8 @@ def why_not(distance_m: FloatArray) -> str | None:
 
 
 def why_none(fit: PathLossFit) -> str | None:
-    """What is wrong with a line that no medium has; None if nothing."""
-    exponent = round(fit.exponent.value, 3) + 0.0  # what arithmetic leaves of none is none, and none is not -0
+    """A sentence on an exponent that no medium has; None if the fit is plausible."""
+    exponent = round(fit.exponent.value, 3) + 0.0  # rounded to 0 rather than -0 or 1e-17
     if MIN_EXPONENT <= exponent <= MAX_EXPONENT:
         return None
     way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < MIN_EXPONENT else "falls too fast"
@@ -81,7 +81,7 @@ def why_none(fit: PathLossFit) -> str | None:
 def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArray) -> PathLossFit:
     """Ordinary least squares over received packets (n,).
 
-    Packets of a cluster (n,), such as the two directions between two robots, share what stands around them. Standard
+    Packets of a cluster (n,), such as the two directions between two robots, share their surroundings. Standard
     errors allow for it (the sandwich of Liang and Zeger, Biometrika 73, 1986) where there are enough clusters.
     """
     x = design(distance_m)

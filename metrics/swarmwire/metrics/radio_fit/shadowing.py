@@ -29,7 +29,7 @@ FARTHEST = 5.0  # correlation distances
 
 @dataclass(frozen=True)
 class Places:
-    """Mean values of the packets of each place, and how many there were."""
+    """Mean values and number of the packets of each place."""
 
     ends_m: FloatArray  # (n, 4) x and y of sender and receiver
     rssi_dbm: FloatArray  # (n,)
@@ -87,8 +87,8 @@ class FieldFits(NamedTuple):
     deviation_db: FloatArray  # (b,) sigma
     correlation_m: FloatArray  # (b,) delta
     noise_db: FloatArray  # (b,)
-    gain: FloatArray  # (b,) what the field explains beyond noise, as a share of all squares
-    inside: FloatArray  # (b,) 1 where delta lies within what was tried, 0 at its ends
+    gain: FloatArray  # (b,) share of the squares that the field explains beyond noise
+    inside: FloatArray  # (b,) 1 where delta lies within the tried values, 0 at their ends
 
 
 class FieldMoments:
@@ -106,7 +106,7 @@ class FieldMoments:
         self._of_noise = self._seen(np.diag(1.0 / places.packets))
 
     def residuals(self, rssi_db: FloatArray) -> FloatArray:
-        """What a line of path loss leaves of means of places (n, b), made white."""
+        """Whitened residuals of a line of path loss, of means of places (n, b)."""
         return self._project @ rssi_db
 
     def fit(self, residuals: FloatArray) -> FieldFits:
@@ -164,7 +164,7 @@ def _peak(height: FloatArray, best: IntArray) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True)
 class ShadowingFit:
-    """The field's sigma and delta, the noise beside it, and what they mean for the line of path loss."""
+    """The field's sigma and delta, the noise beside it, and the standard errors of the line of path loss."""
 
     deviation_db: Estimate  # sigma
     correlation_m: Estimate  # delta
@@ -173,7 +173,7 @@ class ShadowingFit:
 
 
 def fit_shadowing(places: Places) -> ShadowingFit | str:
-    """The fit, or what it lacks."""
+    """The fit, or a sentence on missing data."""
     count = len(places.packets)
     if count < MIN_PLACES:
         return f"needs {MIN_PLACES} places of sender and receiver, got {count}"
@@ -202,7 +202,7 @@ def _with_errors(places: Places, moments: FieldMoments, found: FieldFits, noise:
     low, high = np.percentile(np.log(again.correlation_m), (15.87, 84.13))
     return ShadowingFit(
         Estimate(deviation_db, float(again.deviation_db.std())),
-        # A few drawn fields have no clear delta; half of what two thirds of them span is not moved by those.
+        # A few drawn fields have no clear delta; half of the range of two thirds of them is robust.
         Estimate(correlation_m, correlation_m * float(np.sinh(0.5 * (high - low)))),
         Estimate(noise_db, float(again.noise_db.std())),
         (float(lines[0].std()), float(lines[1].std())),
@@ -214,7 +214,7 @@ class Correlogram(NamedTuple):
 
     apart_m: FloatArray  # (bins,) mean distance between corresponding ends of two links
     found_db2: FloatArray  # (bins,) mean product of two residuals
-    fitted_db2: FloatArray  # (bins,) what the fitted field has for the same pairs
+    fitted_db2: FloatArray  # (bins,) covariance of the fitted field, for the same pairs
 
 
 def correlogram(places: Places, line: PathLossFit, field: ShadowingFit) -> Correlogram:

@@ -27,7 +27,7 @@ QUICK_BPS = 1_000_000_000  # latencies that were measured hold the time on air, 
 
 
 class Row(NamedTuple):
-    """One line; a parameter that was left out has no value, and says why."""
+    """One line; a parameter that was left out has a reason instead of a value."""
 
     parameter: str
     estimate: Estimate | None
@@ -71,7 +71,7 @@ def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[Row]:
 
 
 def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
-    """What the line of path loss leaves, in words."""
+    """The residuals of the line of path loss, as text."""
     residual_db = fit.residual_db
     if len(residual_db):
         yield "root mean square", f"{float(np.sqrt(np.mean(residual_db**2))):.2f} dB"
@@ -80,9 +80,9 @@ def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
 
 
 def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
-    """`{"radio": {...}}` with what could be fitted, and nothing for the rest.
+    """`{"radio": {...}}` with the parameters that were fitted.
 
-    RSSI tell power, gains and reference loss only in sum: the antenna is the one that the robots are said to have had.
+    RSSI tell power, gains and reference loss only in sum: the antenna is an input.
     """
     radio: dict[str, Any] = {}
     tables: dict[str, Any] = {}
@@ -99,7 +99,7 @@ def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
 
 
 def loss_table(losses: LossFit | str) -> dict[str, Any]:
-    """`loss`, or the table `bursts`, by what the data speak for; nothing where losses could not be fitted."""
+    """`loss`, or the table `bursts`, by the model that fits best; empty without a fit."""
     if isinstance(losses, str):
         return {}
     bursts = losses.chosen.bursts
@@ -136,7 +136,7 @@ def network_rows(fit: NetworkFit) -> Iterator[Row]:
 
 
 def network_table(fit: NetworkFit) -> dict[str, Any]:
-    """`{"radio": {...}}` with what could be fitted; nothing but an empty table if that is neither losses nor delays."""
+    """`{"radio": {...}}` with the parameters that were fitted; an empty table without losses and delays."""
     if isinstance(fit.losses, str) and isinstance(fit.latency, str):
         return {"radio": {}}
     range_m = EVERYWHERE_M if isinstance(fit.range, str) else rounded(fit.range.range_m.value)
@@ -160,7 +160,7 @@ def network_table(fit: NetworkFit) -> dict[str, Any]:
 
 
 def network_comments(fit: NetworkFit) -> list[str]:
-    """What whoever reads the table should know."""
+    """Comments for readers of the table."""
     comments: list[str] = []
     if isinstance(fit.range, str):
         comments.append("No distance is known: everybody is within reach, and loss does not depend on distance.")

@@ -13,7 +13,7 @@ from swarmwire.metrics.text import short, shortened
 HEIGHT_IN, FOOT_IN = 2.25, 0.37
 LETTERS_PT = SMALL_PT + 0.5
 _LEFT_IN, _RIGHT_IN, _HEAD_IN = 0.46, 0.08, 0.3
-_DECADES = 2.0  # between the fifth and the ninety-fifth of a hundred values, from which on
+_DECADES = 2.0  # between the 5th and the 95th percentile, from which on an axis is logarithmic
 _LETTERS = 44  # that fit below a column's figure side by side
 _FEWEST = 5  # groups for which there is room, so that two do not look like barrels
 _LONGEST = 14
@@ -29,7 +29,7 @@ def column_axes(
     foot_in: float = FOOT_IN,
     head_in: float = _HEAD_IN,
 ) -> tuple[Any, Any]:
-    """The figure and its axes; room at the right, below and above as asked."""
+    """The figure and its axes, with the given margins."""
     figure = blank_figure(COLUMN_IN, height_in)
     width, height = COLUMN_IN - _LEFT_IN - right_in, height_in - head_in - foot_in
     place = (_LEFT_IN / COLUMN_IN, foot_in / height_in, width / COLUMN_IN, height / height_in)
@@ -48,7 +48,7 @@ def plain_legend(axes: Any, **where: Any) -> None:
 
 
 def fits_log(values: FloatArray) -> bool:
-    """Whether values (n,) are all above 0 and spread over so much that a linear axis would hide most of them."""
+    """Whether values (n,) are all above 0 and span two decades or more, so that a linear axis would hide most."""
     known = values[np.isfinite(values)]
     if not len(known) or known.min() <= 0.0:
         return False
@@ -70,14 +70,14 @@ def set_log(axis: Any) -> None:
 
 
 def room_below_in(labels: Sequence[str]) -> float:
-    """What `column_axes` should leave below the axes for these labels."""
+    """The margin of `column_axes` below the axes for these labels."""
     if not _turned(labels):
         return FOOT_IN
     return FOOT_IN + 0.035 * min(max(map(len, labels)), _LONGEST)
 
 
 def set_categories(axes: Any, labels: Sequence[str]) -> None:
-    """Label the groups, which stand at 0, 1, 2 and so on."""
+    """Label the groups at 0, 1, 2 and so on."""
     aside = 0.6 + 0.5 * max(0, _FEWEST - len(labels))
     axes.set_xlim(-aside, len(labels) - 1 + aside)
     if not _turned(labels):
@@ -107,7 +107,7 @@ def _is_number(label: str) -> bool:
 
 
 def ordered_colors(count: int) -> list[Any]:
-    """So many colours, from dark to light."""
+    """`count` colours, from dark to light."""
     import matplotlib as mpl
 
     colors = mpl.colormaps["viridis"]

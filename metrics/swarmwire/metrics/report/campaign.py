@@ -79,9 +79,9 @@ class ChosenResponses:
 
 
 def choose_responses(samples: Samples, names: Sequence[str]) -> ChosenResponses:
-    """Those of these names; of none: at most MOST of times, then of last values and the delivery ratio.
+    """The responses of these names; without names at most MOST: times, then final values and the delivery ratio.
 
-    BadInput for a name that there is not.
+    BadInput for an unknown name.
     """
     known = samples.folder.responses
     asked = tuple(dict.fromkeys(find_response(name, known) for name in names))
@@ -100,7 +100,7 @@ def _varies(samples: Samples, response: Response) -> bool:
 
 
 def _rank(response: Response) -> tuple[bool, bool, int]:
-    """Times first, then what the scenario lists, then what is preferred; the others stay in the campaign's order."""
+    """Sort key: times, then the scenario's metrics, then the preferred ones; others keep the campaign's order."""
     place = PREFERRED.index(response.column) if response.column in PREFERRED else len(PREFERRED)
     return response.kind != "time", not response.listed, place
 
@@ -192,7 +192,7 @@ def _other_table(
 
 def _figures(found: Summary, response: Response, rounding: Rounding) -> tuple[str, str, str]:
     """Median, quartiles and the median's interval."""
-    # With digits of its own: rounded as the quartiles are, 2.6 s may read > 3 s, which nobody knows.
+    # With its own digits: rounded like the quartiles, 2.6 s might read > 3 s, which is not known.
     beyond = f"> {number_text(found.limit)}{' ' + response.unit if response.unit else ''}"
     censored = response.kind == "time" and found.n > 0
 
@@ -223,15 +223,15 @@ def _rounding(summaries: Sequence[Summary]) -> Rounding:
 
 
 def methods_section(sections: Collection[str], *, times: bool) -> Section:
-    """The section, about what the report has: the titles of its sections, and whether any response is a time."""
+    """The section, for the titles of the report's sections; `times`: whether any response is a time."""
     there = {*sections, *(["times"] if times else [])}
     return Section("Methods", (*_ALWAYS, *(text for title, text in _OF_SECTIONS.items() if title in there)))
 
 
 def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Report:
-    """What came of a campaign, also of one that is not finished; about these responses, or those that say most.
+    """The report of a campaign, finished or not, on these responses, or by default the most telling ones.
 
-    BadInput for a response that there is not, or a file that is damaged.
+    BadInput for an unknown response, or a damaged file.
     """
     samples = Samples(folder)
     chosen = choose_responses(samples, responses)

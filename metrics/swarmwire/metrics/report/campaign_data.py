@@ -46,7 +46,7 @@ _NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 
 
 def response_title(response: Response) -> str:
-    """What a response is, in words, with its unit: "aggregation time in s"."""
+    """The title of a response, with its unit: "aggregation time in s"."""
     if response.column in _KNOWN:
         return _KNOWN[response.column]
     name, _, ending = response.column.rpartition(".")
@@ -80,7 +80,7 @@ class Rounding:
 
 
 def rounding_of(values: Sequence[float], spreads: Sequence[float] = ()) -> Rounding:
-    """The rounding for these values, whose spreads tell what is worth writing; what is not finite says nothing."""
+    """The rounding for these values, by their spreads; values that are not finite are ignored."""
     known = [abs(value) for value in values if math.isfinite(value) and value]
     if not known:
         return Rounding(0)
@@ -95,18 +95,18 @@ def rounding_of(values: Sequence[float], spreads: Sequence[float] = ()) -> Round
 
 
 def _decimals(value: float, digits: int) -> int:
-    """How many decimals show so many digits of it."""
+    """The number of decimals that shows this many digits of the value."""
     return digits - 1 - math.floor(math.log10(value))
 
 
 def figure_name(*of: str) -> str:
-    """What it shows, joined: `survival-aggregation_time_s-radio.loss`."""
+    """The name of a figure's file: `survival-aggregation_time_s-radio.loss`."""
     return "-".join(_OTHERS.sub("-", part) for part in of)
 
 
 @dataclass(frozen=True)
 class Levels:
-    """A parameter's levels, in ascending order of numbers, else as they were asked for."""
+    """A parameter's levels, in ascending order of numbers, else in the order of the design."""
 
     path: str
     labels: tuple[str, ...]  # (l,)
@@ -172,7 +172,7 @@ class Slice:
 
 
 def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: bool = True) -> list[Slice]:
-    """The design points by what is not shown: numbers of a grid at their middle value, names one by one.
+    """The design points, sliced by the parameters not shown: numbers of a grid at their middle value, names one by one.
 
     Numbers of other designs are taken together, and so are names unless `names_apart` and their combinations are
     MAX_SLICES at most.
@@ -197,7 +197,7 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
 
 
 class Samples:
-    """What the sections of a report ask a campaign for. `points` are numbers of design points."""
+    """The samples of a campaign, for the sections of its report. `points` are indices of design points."""
 
     def __init__(self, folder: CampaignFolder) -> None:
         self.folder = folder
@@ -236,11 +236,11 @@ class Samples:
         return _side_by_side(whether) == 1.0
 
     def summary(self, response: Response, points: tuple[int, ...]) -> Summary:
-        """What these runs come to."""
+        """The summary of these runs."""
         return self._summary(response, points)
 
     def quartiles(self, response: Response, points: tuple[int, ...]) -> tuple[float, float, float]:
-        """A quarter, half and three quarters of the runs; inf: beyond the limit, NaN: there is no value."""
+        """A quarter, half and three quarters of the runs; inf: beyond the limit, NaN: no value."""
         sample = self.sample(response, points)
         if not len(sample):
             return (np.nan, np.nan, np.nan)

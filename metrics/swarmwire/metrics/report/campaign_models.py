@@ -38,13 +38,13 @@ from swarmwire.metrics.text import listed, number, sentence
 
 MAX_CURVES = 6
 _MAX_PARAMETERS = 2
-_LOSSES = ("share", "loss")  # last words of parameters that say how much is lost
+_LOSSES = ("share", "loss")  # last words of parameters of loss
 _GRID = 60
 _COUNT = re.compile(r"robots\.[^.]+\.count")
 
 
 def survival_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
-    """The section; None if there is no time."""
+    """The section; None without a response that is a time."""
     levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MAX_PARAMETERS]]
     levels = [each for each in levels if len(each) > 1] or [None]
     figures = [_survival_figure(samples, response, each) for response in times for each in levels]
@@ -89,7 +89,7 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
     growing: list[str] = []
     for levels in filter(_is_loss, (levels_of(path, samples.folder.points) for path in samples.folder.parameters)):
         for response in responses:
-            left = _what_is_left(samples, response, levels)
+            left = _relative(samples, response, levels)
             if left is None:
                 continue
             fits = degradation(_numbers(levels), left)
@@ -124,8 +124,8 @@ def _numbers(levels: Levels) -> FloatArray:
     return levels.number
 
 
-def _what_is_left(samples: Samples, response: Response, levels: Levels) -> FloatArray | None:
-    """Values (levels, runs) relative to nothing lost; None if there is nothing to compare with."""
+def _relative(samples: Samples, response: Response, levels: Levels) -> FloatArray | None:
+    """Values (levels, runs) relative to the least loss; None without a reference."""
     cells = [tuple(levels.points(level)) for level in range(len(levels))]
     table = samples.table(response, cells)
     if response.kind == "time":

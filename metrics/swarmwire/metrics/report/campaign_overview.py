@@ -40,7 +40,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
 
 
 def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
-    """How it was run, how to run one of its runs again, and what is missing."""
+    """The commands that start the campaign, repeat one of its runs, and resume it."""
     name, runs = shlex.quote(str(folder.path)), folder.about.runs
     example = failed[0] if failed else runs // 2
     parts: list[str | Listing] = [
@@ -57,7 +57,7 @@ def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
 
 
 def _moment(utc: str) -> str:
-    """ISO 8601 in its short form, as people read it; any other text as it is."""
+    """A time in the short form of ISO 8601, readable; any other text unchanged."""
     found = re.fullmatch(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)\d\dZ", utc)
     return "{}-{}-{} {}:{} UTC".format(*found.groups()) if found else utc
 

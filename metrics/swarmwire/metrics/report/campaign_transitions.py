@@ -79,7 +79,7 @@ def _curve(samples: Samples, response: Response, x: Levels, rows: list[_Row]) ->
 
 
 def _by(samples: Samples, x: Levels, slices: list[Slice]) -> str:
-    """What tells several curves apart."""
+    """The end of a caption of several curves: the parameters by which they differ."""
     beside = [f"`{path}`" for path in samples.folder.parameters if path != x.path]
     return f" by {listed(beside)}; broken upright lines are change points" if len(slices) > 1 else ""
 
@@ -124,7 +124,7 @@ def _change(samples: Samples, response: Response, x: Levels, cells: Sequence[tup
 
 
 def _jump(change: ChangePoint, x: Levels, shown_at: FloatArray) -> Jump:
-    """The place on an axis on which the levels stand at the places given."""
+    """The change point on an axis with the levels at these places."""
     assert x.number is not None
     numbers = x.number
     low, high = change.place_interval
@@ -168,7 +168,7 @@ def _words(response: Response, x: Levels, where: str, change: ChangePoint | None
 
 
 def _table(rows: list[_Row]) -> Table:
-    """The change points in words; what is the same in all rows stands in the caption or nowhere."""
+    """The table of change points, without columns that are equal in all rows."""
     columns = (
         "response",
         "along",

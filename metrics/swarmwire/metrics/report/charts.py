@@ -27,7 +27,7 @@ _BOX_HALF_WIDTH = 0.11
 _GRID = 64  # values at which a density is taken
 _GOLDEN = 0.6180339887498949
 _APART = 0.012  # of the axis, between the points of several lines
-_COLORS = "cividis"  # as ordered for those who cannot tell red from green, and in print without colours
+_COLORS = "cividis"  # an ordered scale, also for colour-blind readers and in grey print
 _ROW_IN, _MIN_IN, _MAX_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
 _MAX_WRITTEN = 7  # columns and rows of cells into which values are written
 _BEYOND, _NONE = "#f1e9f5", "#ffffff"
@@ -35,7 +35,7 @@ _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 @dataclass(frozen=True)
 class Group:
-    """The values of one group, (n,), and what they come to."""
+    """The values of one group, (n,), and their quartiles."""
 
     label: str
     values: FloatArray  # those that were observed
@@ -69,7 +69,7 @@ def _runs(group: Group) -> float:
 
 
 def _draw_points(axes: Any, place: int, values: FloatArray) -> None:
-    aside = (np.arange(1, len(values) + 1) * _GOLDEN) % 1.0 - 0.5  # spread evenly, whatever the number
+    aside = (np.arange(1, len(values) + 1) * _GOLDEN) % 1.0 - 0.5  # spread evenly
     axes.plot(place + 1.4 * _HALF_WIDTH * aside, values, ".", ms=3.2, mew=0, color=CURVE, alpha=0.35, zorder=2)
 
 
@@ -182,7 +182,7 @@ def _aside(x: FloatArray, places: float, *, log: bool) -> FloatArray:
 
 
 def _within(edge: FloatArray, limit: float | None) -> FloatArray:
-    """What lies beyond the limit, at the limit."""
+    """The edge, clipped to the limit."""
     return np.where(np.isposinf(edge), np.nan if limit is None else limit, edge)
 
 
@@ -270,7 +270,7 @@ def _mark_beyond(axes: Any, values: FloatArray) -> None:
 
 
 def _draw_jumps(axes: Any, jumps: Sequence[Jump | None], above: float) -> None:
-    """Each in its row, with its interval so much above the row's middle, where it hides no number."""
+    """Each in its row, with its interval above the middle of the row, so that numbers stay readable."""
     outlined: Look = {"zorder": 5, "solid_capstyle": "butt"}
     for row, jump in enumerate(jumps):
         if jump is None:

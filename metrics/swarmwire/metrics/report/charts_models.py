@@ -49,7 +49,7 @@ def resilience_curve(
 
 
 def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: float) -> Any:
-    """The figure of a value (k,) over numbers of robots (k,); `level`: what it would be if robots cost nothing."""
+    """The figure of a value (k,) over numbers of robots (k,); `level`: the value of ideal scaling."""
     figure, axes = column_axes(title, "robots")
     axes.axhline(level, color=SOFT, lw=0.7, ls="--", zorder=1)
     known = np.isfinite(value)
@@ -92,7 +92,7 @@ def survival_curves(curves: Sequence[SurvivalCurve], title: str, x_label: str) -
 
 
 def _steps(curve: SurvivalCurve) -> tuple[FloatArray, FloatArray]:
-    """The corners from 0 to the end, of which no more than can be told apart."""
+    """The corners from 0 to the end, at most _MAX_CORNERS."""
     time_s = np.concatenate(([0.0], curve.time_s, [max(curve.end_s, *curve.time_s, 0.0)]))
     share = np.concatenate(([1.0], curve.share, [curve.share[-1] if len(curve.share) else 1.0]))
     if len(time_s) <= _MAX_CORNERS:

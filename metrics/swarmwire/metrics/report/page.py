@@ -15,7 +15,7 @@ from swarmwire.metrics.drawing.canvas import new_figure
 from swarmwire.metrics.drawing.style import LONG_SIDE_IN
 
 COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
-_DPI_SIZE_PX = 1280  # only what is drawn as pixels within a figure depends on it
+_DPI_SIZE_PX = 1280  # resolution of the parts that are drawn as pixels
 _HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)
 _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 _STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
@@ -33,7 +33,7 @@ _SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing with what it shows."""
+    """A drawing with its caption."""
 
     name: str  # of its file, without .svg: unique within a report
     svg: str  # a whole <svg> element, whose ids are its own
@@ -47,19 +47,19 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str
-    folded: bool = False  # whether the page shows the caption alone until it is asked for the rest
+    folded: bool = False  # whether the page shows only the caption until a reader opens it
 
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines to be read letter by letter: commands, messages of errors."""
+    """Preformatted lines: commands, error messages."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what belongs under it, in order."""
+    """A heading and its content, in order."""
 
     title: str
     parts: tuple[str | Listing | Table | Figure, ...]  # a text is a paragraph; `so` within it is code
@@ -71,7 +71,7 @@ class Report:
 
     title: str
     sections: tuple[Section, ...]
-    about: str = ""  # a line below the title: what it is about, at a glance
+    about: str = ""  # a line below the title
 
     @property
     def figures(self) -> tuple[Figure, ...]:
@@ -87,7 +87,7 @@ def blank_figure(width_in: float, height_in: float) -> Any:
 def as_svg(figure: Any, name: str) -> str:
     """The figure as one <svg> element, whose ids begin with its name (letters, digits, `-`, `_`, `.`).
 
-    Letters are drawn as paths, so that it looks the same in any browser, text processor and print.
+    Letters are drawn as paths, so that the figure looks the same in any browser, text processor and print.
     """
     import matplotlib as mpl
 
@@ -131,7 +131,7 @@ def page(report: Report) -> str:
 
 
 def _blocks(section: Section) -> Iterator[dict[str, Any]]:
-    """The parts as the template takes them; figures that follow one another stand together."""
+    """The parts in the form of the template; consecutive figures are one block."""
     for kind, parts in groupby(section.parts, type):
         if kind is Figure:
             yield {"kind": "figures", "figures": [_figure(part) for part in parts if isinstance(part, Figure)]}
@@ -146,7 +146,7 @@ def _blocks(section: Section) -> Iterator[dict[str, Any]]:
 
 
 def _figure(figure: Figure) -> dict[str, Any]:
-    """The element goes into the page as it is, with its caption for those who cannot see it."""
+    """The SVG element, with its caption as label for screen readers."""
     from markupsafe import Markup, escape
 
     spoken = f'<svg role="img" aria-label="{escape(figure.caption.replace("`", ""))}" '
@@ -154,7 +154,7 @@ def _figure(figure: Figure) -> dict[str, Any]:
 
 
 def _numeric_columns(table: Table) -> list[bool]:
-    """Whether a column holds numbers (and dashes for none), which stand at the right."""
+    """Whether each column holds only numbers or dashes, and is aligned right."""
     return [bool(cells) and all(map(_NUMBER.match, cells)) for cells in zip(*table.rows, strict=True)] or [
         False for _ in table.columns
     ]
@@ -178,10 +178,10 @@ def _breakable(text: str) -> Any:
 
 
 def write_report(report: Report, to: Path) -> list[Path]:
-    """Write the page there and the figures into a folder beside it; the paths of all of them, the page first.
+    """Write the page there and the figures into a folder beside it; returns all paths, the page first.
 
     Those of `report.html` go to `figures/`, those of `NAME.html` to `NAME-figures/`.
-    BadInput for a path that cannot be.
+    BadInput for a path that cannot be written.
     """
     check_output_path(to, (".html", ".htm"))
     text = page(report)

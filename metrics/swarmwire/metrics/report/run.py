@@ -23,7 +23,7 @@ _ENDED = {
 
 
 def what_was_run(run: RunData) -> Section:
-    """The section: a table of facts, what was not as it should be, and the command that repeats the run."""
+    """The section: a table of facts, problems of the run, and the command that repeats it."""
     facts = [*_scenario(run), *_course(run), *_machine(run)]
     again = (
         "The folder alone is enough to run it again; on this CPU and with these versions bit for bit:"
@@ -34,7 +34,7 @@ def what_was_run(run: RunData) -> Section:
         "What was run",
         (
             Table(("", ""), tuple(facts), ""),
-            *_not_as_it_should_be(run),
+            *_problems(run),
             *_hash(run),
             again,
             *([Listing(f"swarmwire repeat {run.shown_name}")] if run.started else []),
@@ -119,7 +119,7 @@ def _took(summary: dict[str, Any]) -> str:
 
 
 def _hash(run: RunData) -> list[str]:
-    """By what a repetition is compared: in a paragraph, since a cell so wide would be cut off on a phone."""
+    """The hash by which a repetition is compared. A paragraph, since a cell this wide would be cut off on a phone."""
     if run.summary is None:
         return []
     of = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
@@ -135,8 +135,8 @@ def _machine(run: RunData) -> list[tuple[str, str]]:
     return [*rows, ("versions", told)] if told else rows
 
 
-def _not_as_it_should_be(run: RunData) -> list[str]:
-    """Paragraphs about what a reader should know before believing anything."""
+def _problems(run: RunData) -> list[str]:
+    """Paragraphs on problems of the run, which readers need to judge its results."""
     summary, arenas = run.summary, run.static.arenas
     said: list[str] = []
     if arenas > 1:
@@ -167,9 +167,9 @@ def _not_as_it_should_be(run: RunData) -> list[str]:
 
 
 def run_report(folder: Path) -> Report:
-    """What was run, over time, where, the radio, the metrics: with what there is of a run that was killed or goes on.
+    """The report of a run, also of one that was killed or goes on: scenario, timeline, paths, radio and metrics.
 
-    Of several arenas the first is drawn, and tables tell of all. A table that was not recorded, or is damaged, costs
+    Figures are of the first arena; tables cover all. A table that was not recorded, or is damaged, costs
     its figure, and the text says so. BadInput where there is no run folder, or its `static.json` or summary cannot be
     read, or without matplotlib.
     """

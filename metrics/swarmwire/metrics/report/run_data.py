@@ -21,7 +21,7 @@ from swarmwire.metrics.text import counted
 if TYPE_CHECKING:
     import polars as pl
 
-MAX_POINTS = 800  # of a curve: about what a figure has dots for across
+MAX_POINTS = 800  # of a curve: about the width of a figure in dots
 ARENA = 0  # whose pictures are drawn
 
 
@@ -51,8 +51,8 @@ class Lane:
 def lanes_of(events: "pl.DataFrame") -> list[Lane]:
     """The lanes of one arena's rows of `events`, by first occurrence.
 
-    Rows do not say which of several occurrences an end belongs to: it is the first that is open and changed the same
-    robots, else the first that is open.
+    Rows of ends do not name their beginning: an end belongs to the first open one with the same robots, else to the
+    first open one.
     """
     lanes: dict[str, Lane] = {}
     opened: dict[str, list[tuple[int, list[str]]]] = {}
@@ -99,7 +99,7 @@ def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
 
 @dataclass(frozen=True)
 class RunData:
-    """A run folder, and what most sections read of it."""
+    """A run folder, and the data that most sections use."""
 
     folder: RunFolder
     static: Static
@@ -121,11 +121,11 @@ class RunData:
         return self.static.range_m is not None
 
     def record(self, name: str) -> dict[str, Any]:
-        """What the summary says of a table that was recorded; empty without one."""
+        """The summary's entry of a recorded table; empty without one."""
         return {} if self.summary is None else dict(self.summary["record"].get(name, {}))
 
     def of_arena(self, part: str, arena: int = ARENA) -> Any:
-        """What the summary says of an arena: its `radio` or `metrics`; None without a summary."""
+        """The summary's `radio` or `metrics` of an arena; None without a summary."""
         found: Any = None if self.summary is None else self.summary[part]
         return cast("list[Any]", found)[arena] if isinstance(found, list) else found
 
@@ -155,7 +155,7 @@ class RunData:
 
 
 def read_run(path: Path) -> RunData:
-    """Read a run folder; BadInput where there is none, or its `static.json` or summary cannot be read."""
+    """Read a run folder; BadInput if it is missing, or its `static.json` or summary cannot be read."""
     folder = RunFolder(path)
     static, summary = folder.static, folder.summary
     try:

@@ -75,7 +75,7 @@ def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
 
 
 def _names(static: Static) -> tuple[dict[float, str], bool]:
-    """Names by place, of robots or if these are many of groups, at their middle; and whether they stand upright."""
+    """Labels by place (of robots, or of groups if robots are many), and whether they are written upright."""
     if static.robots <= MAX_NAMED:
         names: dict[float, str] = dict(enumerate(static.robot_names))
     else:
@@ -93,7 +93,7 @@ def _write(axes: Any, link_pdr: FloatArray) -> None:
 
 
 def links(run: RunData) -> Figure | str:
-    """The figure, or why there is none."""
+    """The figure, or the reason for its absence."""
     found = _counted(run)
     if isinstance(found, str):
         return f"Delivery by link: {found}"
@@ -117,7 +117,7 @@ def links(run: RunData) -> Figure | str:
 
 
 def _counted(run: RunData) -> "pl.DataFrame | str":
-    """Packets by sender, receiver and fate, or why they are not known."""
+    """Packets by sender, receiver and fate, or the reason for their absence."""
     import polars as pl
 
     table = run.table("radio_links")
@@ -133,7 +133,7 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
 def of_links(table: "pl.DataFrame", robots: int) -> tuple[IntArray, IntArray]:
     """Of packets by sender, receiver and fate: those received, and those with the receiver in range, (n, n) each.
 
-    In range is as in the radio's account: whatever became of the packet, unless an obstacle was in the way.
+    In range counts as in the summary: packets of any fate but `blocked`.
     """
     fate = table["fate"].cast(str).to_numpy()
     place = table["sender"].to_numpy(), table["receiver"].to_numpy()

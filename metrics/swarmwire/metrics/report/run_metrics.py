@@ -65,12 +65,12 @@ def _statistics(value: FloatArray, adds_up: bool) -> dict[str, float | None]:
 
 
 def _about(of: MetricInfo) -> tuple[str, str]:
-    """Its unit, and what it is."""
+    """Its unit and description."""
     return of.unit, "; ".join(filter(None, (of.help or "the user's own", _KINDS.get(of.kind))))
 
 
 def _arenas(run: RunData) -> list[str | Table]:
-    """What all arenas came to: across them by metric, and one by one."""
+    """The results of all arenas: by metric across them, and one by one."""
     arenas = run.static.arenas
     if run.summary is None or arenas < 2:
         return []

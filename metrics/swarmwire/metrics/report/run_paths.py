@@ -46,7 +46,7 @@ class Paths:
     lap: IntArray  # (k, m, 2) how often the seam of a torus was crossed, along and across; 0 without one
 
     def line(self, columns: IntArray, first: int, last: int) -> tuple[FloatArray, FloatArray]:
-        """The ways, x and y, of these columns from one place in `ticks` to another, NaN where the pen is lifted."""
+        """The paths, x and y, of these columns from one index of `ticks` to another, with NaN at gaps."""
         place, lap = self.place_m[first : last + 1, columns], self.lap[first : last + 1, columns]
         jump = (np.diff(lap, axis=0) != 0).any(axis=-1)  # (k - 1, m)
         drawn = np.full((2 * len(place), len(columns), 2), np.nan)
@@ -72,7 +72,7 @@ def paths_of(place_m: AnyArray, static: Static) -> Paths:
 
 
 def _evenly(count: int, most: int) -> IntArray:
-    """All of so many, or `most` of them, evenly, with the first and the last."""
+    """All indices below `count`, or `most` of them evenly, with the first and the last."""
     if count <= most:
         return np.arange(count)
     return np.unique(np.round(np.linspace(0, count - 1, most)).astype(np.int64))
@@ -88,8 +88,8 @@ def trajectories(
         arena: which one.
         paths: to draw.
         pose: (n, 3) of all robots at the end.
-        alive: (n,) whether they were then.
-        movable: (k, 3) where movable obstacles were at the end; None: there are none.
+        alive: (n,) at the end.
+        movable: (k, 3) poses of movable obstacles at the end; None: no movable obstacles.
         end_s: the last tick's time.
     """
     by_time = len(static.groups) == 1
@@ -189,7 +189,7 @@ def _entries(static: Static, arena: int, everybody_alive: bool) -> list[Any]:
 
 
 def where(run: RunData) -> list[Figure]:
-    """The figure, if there is a tick."""
+    """The figure; none without a tick."""
     if isinstance(run.film, str):
         return []
     film, static = run.film, run.static

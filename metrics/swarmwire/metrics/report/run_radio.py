@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}
 _HEIGHT_IN = 2.75
 _BINS = 48
-_WIDE = 30.0  # of the latest over the earliest, from which on the axis is logarithmic
+_WIDE = 30.0  # ratio of the longest and the shortest, from which on the axis is logarithmic
 _LATEST = 99.9  # percent: where the axis ends, since a single packet may be very late
 _DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
 COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
@@ -33,7 +33,7 @@ TITLE = "The radio"
 
 
 def fates(run: RunData) -> list[str | Table]:
-    """The tables, from the summary; without one a line that says so."""
+    """The tables of fates and latencies from the summary; without a summary a sentence."""
     if run.summary is None:
         return ["What became of packets in all is counted at the end of a run, which this one has not reached."]
     arenas = [found for arena in range(run.static.arenas) if (found := run.of_arena("radio", arena))]
@@ -71,7 +71,7 @@ def _ms(value_s: float | None) -> str:
 
 
 def distances(run: RunData) -> Figure | str:
-    """The figure, or why there is none."""
+    """The figure, or the reason for its absence."""
     table = run.table("radio_distances")
     if isinstance(table, str):
         killed = " It is written at the end of a run." if run.summary is None else ""
@@ -150,7 +150,7 @@ def _edges(latency_ms: FloatArray) -> FloatArray:
 
 
 def latencies(run: RunData) -> Figure | str:
-    """The figure, or why there is none."""
+    """The figure, or the reason for its absence."""
     packets = run.packets(COLUMNS)
     if isinstance(packets, str):
         return f"Latencies of single packets: {packets}"
@@ -173,7 +173,7 @@ def latencies(run: RunData) -> Figure | str:
 
 
 def radio(run: RunData) -> Section:
-    """The section: figures side by side, then what is to be said of those that cannot be drawn, then tables."""
+    """The section: figures side by side, then the reasons for missing ones, then tables."""
     if not run.has_radio:
         return Section(TITLE, ("The robots have no radio.",))
     found = run.of_arena("radio")

@@ -1,4 +1,4 @@
-"""The section on what happened: metrics and events over time, and the paths of the robots."""
+"""The timeline of a run: metrics and events over time, and the paths of the robots."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -99,7 +99,7 @@ def timeline(time_s: FloatArray, curves: Sequence[Curve], lanes: Sequence[Lane])
 
 
 def draw_curve(axes: Any, time_s: FloatArray, curve: Curve) -> None:
-    """The curve on axes of its own, which have no limits across yet."""
+    """Draw the curve on empty axes."""
     kept, whole = thinned(curve.value), curve.whole or is_count(curve.name, curve.facts)
     steps = "steps-post" if whole else "default"
     axes.plot(time_s[kept], curve.value[kept], color=CURVE, lw=1.0, drawstyle=steps)
@@ -109,7 +109,7 @@ def draw_curve(axes: Any, time_s: FloatArray, curve: Curve) -> None:
 
 
 def _mark(axes: Any, lanes: Sequence[Lane], end_s: float) -> None:
-    """What happened, through a panel, where it does not hide it."""
+    """Mark the events through a panel, if they are few."""
     spans = [span for lane in lanes for span in lane.spans]
     if len(spans) > _MAX_LINES:
         return
@@ -143,7 +143,7 @@ def small_panels(time_s: FloatArray, curves: Sequence[Curve]) -> Any:
 
 
 def what_happened(run: RunData) -> Section:
-    """The section: the timeline, the ways of the robots, and small panels of the metrics that the scenario names."""
+    """The section: timeline, paths of the robots, small panels of the scenario's metrics, and events."""
     if isinstance(run.film, str):
         return Section("What happened", (f"No tick can be shown: {run.film}",))
     film = run.film
@@ -162,7 +162,7 @@ def what_happened(run: RunData) -> Section:
 
 
 def second(film: Film) -> list[str]:
-    """The metrics for small panels: those that the scenario names but times, then some of the standard."""
+    """The metrics for small panels: those of the scenario that are no times, then some standard ones."""
     listed = [name for name in film.metrics if name not in METRICS or not METRICS[name].standard]
     listed = [name for name in listed if not _is_time(name, film.facts)]
     changing = [name for name in SECOND if name in film.metrics and np.unique(film.metrics[name]).size > 1]
@@ -183,7 +183,7 @@ def _is_time(name: str, facts: Facts) -> bool:
 
 
 def _moments(run: RunData, film: Film) -> list[Lane]:
-    """Since when what stopped the arena had held, and when what the metrics that are times wait for came about."""
+    """Lanes of moments: the time of the stop condition, and the values of metrics that are times."""
     end: dict[str, Any] = run.summary["by_arena"][ARENA] if run.summary else {"stopped_by": None}
     moments: dict[str, float] = {}
     if end["stopped_by"]:

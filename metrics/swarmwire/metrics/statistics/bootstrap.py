@@ -106,7 +106,7 @@ def mean_difference_interval(a: FloatArray, b: FloatArray, level: float = LEVEL)
 def binomial_interval(
     successes: IntArray | FloatArray, trials: IntArray | FloatArray, confidence: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Wilson's score interval of a probability, lower and upper ends (k,); NaN where there was no trial.
+    """Wilson's score interval of a probability, lower and upper ends (k,); NaN without a trial.
 
     With p = successes / trials = s / n: (p + z^2 / 2n ± z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n). Trials are
     taken to be independent. It stays within 0 and 1, also for shares of 0 and 1.

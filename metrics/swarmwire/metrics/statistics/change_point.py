@@ -63,7 +63,7 @@ class ChangePoint:
 
 
 def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL) -> ChangePoint | None:
-    """The step along a parameter (points,), strictly rising, of the responses (points, seeds), NaN where none is.
+    """The step along a parameter (points,), strictly rising, of the responses (points, seeds), NaN: no value.
 
     Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant does as well, or
     fewer than two points have values.
@@ -73,7 +73,7 @@ def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL)
     if len(parameter) < 2:
         return None
     mean = float(np.nanmean(table))
-    table = table - mean  # squares of what is left keep their digits
+    table = table - mean  # centred, so that sums of squares keep their digits
     sums = point_sums(table)
     residual = _residuals(sums)
     split = int(np.argmin(residual))
@@ -109,7 +109,7 @@ def _levels(sums: PointSums) -> tuple[FloatArray, FloatArray]:
 
 
 def _residuals(sums: PointSums) -> FloatArray:
-    """Sum of squares around the two means of each split, (…, splits); inf where there are not two."""
+    """Sum of squares around the two means of each split, (…, splits); inf without two."""
     below, above = _levels(sums)
     count = np.cumsum(sums.count, axis=-1)
     explained = count[..., :-1] * below**2 + (count[..., -1:] - count[..., :-1]) * above**2

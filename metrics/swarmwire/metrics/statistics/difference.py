@@ -24,7 +24,7 @@ def cliffs_delta(first: Sample, second: Sample) -> float:
     """P(first > second) - P(first < second) over all pairs, -1 to 1 (Cliff, Psychol. Bull. 114, 1993); NaN of none.
 
     It is 2 A - 1 with A of Vargha and Delaney (2000). Of censored times, pairs whose order is unknown count as equal
-    (Gehan, Biometrika 52, 1965): so it errs towards 0.
+    (Gehan, Biometrika 52, 1965): so the value errs towards 0.
     """
     pairs = len(first) * len(second)
     if not pairs:
@@ -33,9 +33,9 @@ def cliffs_delta(first: Sample, second: Sample) -> float:
 
 
 def hedges_g(first: FloatArray, second: FloatArray) -> float:
-    """(mean of first (n,) - mean of second (m,)) / pooled standard deviation, unbiased; NaN where there is none.
+    """(mean of first (n,) - mean of second (m,)) / pooled standard deviation, unbiased; NaN without variance.
 
-    The factor 1 - 3 / (4 (n + m) - 9) takes off what small samples add (Hedges, J. Educ. Stat. 6, 1981).
+    The factor 1 - 3 / (4 (n + m) - 9) corrects the bias of small samples (Hedges, J. Educ. Stat. 6, 1981).
     """
     freedom = len(first) + len(second) - 2
     if min(len(first), len(second)) < 1 or freedom < 1:
@@ -78,17 +78,17 @@ def _shares(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, Float
 
 @dataclass(frozen=True)
 class Difference:
-    """Second less first; NaN where it is not known."""
+    """Second minus first; NaN: unknown."""
 
     pairs: int  # seeds that were compared one by one; 0: the samples were compared as wholes
     median: float  # of numbers in pairs the median of the differences, else the difference of the medians
-    median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond what was watched
+    median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond the observed times
     mean: float  # of times: of min(time, horizon)
     mean_interval: Interval  # bootstrap
     horizon: float  # of times: up to when every run was watched; inf of numbers
     delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values of both
     g: float  # Hedges'; NaN of times
-    p: float  # two-sided, of the test; NaN: nothing tells the two apart
+    p: float  # two-sided, of the test; NaN: not defined
     test: Test
 
 

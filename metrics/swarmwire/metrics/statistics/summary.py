@@ -13,7 +13,7 @@ from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 @dataclass(frozen=True)
 class Summary:
-    """Of n values; NaN where there are none, and for a quartile of times that lies beyond what was watched."""
+    """Of n values; NaN without values, and for a quartile of times beyond the observed times."""
 
     n: int
     failed: int  # runs that ended in an error
@@ -25,7 +25,7 @@ class Summary:
     mean: float  # of times: of min(time, limit)
     q50_interval: Interval
     mean_interval: Interval
-    limit: float  # the largest value; of times, what a quartile that is NaN lies beyond
+    limit: float  # the largest value; a quartile of times that is NaN lies beyond it
 
 
 def summary(sample: Sample, level: float = LEVEL) -> Summary:

@@ -38,8 +38,8 @@ class KaplanMeier:
     def quantile_interval(self, share: float) -> Interval:
         """Where the band meets the share (Brookmeyer and Crowley, Biometrics 38, 1982); high is inf where it does not.
 
-        NaN where nothing was watched, and low is NaN where not even the band's lower edge comes so far down: the
-        time is beyond what was watched.
+        NaN of an empty sample, and low is NaN where not even the band's lower edge comes down to the share: the
+        time is beyond the observed times.
         """
         if not len(self.time):
             return UNKNOWN
@@ -98,15 +98,15 @@ def _band(survival: FloatArray, variance: FloatArray, level: float) -> tuple[Flo
 
 
 def _steps(variance: FloatArray) -> FloatArray:
-    """What each time adds to Greenwood's sum, (k,): 0 from where S is 0, since no area is left there."""
+    """The terms of Greenwood's sum, (k,): 0 from where S is 0, since no area is left there."""
     finite = np.where(np.isfinite(variance), variance, 0.0)
     return np.where(np.isfinite(variance), np.diff(finite, prepend=0.0), 0.0)
 
 
 def resampled_quantiles(sample: Sample, drawn: Counts, share: float) -> FloatArray:
-    """Kaplan and Meier's quantile of each resample, (resamples,); inf where it lies beyond what was watched.
+    """Kaplan and Meier's quantile of each resample, (resamples,); inf beyond the observed times.
 
-    `drawn` (resamples, n) tells how often each value of the sample was drawn.
+    `drawn` (resamples, n) holds the number of draws of each value.
     """
     order = np.lexsort((~sample.observed, sample.value))  # at the same time events come before ends
     counts = drawn[:, order].astype(np.float64)
@@ -118,7 +118,7 @@ def resampled_quantiles(sample: Sample, drawn: Counts, share: float) -> FloatArr
 
 
 class LogRank(NamedTuple):
-    """The test's result; NaN if nothing tells the two apart: nothing happened, or not to both."""
+    """The result of the test; NaN without an event while both samples had runs at risk."""
 
     z: float  # standard normal if both are alike; positive: it happens sooner in the first
     p: float  # two-sided

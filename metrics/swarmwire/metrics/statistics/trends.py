@@ -15,7 +15,7 @@ from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval
 MIN_STRESSES = 3  # two points lie on every curve
 PARAMETERS = 3  # a, b and the variance
 ROUNDING = 1e-24  # of squares, relative to all
-TELLING = 2.0  # AIC apart by less says little (Burnham and Anderson, 2002)
+TELLING = 2.0  # smaller differences of AIC mean little (Burnham and Anderson, 2002)
 
 Form = Literal["linear", "exponential"]
 
@@ -91,7 +91,7 @@ def _line(x: FloatArray, a: float, b: float) -> FloatArray:
 
 
 def _exponential(x: FloatArray, a: float, b: float) -> FloatArray:
-    return a * np.exp(np.minimum(b * x, 700.0))  # the search may try what would overflow
+    return a * np.exp(np.minimum(b * x, 700.0))  # the search may try values that would overflow
 
 
 def _fit(form: Form, x: FloatArray, y: FloatArray, guess: tuple[float, float], level: float) -> Fit:
@@ -133,7 +133,7 @@ class Scaling:
 
 
 def scaling(robots: FloatArray, response: FloatArray, *, is_time: bool) -> Scaling:
-    """Of the response (…, sizes) of swarms of so many robots (sizes,): work done, or the time that a task takes.
+    """The scaling of a response (…, sizes) over numbers of robots (sizes,): work done, or the time of a task.
 
     Leading axes may be resamples. BadInput unless there are at least two sizes, all positive, each once.
     """

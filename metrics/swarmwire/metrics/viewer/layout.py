@@ -15,13 +15,13 @@ _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high
 _MIN_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
 _PAGE_ARENA_SHARE = 0.64
-_ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
+_ROWS = [4.2, 1.0]  # of the views, and of the events below them
 
 
 def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
     """The blueprint for recordings of this run, with a close look at the selected robot.
 
-    `play_state` is "following" for what is still being recorded. Without a radio there is no plot of packets.
+    `play_state` is "following" for a live run. Without a radio there is no plot of packets.
     """
     import rerun.blueprint as rrb
 
@@ -38,7 +38,7 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 
 
 def page_layout(static: Static, selected: str) -> Any:
-    """The blueprint for the page, which tells numbers and events itself: the arena, as large as there is room."""
+    """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible."""
     import rerun.blueprint as rrb
 
     plots = _plots(static)[:2]
@@ -126,7 +126,7 @@ def _plots(static: Static) -> list[Any]:
 
 
 def _last(duration_s: float, rate_hz: int) -> Any:
-    """What was logged in the last seconds before the cursor, whichever timeline is shown."""
+    """The rows of the last seconds before the cursor, on either timeline."""
     import rerun.blueprint as rrb
 
     since, now = -round(duration_s * NS_PER_S), rrb.TimeRangeBoundary.cursor_relative
@@ -173,7 +173,7 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
 
 
 def _drawn(static: Static, selected: str) -> list[str]:
-    """What the selected robot's body lets the picture show of its sensors."""
+    """Sentences on the sensors of the selected robot that the recording shows."""
     index = static.robot_names.index(selected)
     body = next(group.body for group in static.groups if group.start <= index < group.stop)
     rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []

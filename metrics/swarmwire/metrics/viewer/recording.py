@@ -16,7 +16,7 @@ from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.scene import RerunArena
 from swarmwire.metrics.viewer.selection import selected_robot
 
-ROOM_BYTES = 1_000_000  # for what is written before the first tick
+ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
 # Of each block rerun keeps two or three kilobytes an entity until the file is closed, 37 kB for a swarm with a radio.
 SEND_BYTES = 1_000_000
 SEND_SHARE = 0.01  # of the time so far: where ticks are slow, a block every 2 s takes 70 MB an hour
@@ -38,10 +38,10 @@ class RerunRecording(Observer):
     ) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
-        What was seen is written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
+        Rows are written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
-        of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
+        of the first group that has rays or photocells. A subclass with another target has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
         VIEW.need(self._what)
@@ -49,7 +49,7 @@ class RerunRecording(Observer):
         self._arena, self._selected = arena, selected
 
     def begin(self, static: Static) -> None:
-        """Open the file and log what does not change; BadInput if there is no such arena or selected robot."""
+        """Open the file and log the constants; BadInput if there is no such arena or selected robot."""
         import rerun as rr
 
         if not 0 <= self._arena < static.arenas:
@@ -98,12 +98,12 @@ class RerunRecording(Observer):
             self._limit.restart()
 
     def _layout(self, static: Static, selected: str) -> Any:
-        """How it looks when it is opened."""
+        """The blueprint of the recording."""
         return layout(static, selected)
 
     def _connect(self, layout: Any) -> None:
-        """Lead the stream to where it goes; OSError if there is no room: rerun would wait for ever for its writer."""
-        assert self._path is not None  # who has no path leads elsewhere
+        """Connect the stream to its target; OSError if the disk is full, since rerun would then wait for ever."""
+        assert self._path is not None  # subclasses without a path override this
         try:
             self._path.write_bytes(bytes(ROOM_BYTES))
         except OSError:
@@ -112,7 +112,7 @@ class RerunRecording(Observer):
         self._rec.save(self._path, default_blueprint=layout)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Close the file, whatever fails. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        """Close the file, also after a failure. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
         try:
             self._rows.send()
         finally:
@@ -126,7 +126,7 @@ class RerunRecording(Observer):
 class RerunLive(RerunRecording):
     """Observer that draws one arena of a run in the viewer at a URL, which shows the newest tick.
 
-    For a process of its own: a call waits for a viewer that does not take what it is sent.
+    For a separate process: a call blocks while the viewer does not read.
     """
 
     _send_bytes = 0  # people wait for it
@@ -152,5 +152,5 @@ class RerunLive(RerunRecording):
         return page_layout(static, selected) if self._page else layout(static, selected, "following")
 
     def _connect(self, layout: Any) -> None:
-        self._arena_view.links_every_ticks = 1  # whoever publishes the ticks has thinned the links already
+        self._arena_view.links_every_ticks = 1  # the publisher of the ticks has thinned the links
         self._rec.connect_grpc(self._url, default_blueprint=layout)

@@ -40,7 +40,7 @@ for _fate, _color in FATES.items():
 
 
 def begin_lost(rec: Any) -> None:
-    """Log how lines of unheard packets look."""
+    """Log the style of the lines of packets that were not received."""
     import rerun as rr
 
     look = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), draw_order=_LOST_ORDER)
@@ -48,10 +48,10 @@ def begin_lost(rec: Any) -> None:
 
 
 def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m: FloatArray) -> None:
-    """Add the packets of an arena that ended unheard since the last tick, as lines between its robots' positions.
+    """Add the packets of an arena that were lost since the last tick, as lines between its robots' positions.
 
-    position_m (robots, 2) is where they are now, which is not quite where they were when the packet went on air. A
-    packet that never did has no receiver, and so no line.
+    position_m (robots, 2) are the current positions, slightly later than those when the packet went on air. A packet
+    that never went on air has no receiver, and so no line.
     """
     import rerun as rr
 
@@ -85,7 +85,7 @@ def _raster(static: Static) -> ByteArray:
 
 
 class RerunLeds:
-    """The lit LEDs of one arena: points in each tick in which there are some."""
+    """The lit LEDs of one arena, as points."""
 
     def __init__(self, static: Static) -> None:
         """Draw the LEDs of any arena of this run."""
@@ -96,7 +96,7 @@ class RerunLeds:
         self._any_lit = False
 
     def begin(self, rec: Any) -> None:
-        """Log what does not change."""
+        """Log the constants."""
         import rerun as rr
 
         look = rr.Points2D.from_fields(radii=rr.Radius.ui_points(2.5), draw_order=_LEDS)
@@ -132,10 +132,10 @@ class RerunRobots:
         least = min(_MIN_HEADING, _CROWDED / math.sqrt(static.robots))
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._arrow_m = self.heading_m[:, None].astype(np.float32)
-        self._was: tuple[bytes, bytes] | None = None  # who was alive and at what when the colours were logged
+        self._was: tuple[bytes, bytes] | None = None  # alive and state when the colours were last logged
 
     def begin(self, rec: Any) -> None:
-        """Log what does not change."""
+        """Log the constants."""
         import rerun as rr
 
         names = [shown(name) for name in self._static.robot_names]
@@ -182,7 +182,7 @@ def _points(pose: NDArray[np.float32]) -> Any:
 
 
 class RerunArena:
-    """What is seen of one arena: a call per kind of thing and tick, whatever the number of robots.
+    """The views of one arena: a constant number of calls per tick, for any number of robots.
 
     In rerun's 2D views y points down; a static transform that mirrors y turns it up, and leaves the data as it is.
     """
@@ -197,7 +197,7 @@ class RerunArena:
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
     def begin(self, rec: Any) -> None:
-        """Log what does not change."""
+        """Log the constants."""
         import rerun as rr
 
         rec.log("world", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
@@ -238,7 +238,7 @@ class RerunArena:
             add_lost(rows, truth.finished, self._arena, position_m)
 
     def _edges(self, edges: IntArray) -> IntArray:
-        """The arena's own edges, as indices of its robots."""
+        """The edges of this arena, as indices of its robots."""
         start = self._own.start
         own = (edges[:, 0] >= start) & (edges[:, 0] < self._own.stop)
         return edges[own] - start

@@ -16,8 +16,8 @@ from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.extras import VIEW
 
-LEAVE_S = 5.0  # how long it may take to end when it is told to
-# Linux kills whoever asks for it (PR_SET_PDEATHSIG, 1) with its parent; if that is dead by then, nothing begins.
+LEAVE_S = 5.0  # from the request to end until it is killed
+# Linux kills a process with its parent after prctl(PR_SET_PDEATHSIG, SIGKILL); if the parent is dead, exit at once.
 ASKS = (
     "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9); "
     "os.getppid() == int(sys.argv[1]) or os._exit(1); os.execv(sys.argv[2], sys.argv[2:])"
@@ -25,7 +25,7 @@ ASKS = (
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
 _PAUSE_NS = NS_PER_S // 20
 _SAME_IN_A_ROW = 4
-_NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # how the viewer says that it has no Vulkan
+_NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # the viewer's messages without a Vulkan driver
 _Found = TypeVar("_Found")
 
 
@@ -52,7 +52,7 @@ def ending_with_this(command: Sequence[str]) -> list[str]:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Tell the process to end, and kill it if it does not, also if it is stopped."""
+    """Terminate the process; kill it if it does not end, also if it is stopped."""
     process.terminate()
     try:
         process.wait(LEAVE_S)
@@ -62,7 +62,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 def is_open(port: int) -> bool:
-    """Whether somebody listens at this port of the loopback."""
+    """Whether a process listens at this port of the loopback."""
     with socket.socket() as probe:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
@@ -74,8 +74,8 @@ class NoGraphics(SwarmwireError):
 def render_png(rrd: Path, png: Path, at_s: float | None = None, size: tuple[int, int] = (1600, 900)) -> None:
     """Write the viewer's window, of this size in pixels, with the recording at this time (None: its end).
 
-    The viewer is rerun's own program. It listens on this machine alone, keeps its files in a directory that goes with
-    it, and has ended when this returns. BadInput without the extra [view], the recording or the time; NoGraphics
+    The viewer is rerun's own program. It listens on this machine only, keeps its files in a temporary directory, and
+    has ended when this returns. BadInput without the extra [view], the recording or the time; NoGraphics
     without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
     """
     VIEW.need("picture")
@@ -114,9 +114,9 @@ def _opened(client: Any) -> Any | None:
 
 
 def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
-    """A function that gives the picture once some in a row are the same.
+    """A function that returns the picture once several in a row are equal, else None.
 
-    After a jump in time the viewer fetches what it has not loaded yet, and its plots slide into place.
+    After a jump in time the viewer loads missing data, and its plots slide into place.
     """
     row: deque[bytes] = deque(maxlen=_SAME_IN_A_ROW)
 
@@ -128,7 +128,7 @@ def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
 
 
 class _Viewer:
-    """A viewer's process, and waiting for what it does for as long as it lives."""
+    """The viewer's process, with waits that end when it dies."""
 
     def __init__(self, process: subprocess.Popen[bytes], port: int, log: Path) -> None:
         self._process, self._log, self._clock = process, log, WallClock()
@@ -144,12 +144,12 @@ class _Viewer:
             return None
 
     def wait(self, ready: Callable[[], _Found | None]) -> _Found:
-        """What `ready` returns once it is not None."""
+        """Poll `ready` until it returns a value, and return that."""
         until_ns = self._clock.now_ns() + PATIENCE_NS
         while self._clock.now_ns() < until_ns:
             try:
                 found = ready()
-            except (ConnectionError, RuntimeError):  # it died while it was asked, or does not answer yet
+            except (ConnectionError, RuntimeError):  # not up yet, or dead
                 found = None
             if found is not None:
                 return found
@@ -175,7 +175,7 @@ def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
 
 
 def _environment(home: str) -> dict[str, str]:
-    """A home of its own: the viewer neither finds the user's settings nor leaves any, and reports to nobody.
+    """A temporary home: the viewer neither reads nor writes the user's settings, and sends no reports.
 
     Without a log there are no notices of it in the picture either.
     """

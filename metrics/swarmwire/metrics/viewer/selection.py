@@ -14,11 +14,11 @@ from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import LIGHT, MARK, packed
 
 _FRAME = "world/selected"  # moves with the robot, axes as the arena's
-EYE = f"{_FRAME}/eye"  # what looks on from there sees y point up
+EYE = f"{_FRAME}/eye"  # a view from there has y pointing up
 _HITS: NDArray[np.uint32] = np.array(
     [packed((120, 125, 145), 150), packed(MARK, 255), packed((255, 60, 50), 255)], np.uint32
 )
-_NOTHING, _THING, _ROBOT = range(3)  # what a ray meets
+_NOTHING, _THING, _ROBOT = range(3)  # nearest thing on a ray
 _LIGHT_BAR = packed(LIGHT, 200)
 _RANGE_ALPHA, _RING_ALPHA = 45, 170
 _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
@@ -44,7 +44,7 @@ def selected_robot(static: Static, name: str | None, where: str) -> str:
 
 
 def close_up_m(static: Static, selected: str) -> float:
-    """Half the width of what a close look at a robot should show."""
+    """Half the width of the close-up of a robot."""
     body = _group(static, static.robot_names.index(selected)).body
     return 3.0 * (body.radius_m + (body.proximity.range_m if body.proximity else 2.0 * body.radius_m))
 
@@ -65,11 +65,11 @@ class RerunSelected:
         self._group, self._ring_m = _group(static, self._index), _RING_HEADINGS * float(heading_m[self._index])
         self._radius_m = radius_m
         self._sensed: dict[str, FloatArray] = {}
-        self._sees = False  # whether any sensor answers
+        self._sees = False  # whether any sensor reads more than 0
         self._drawn = False  # whether there are rays to be seen
 
     def begin(self, rec: Any) -> None:
-        """Log what moves with the robot but never changes."""
+        """Log the constant marks that move with the robot."""
         import rerun as rr
 
         around = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
@@ -85,7 +85,7 @@ class RerunSelected:
         rec.log(f"{_FRAME}/rays", rays, static=True)
 
     def add(self, rows: RerunRows, truth: Truth, *, full: bool) -> None:
-        """Add a tick; if it is not to be recorded in full, rays that see nothing stay as they are."""
+        """Add a tick; unless `full`, rays without a hit are not updated."""
         import rerun as rr
 
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
@@ -111,7 +111,7 @@ class RerunSelected:
         self._drawn = len(lines) > 0
 
     def _remember(self, truth: Truth) -> None:
-        """Keep what it senses in this tick; the dead sense nothing."""
+        """Keep the robot's readings of this tick; a dead robot has none."""
         readings = truth.readings.get(self._group.name)
         if not truth.alive[self._row]:
             self._sensed = {}
@@ -130,7 +130,7 @@ class RerunSelected:
         return lines
 
     def _hits(self, truth: Truth, sheet: ProximitySpec, rays: FloatArray) -> NDArray[np.uint32]:
-        """The colour of each ray, (rays,), by what it meets."""
+        """The colour of each ray, (rays,): of a robot, of another thing, or of nothing."""
         seen = self._sensed["proximity.value"] > sheet.noise
         if not seen.any():
             return np.full(len(rays), _HITS[_NOTHING])

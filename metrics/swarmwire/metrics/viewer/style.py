@@ -69,7 +69,7 @@ class RerunClasses:
         self._died = False
 
     def of(self, rec: Any, alive: BoolArray, state: IntArray, states: tuple[str, ...]) -> IntArray:
-        """Each robot's class, (robots,), of who is alive and at which place in `states`; logs what is new."""
+        """Each robot's class, (robots,), from alive and its index in `states`; logs new classes."""
         codes = len(states)
         keys, inverse = np.unique(self._group * codes + state, return_inverse=True)
         known = len(self._id), self._died
@@ -86,7 +86,7 @@ class RerunClasses:
         return self._id[group, code]
 
     def _name(self, group: str, state: str) -> str:
-        """What robots of this class are called; where there is one group alone, its name would tell nothing."""
+        """The name of a class; the group's name is left out where there is only one group."""
         if not state:
             return group
         return state if len(self._static.groups) == 1 else f"{group}: {state}"
