@@ -83,7 +83,7 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
     assert "movable_x_m" not in folder.metrics().columns
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     from swarmwire.metrics.drawing.animation import FilmFigure
-    from tests.integration.metrics.drawing.test_film_figure import FLOOR, MOVABLE, color_at
+    from tests.integration.metrics.drawing.test_animation import FLOOR, MOVABLE, color_at
 
     figure = FilmFigure(film, 640)
     side_m = 0.15  # along the box from its middle: there the pusher does not hide it

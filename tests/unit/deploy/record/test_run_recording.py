@@ -6,7 +6,7 @@ import pytest
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import run
-from tests.integration.metrics.viewer.test_rerun_recording import class_names, column, series
+from tests.integration.metrics.viewer.test_recording import class_names, column, series
 from tests.support.deploy.commands import LOSSY
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
