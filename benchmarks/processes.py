@@ -10,7 +10,7 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.runners import RunnerProcesses
 from swarmwire.world.scenario_file import scenario_from
 
 PLAIN = "benchmarks.plain_agent_host"

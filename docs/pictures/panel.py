@@ -12,8 +12,7 @@ from rich.console import Console
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import panel_view
 from swarmwire.world.scenario_file import load_scenario

@@ -23,7 +23,7 @@ from swarmwire.deploy.campaign.spec import campaign_file
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
-from swarmwire.deploy.record.origin import read_origin
+from swarmwire.deploy.record.provenance import read_facts
 from swarmwire.deploy.tuning.spec import read_tuning
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import read_campaign
@@ -41,7 +41,7 @@ FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "static": ("static.json", lambda at: RunFolder(at.parent).static),
     "tables": ("static.json", lambda at: RunFolder(at.parent).ticks()),
     "run": ("run.json", lambda at: RunFolder(at.parent).measured),
-    "run to repeat": ("run.json", lambda at: read_origin(at.parent)),
+    "run to repeat": ("run.json", lambda at: read_facts(at.parent)),
     "campaign": ("campaign.json", lambda at: read_campaign(at.parent)),
     "campaign results": ("campaign.json", lambda at: CampaignFolder(at.parent)),
     "tuning": ("tuning.json", lambda at: read_tuning(at.parent)),

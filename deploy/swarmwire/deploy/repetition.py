@@ -7,16 +7,13 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.config import Recording, Replay, Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.record.live_events import read_live_events
-from swarmwire.deploy.record.origin import Origin, read_origin
-from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.record.provenance import RunFacts, read_facts
 from swarmwire.deploy.record.trajectory_log import TrajectoryCheck, ticks_logged
-from swarmwire.deploy.replay import Replay
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
 from swarmwire.metrics.run_folder.reader import RunFolder
 
@@ -66,7 +63,7 @@ class RepeatedRun:
 
     Attributes:
         simulation: what will run.
-        origin: from what the run was made.
+        facts: from what the run was made.
     """
 
     def __init__(
@@ -79,9 +76,9 @@ class RepeatedRun:
         record: Recording | None = None,
     ) -> None:
         self._folder = folder = Path(folder)
-        self.origin = read_origin(folder)
+        self.facts = read_facts(folder)
         self._summary = _read_summary(folder)
-        self._inputs = _inputs(folder, self.origin, self._summary)
+        self._inputs = _inputs(folder, self.facts, self._summary)
         live_events, self._live_events_sha256 = read_live_events(folder)
         if self._summary and self._summary.live_events_sha256 and not live_events:
             expected = "expected the record of what people did to this run, on which it depends"
@@ -90,19 +87,19 @@ class RepeatedRun:
             raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
         self.simulation = Simulation(
             folder / SCENARIO,
-            seeds=self.origin.seeds,
+            seeds=self.facts.seeds,
             runners=runners,
             out=out,
             observers=observers,
             record=record,
-            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, live_events, self.origin.subtick_s),
+            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, live_events, self.facts.subtick_s),
         )
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
         self.simulation.watch(self._check)
 
     def run(self) -> Repetition:
         """Run it, and compare."""
-        changes = self.origin.changes(self._folder, self.simulation.code)
+        changes = self.facts.changes(self._folder, self.simulation.code)
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
@@ -126,7 +123,7 @@ class RepeatedRun:
             wanted = self._summary.ticks
         else:
             known = ticks_logged(self._folder)
-            wanted = known if known and not recorded_anew else self.origin.ticks
+            wanted = known if known and not recorded_anew else self.facts.ticks
         return min(wanted, self._inputs.end_tick) if self._inputs else wanted
 
     def _why_not_all(self, result: Result) -> str:
@@ -157,9 +154,9 @@ def _read_summary(folder: Path) -> _Summary | None:
     return _Summary(found["ended"], found["ticks"], hashes, inputs.get("sha256"), given.get("sha256"))
 
 
-def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:
+def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> RecordedInputs | None:
     inputs = recorded_inputs(folder)
-    driven = bool(origin.gateways) or (origin.realtime is not None and (origin.runners > 0 or origin.subtick_s))
+    driven = bool(facts.gateways) or (facts.realtime is not None and (facts.runners > 0 or facts.subtick_s))
     from_outside = driven or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
         expected = "expected the record of what came from outside, on which this run depends"

@@ -11,9 +11,8 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.agents import agent_specs
 from swarmwire.deploy.campaign.store import CampaignFolder
-from swarmwire.deploy.measuring import measuring
+from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.metrics.campaign.select import select
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.metric import Metric

@@ -62,7 +62,7 @@ def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path
     install(tmp_path / "site", "wind_metrics", {"east": "East"})
     monkeypatch.syspath_prepend(tmp_path / "site")
     result = run(scenario, overrides=['metrics=["east"]'], out=tmp_path / "run")
-    assert "wind_metrics" in result.modules
+    assert "wind_metrics" in result.facts.modules
     assert RunFolder(tmp_path / "run").metrics()["east"][-1] == result.metrics["east"].final
     assert repeat(tmp_path / "run").changes == ()
     (tmp_path / "site" / "wind_metrics.py").write_text(CODE + "# a word more\n")

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, run
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.config import Recording
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import ROOT

@@ -9,8 +9,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.deploy.commands import LOSSY
 
 

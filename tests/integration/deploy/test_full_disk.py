@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from swarmwire.deploy.record import origin
+from swarmwire.deploy.record import provenance
 from swarmwire.deploy.result import Result
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
@@ -65,7 +65,7 @@ def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, m
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(origin, "write_whole", refuses)
+    monkeypatch.setattr(provenance, "write_text", refuses)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert (code, out) == (1, "")
     assert_names(errors, tmp_path / "run")

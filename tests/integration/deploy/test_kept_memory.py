@@ -9,7 +9,7 @@ import pytest
 THREADS = 6
 PROGRAM = f"""
 import ctypes, threading
-from swarmwire.deploy.kept_memory import share_heaps
+from swarmwire.deploy.host import share_heaps
 SHARED
 met, gone = threading.Barrier({THREADS + 1}), threading.Barrier({THREADS + 1})
 libc = ctypes.CDLL(None)

@@ -7,10 +7,8 @@ import pytest
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy import Result, run
-from swarmwire.deploy.agents import agent_specs
-from swarmwire.deploy.endpoint import local_endpoint, new_run_id
-from swarmwire.deploy.new_medium import new_medium
-from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id
+from swarmwire.deploy.scenario_parts import agent_specs, new_medium
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.zenoh_backend import LockstepBackend

@@ -16,7 +16,7 @@ from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.inputs import RecordedBackend
-from swarmwire.deploy.record.modules import PARTS, module_digests
+from swarmwire.deploy.record.provenance import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS
 from swarmwire.world.scenario.scenario import same_content

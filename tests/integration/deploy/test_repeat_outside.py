@@ -11,8 +11,8 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import repeat, run
+from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import WITHIN
-from swarmwire.deploy.record.run_record import RunRecord
 from swarmwire.metrics.run_folder.layout import INPUTS
 from tests.integration.deploy.test_realtime import frames_of, runners_here
 from tests.support.deploy.commands import LOSSY
@@ -113,13 +113,13 @@ def test_a_run_that_lost_a_runner_whose_robots_stand_from_then_on_is_the_same_ag
 def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(tmp_path, talkers, monkeypatch):
     takeovers: list[subprocess.Popen[bytes]] = []
 
-    def take_over(_: RunRecord, text: str) -> None:
+    def take_over(_: RunFolder, text: str) -> None:
         command = text.partition("such as: python ")[2].replace("NAME", "fresh").split()
         if not command:  # it is told, too, that the other came
             return
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
-    monkeypatch.setattr(RunRecord, "say", take_over)
+    monkeypatch.setattr(RunFolder, "say", take_over)
     setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait"]
     watcher = Watcher((lambda truth: truth.tick >= 5, kill_one))
     try:

@@ -8,7 +8,7 @@ from _thread import start_new_thread
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.system_limits import OWN_FILES, OWN_THREADS, need_open_files, need_threads
+from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from tests.support.deploy.commands import LOSSY, called
 
 
@@ -48,7 +48,7 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
             raise RuntimeError("can't start new thread")
         started.append(start(*arguments))
 
-    monkeypatch.setattr("swarmwire.deploy.system_limits.start_new_thread", limited)
+    monkeypatch.setattr("swarmwire.deploy.host.start_new_thread", limited)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
     assert errors.startswith("error: this machine: ")

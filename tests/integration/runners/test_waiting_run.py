@@ -13,13 +13,11 @@ from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
+from swarmwire.deploy.config import Listening, Recording
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.control.run_finder import Announced, found_runs
-from swarmwire.deploy.listening import Listening
 from swarmwire.deploy.live.following import read_live
-from swarmwire.deploy.record.recording import Recording
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import HERE, Joiners
 from tests.support.waiting import until
@@ -41,7 +39,7 @@ def listening(
         LOSSY,
         overrides=[*joiners.overrides, *overrides],
         out=folder,
-        listening=Listening(HERE, told=joiners),
+        listening=Listening(HERE, observer=joiners),
         record=Recording(rrd=False, tables=False),
     )
     simulation.watch(Announced(folder))

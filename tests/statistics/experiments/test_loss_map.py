@@ -9,7 +9,7 @@ import pytest
 from docs.experiments.experiment import find_experiment
 from docs.experiments.figures.loss_map import BEHAVIOURS, CHECKS, results, shares
 from docs.experiments.places import HERE
-from swarmwire.deploy.measuring import measuring
+from swarmwire.deploy.scenario_parts import measuring
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.experiments.miniature import miniature
 from tests.support.metrics.swarm.swarms import said, stand

@@ -19,11 +19,10 @@ from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.new_terms import KEPT
+from swarmwire.deploy.backends import KEPT
+from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss, RunnerEvent
@@ -57,7 +56,7 @@ class Watcher(Observer):
             self.steps.pop(0)[1]()
 
 
-class Joiners:
+class Joiners(JoinObserver):
     """Told of runners that come and go; starts runners, and what the test wants to happen then."""
 
     def __init__(self, folder: Path) -> None:
@@ -127,7 +126,7 @@ class Joiners:
         simulation = Simulation(
             LOSSY,
             overrides=[*self.overrides, *overrides],
-            listening=Listening(HERE, start_with=start_with, told=self),
+            listening=Listening(HERE, start_with=start_with, observer=self),
             **more,
         )
         if watcher is not None:

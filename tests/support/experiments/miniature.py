@@ -10,10 +10,10 @@ import polars as pl
 from docs.experiments.digest import digest_of
 from docs.experiments.experiment import Experiment, find_experiment
 from docs.experiments.places import HERE
-from swarmwire.deploy.arguments import seed_list
 from swarmwire.deploy.campaign.design import vary_from
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep
+from swarmwire.deploy.config import seed_list
 from tests.support.deploy.campaign.small import InThisProcess
 
 

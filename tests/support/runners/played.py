@@ -7,10 +7,9 @@ from typing import Any
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
-from swarmwire.deploy.listening import Listening
+from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.registry import RunnerEvent
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.runners.raw_runner import RawRunner, Says, honestly
@@ -21,7 +20,7 @@ OVERRIDES = [f"robots.flock.count={ROBOTS}", "time.rate_hz=10", "physics.engine=
 
 
 @dataclass
-class Played(Observer):
+class Played(Observer, JoinObserver):
     """An observer of the run, who is told of its runners, too: lets one join after the other, and looks at counts."""
 
     says: Says = honestly
@@ -34,7 +33,7 @@ class Played(Observer):
 
     def run(self, *overrides: str, **more: Any) -> Result:
         """The run, to its end; raises what it raises."""
-        listening = Listening(("tcp/127.0.0.1:0",), told=self)
+        listening = Listening(("tcp/127.0.0.1:0",), observer=self)
         changes = [*OVERRIDES, f"duration_s={self.ticks / 10}", *overrides]
         self.simulation = Simulation(SCENARIO, seeds=[1, 2], overrides=changes, listening=listening, **more)
         self.simulation.watch(self)
@@ -56,6 +55,6 @@ class Played(Observer):
         self.refusals.append(why)
 
     def see(self, truth: Truth) -> None:
-        backend = self.simulation._backend
+        backend = self.simulation._parts.backend
         assert backend is not None
         self.counted.append(Counter(backend.counts()))

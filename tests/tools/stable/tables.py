@@ -4,11 +4,11 @@ from dataclasses import asdict
 from typing import Any
 
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.record.origin import Origin
+from swarmwire.deploy.record.provenance import RunFacts
 from tests.tools.stable.recorded_run import recorded
 from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample
 
-TYPES = {"run.json": Origin, "static.json": Static}  # of what they hold beside `format`
+TYPES = {"run.json": RunFacts, "static.json": Static}  # of what they hold beside `format`
 
 
 def text() -> str:

@@ -9,11 +9,9 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
-from swarmwire.deploy import Result, run
-from swarmwire.deploy import simulation as simulation_module
+from swarmwire.deploy import Result, run, wiring
 from swarmwire.deploy.controls import LOOK_NS, Controls
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
@@ -200,7 +198,7 @@ def free() -> Result:
 
 
 def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
+    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
     pause, step = controls.toggle_pause, controls.step

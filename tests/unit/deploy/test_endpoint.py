@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.wire.sessions import PRIVATE
-from swarmwire.deploy.endpoint import SOCKET, STALE_S, local_endpoint
+from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
 
 
 @pytest.fixture

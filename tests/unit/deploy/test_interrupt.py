@@ -7,7 +7,7 @@ import typer
 
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.cli.process import leaving_when_hung_up
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.controls import Interrupt
 
 ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy import kernel_cache
-from swarmwire.deploy.kernel_cache import SET, keep_kernels
+from swarmwire.deploy import host
+from swarmwire.deploy.host import KERNEL_CACHE, keep_kernels
 
 
 @pytest.fixture
 def at_exit(monkeypatch):
     """What is to be done when the process ends; the place of kernels is as before after the test."""
     registered = []
-    monkeypatch.setenv(SET, "x")
-    monkeypatch.delenv(SET)
+    monkeypatch.setenv(KERNEL_CACHE, "x")
+    monkeypatch.delenv(KERNEL_CACHE)
     monkeypatch.setattr(atexit, "register", lambda act, *given, **_: registered.append((act, given)))
     yield registered
     for act, given in registered:
@@ -25,21 +25,21 @@ def at_exit(monkeypatch):
 def test_where_nothing_can_be_written_they_are_kept_for_this_process(monkeypatch, tmp_path, at_exit):
     file = tmp_path / "file"
     file.touch()
-    monkeypatch.setattr(kernel_cache, "CODE", tmp_path / "nowhere")
+    monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
     monkeypatch.setenv("XDG_CACHE_HOME", str(file))  # no folder can be made in it
     keep_kernels()
-    place = Path(os.environ[SET])
+    place = Path(os.environ[KERNEL_CACHE])
     assert place.is_dir()
     keep_kernels()  # as does a process that this one starts
-    assert os.environ[SET] == str(place)
+    assert os.environ[KERNEL_CACHE] == str(place)
     assert len(at_exit) == 1
     assert at_exit[0][1] == (str(place),)
 
 
 def test_a_cache_of_the_user_or_beside_the_code_will_do(monkeypatch, tmp_path, at_exit):
     keep_kernels()
-    monkeypatch.setattr(kernel_cache, "CODE", tmp_path / "nowhere")
+    monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     keep_kernels()
-    assert SET not in os.environ
+    assert KERNEL_CACHE not in os.environ
     assert (tmp_path / "cache" / "numba").is_dir()

@@ -3,14 +3,14 @@
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import run, simulation
+from swarmwire.deploy import run, wiring
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.commands import LOSSY, called
 
 
 @pytest.fixture
 def _moved(monkeypatch):
-    monkeypatch.setattr(simulation, "WallClock", FakeClock)
+    monkeypatch.setattr(wiring, "WallClock", FakeClock)
 
 
 @pytest.mark.usefixtures("_moved")
@@ -24,7 +24,7 @@ def test_agents_in_this_process_are_paced_and_do_the_same():
 
 
 def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkeypatch, capfd):
-    monkeypatch.setattr(simulation, "WallClock", lambda: GoingClock(MS))
+    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
     result = run(LOSSY, overrides=["duration_s=2"], realtime=1e6)
     assert result.realtime is not None
     assert result.realtime.missed_ticks == 20

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.deploy.cli import app as cli
-from swarmwire.deploy.refusals import refusal
+from swarmwire.deploy.host import refusal
 from tests.support.deploy.commands import called
 
 

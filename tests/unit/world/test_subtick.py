@@ -17,7 +17,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.deploy.new_medium import new_medium
+from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.loop import Loop

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.packets import FATE_NAMES
-from swarmwire.deploy.measuring import conditions, measuring
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
+from swarmwire.deploy.scenario_parts import conditions, measuring
 from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response
 from swarmwire.world.scenario.scenario import Scenario
 

@@ -34,8 +34,8 @@ from swarmwire.comms.clock import Clock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.schedule import OPTION, Finished
 from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
-from swarmwire.deploy.record import machine
-from swarmwire.deploy.record.modules import module_digests
+from swarmwire.deploy.record import provenance
+from swarmwire.deploy.record.provenance import module_digests
 from swarmwire.metrics.campaign.spec import read_campaign
 from swarmwire.metrics.run_folder.layout import SCENARIO
 
@@ -95,7 +95,7 @@ class DaskExecutor:
         self._campaign = f"swarmwire-{uuid4().hex}"  # of the plugin, the resource and the topic of events
         self._tasks: dict[str, Task] = {}  # under way, by dask's key
         self._futures = SimpleQueue[Any]()  # as_completed cannot wait for a limited time; callbacks fill a queue
-        self._begun, self._mute_polls, self._cpus = False, 0, {machine.cpu()}
+        self._begun, self._mute_polls, self._cpus = False, 0, {provenance.cpu()}
         self._polled_ns = self._worked_ns = self._clock.now_ns()
         with ExitStack() as stack:
             stack.enter_context(_quiet_client())
@@ -286,7 +286,7 @@ def _files(folder: Path) -> dict[str, bytes]:
 def environment(modules: tuple[str, ...] = ()) -> dict[str, Any]:
     """Versions, CPU and digests of the code of this process: of these modules, else of swarmwire's."""
     digests = module_digests([f"{module}:" for module in modules])
-    return {"versions": machine.versions(), "cpu": machine.cpu(), "modules": digests}
+    return {"versions": provenance.versions(), "cpu": provenance.cpu(), "modules": digests}
 
 
 def fault_of(here: Mapping[str, Any], there: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import did_you_mean, from_toml
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.agents import agent_specs
+from swarmwire.deploy.scenario_parts import agent_specs
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario.schema import Node, plain
 from swarmwire.world.scenario_file import scenario_schema

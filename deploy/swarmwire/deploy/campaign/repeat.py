@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.arguments import Runners
 from swarmwire.deploy.campaign.start import code_changes
 from swarmwire.deploy.campaign.store import CampaignFolder
-from swarmwire.deploy.record.recording import Recording
+from swarmwire.deploy.config import Recording, Runners
 from swarmwire.deploy.record.scenario_copy import changed_files
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, read_campaign
 
 

@@ -10,9 +10,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.design import Point
 from swarmwire.deploy.campaign.spec import Plan, overrides_of
 from swarmwire.deploy.campaign.store import new_folder
-from swarmwire.deploy.record import machine
-from swarmwire.deploy.record.modules import changed_modules, module_digests
-from swarmwire.deploy.record.new_folder import stamped_folder
+from swarmwire.deploy.record.folder import stamped_folder
+from swarmwire.deploy.record.provenance import changes_since, cpu, module_digests, versions
 from swarmwire.deploy.record.scenario_copy import Copies, changed_files, copied_mapping, copy_scenario
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Campaign, CopiedFile, Provenance, write_campaign
 from swarmwire.world.scenario.scenario import Scenario
@@ -67,8 +66,8 @@ def provenance(
         "scenario": scenario.name,
         "command": command,
         "began_utc": WallClock().utc_stamp(),
-        "versions": machine.versions(),
-        "cpu": machine.cpu(),
+        "versions": versions(),
+        "cpu": cpu(),
         "modules": module_digests(code),
         "files": files,
     }
@@ -103,13 +102,7 @@ def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
 
 def code_changes(begun: Provenance) -> list[str]:
     """Code, versions and CPU that are not as at the beginning, a line each."""
-    versions, code = machine.versions(), [f"{module}:" for module in begun.modules]
-    changed = [name for name in begun.versions if begun.versions[name] != versions.get(name)]
-    return [
-        *changed_modules(begun.modules, module_digests(code)),
-        *(f"{name} is {versions.get(name, 'not there')}; it was {begun.versions[name]}" for name in changed),
-        *([f"the CPU is {machine.cpu()}; it was {begun.cpu}"] if machine.cpu() != begun.cpu else []),
-    ]
+    return changes_since(begun.modules, begun.versions, begun.cpu, [f"{module}:" for module in begun.modules])
 
 
 def check_same(plan: Plan, campaign: Campaign, folder: Path) -> None:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from swarmwire.deploy.arguments import SeedsGiven, seed_list
 from swarmwire.deploy.campaign.design import GRID, vary_from
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.campaign.start import begin, check_resumable, check_same, default_folder
 from swarmwire.deploy.campaign.store import CampaignFolder, locked
 from swarmwire.deploy.campaign.worker import Task, TaskResult
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.config import SeedsGiven, seed_list
+from swarmwire.deploy.controls import Interrupt
 from swarmwire.metrics.campaign.spec import FAILED, SCENARIO_FOLDER, Campaign, read_campaign
 from swarmwire.world.scenario.scenario import Scenario
 

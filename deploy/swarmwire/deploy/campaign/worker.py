@@ -22,8 +22,8 @@ from swarmwire.comms.errors import Interrupted
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.campaign.columns import Row, failed_row, row_of
-from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.record import machine
+from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.record import provenance
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.writer import PARQUET
@@ -206,4 +206,4 @@ def _parquet(frame: Any) -> bytes:
 
 @cache
 def _machine() -> Row:
-    return {"machine_cpu": machine.cpu(), "machine_host": platform.node()}
+    return {"machine_cpu": provenance.cpu(), "machine_host": platform.node()}

@@ -36,8 +36,7 @@ from swarmwire.deploy.cli.sweep import sweep_command
 from swarmwire.deploy.cli.tune import tune_command
 from swarmwire.deploy.cli.view import ui_command, view_command
 from swarmwire.deploy.cli.world import world_command
-from swarmwire.deploy.kept_memory import share_heaps
-from swarmwire.deploy.refusals import refusal
+from swarmwire.deploy.host import refusal, share_heaps
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"

@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 
 from swarmwire.comms.errors import Interrupted
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.controls import Interrupt
 
 FAILED = 1  # the run failed: an agent's error, a runner lost
 DIFFERENT = 1  # a repetition came out differently, or there is nothing to compare it with

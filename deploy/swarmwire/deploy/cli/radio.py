@@ -229,7 +229,7 @@ def _probe_scenario(
     # Imported here: pydantic and numba take a second, which --help should not.
     from rich.console import Console
 
-    from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.radio.coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.metrics.drawing.canvas import check_picture
 
@@ -265,7 +265,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
     from rich.console import Console
 
     from swarmwire.comms.radio.analysis.contention import contention as contend
-    from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.radio.probe import radio_of
 
     radio = radio_of(preset, settings)

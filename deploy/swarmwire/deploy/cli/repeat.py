@@ -35,8 +35,8 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaign.repeat import CampaignRun
-    from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.record.recording import Recording, packet_share
+    from swarmwire.deploy.config import Recording, packet_share
+    from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.repetition import RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.campaign.spec import ABOUT
@@ -67,7 +67,7 @@ def repeat_command(
 
 def _repeat_of_campaign(repeated: "CampaignRun", out: Path | None, console: Console) -> None:
     """Run it again, tell how it came out, and leave with the exit code that says so."""
-    from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.terminal.progress import run_progress
 
     simulation = repeated.simulation

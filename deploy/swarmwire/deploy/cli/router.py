@@ -95,7 +95,7 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
 
     from swarmwire.comms.clock import WallClock, to_ns
     from swarmwire.comms.wire.sessions import closed_after, listens_at, open_router
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.controls import Interrupt
 
     clock = WallClock()
     with Interrupt() as interrupt:

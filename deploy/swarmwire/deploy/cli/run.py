@@ -38,8 +38,11 @@ from swarmwire.deploy.cli.options import (
 from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swarmwire.comms.interfaces import Observer
+    from swarmwire.deploy.config import RunConfig
     from swarmwire.deploy.result import Result
-    from swarmwire.deploy.simulation import Simulation
 
 
 def run_command(
@@ -78,12 +81,9 @@ def run_command(
     --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.arguments import choose_seeds
-    from swarmwire.deploy.compiling import compiling_told
+    from swarmwire.deploy.config import Recording, RunConfig, choose_seeds, packet_share
     from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
-    from swarmwire.deploy.record.new_folder import default_folder
-    from swarmwire.deploy.record.recording import Recording, packet_share
-    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.deploy.record.folder import default_folder
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:
@@ -93,57 +93,54 @@ def run_command(
         if name not in checked.robot_names():
             raise BadInput("--revoked", name, "expected a robot of the scenario")
     member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
-    gateways = gateways_of_options(gateway or [], gateway_set or [], swarm, member)
     chosen = choose_seeds(checked, seed, seeds)
-    folder = out or default_folder(scenario.stem, chosen)
-    console = Console(quiet=quiet, highlight=False)
-    with compiling_told(console):
-        simulation = Simulation(
-            checked,
-            seeds=chosen,
-            runners=runners,
-            out=folder,
-            socket=socket,
-            realtime=realtime,
-            subtick=subtick,
-            gateways=gateways,
-            record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
-        )
-        result = run_shown(simulation, folder, console, view=view, ui=ui)
-    if result.ended == "interrupted":
-        raise typer.Exit(INTERRUPTED)
+    config = RunConfig(
+        checked,
+        seeds=chosen,
+        runners=runners,
+        out=out or default_folder(scenario.stem, chosen),
+        socket=socket,
+        realtime=realtime,
+        subtick=subtick,
+        gateways=gateways_of_options(gateway or [], gateway_set or [], swarm, member),
+        record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
+    )
+    run_shown(config, Console(quiet=quiet, highlight=False), view=view, ui=ui)
 
 
 def run_shown(
-    simulation: "Simulation", folder: Path, console: Console, *, view: bool = False, ui: bool = False
-) -> "Result":
-    """The result of the run, told and shown while it goes on and afterwards."""
+    config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
+) -> None:
+    """Run a scenario into its folder, shown while it goes on and afterwards."""
     from swarmwire.deploy.control.run_finder import Announced
+    from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.live.live_view import LiveView
     from swarmwire.deploy.page.beside import PageBeside
-    from swarmwire.deploy.running import finished
+    from swarmwire.deploy.simulation import Simulation, finished
     from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result
 
-    simulation.watch(Announced(folder))
-    simulation.watch(RobotsTold(simulation, console))
-    simulation.watch(run_progress(simulation, console))
-    with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
-        for wanted, beside in ((view, live), (ui, page)):
-            if wanted:
-                simulation.watch(beside)
-        with leaving_when_hung_up(simulation.interrupt):
-            result = finished(simulation)
-        print_result(result, simulation.metrics.metrics, console)
-        if simulation.record_failed:
-            raise simulation.record_failed
-        _say_where(result, folder, console)
-        for beside, name in ((live, "view"), (page, "page")):
-            if beside.pid is not None:
-                console.print(f"the {name} stays open: close it, or press Ctrl-C, to end it")
-        live.wait()
-        page.wait()
-    return result
+    folder = Path(config.out or "")
+    with compiling_told(console):
+        simulation = Simulation(config)
+        with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
+            beside = [(live, "view")] * view + [(page, "page")] * ui
+            shown = [Announced(folder), RobotsTold(simulation, console), run_progress(simulation, console)]
+            for observer in (*observers, *shown, *(opened for opened, _ in beside)):
+                simulation.watch(observer)
+            with leaving_when_hung_up(simulation.interrupt):
+                result = finished(simulation)
+            print_result(result, simulation.metrics.metrics, console)
+            if simulation.record_failed:
+                raise simulation.record_failed
+            _say_where(result, folder, console)
+            for opened, name in beside:
+                if opened.pid is not None:
+                    console.print(f"the {name} stays open: close it, or press Ctrl-C, to end it")
+            live.wait()
+            page.wait()
+    if result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
 
 
 def _say_where(result: "Result", folder: Path, console: Console) -> None:

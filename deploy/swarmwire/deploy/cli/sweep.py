@@ -80,10 +80,10 @@ def sweep_command(
     refused before anything was run; 130: interrupted.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.arguments import seed_list
     from swarmwire.deploy.campaign.start import default_folder
     from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep, resume_sweep
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.config import seed_list
+    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
     from swarmwire.deploy.terminal.sweep_report import print_sweep
 
@@ -116,9 +116,9 @@ def _plan(
     source: Path | None, vary: Sequence[str], seeds: str | None, overrides: Sequence[str], given: Mapping[str, Any]
 ) -> "Plan | None":
     """The campaign that options and file describe, checked; options override the file. None: neither is there."""
-    from swarmwire.deploy.arguments import SEEDS, seed_list
     from swarmwire.deploy.campaign.design import vary_of
     from swarmwire.deploy.campaign.spec import SweepSpec, campaign_file, plan_of, spec_in
+    from swarmwire.deploy.config import SEEDS, seed_list
 
     if source is None:
         if vary or seeds or overrides:

@@ -92,7 +92,7 @@ def tune_command(
     }  # fmt: skip
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.terminal.sweep_progress import sweep_progress
     from swarmwire.deploy.terminal.tune_progress import tune_progress
     from swarmwire.deploy.terminal.tune_report import print_tuned
@@ -131,7 +131,7 @@ def _plan(
     numbers: Mapping[str, int | None],
 ) -> "TuningPlan":
     """The tuning that options describe, checked; `seeds` are those of the trials and the fresh ones."""
-    from swarmwire.deploy.arguments import seed_list
+    from swarmwire.deploy.config import seed_list
     from swarmwire.deploy.tuning.spec import TuningSpec, fresh_seeds, search_of, tuning_plan
 
     if scenario is None:

@@ -28,7 +28,7 @@ def view_command(
     Opens a window if there is a screen; else prints an address for a browser on this machine.
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.live.viewer import ViewOptions, has_screen
 
     VIEW.need("view")
@@ -94,7 +94,7 @@ def ui_command(
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
     from swarmwire.deploy.control.remote_control import only_run_at
     from swarmwire.deploy.control.run_finder import find_run
-    from swarmwire.deploy.interrupt import Interrupt
+    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.live.following import Live
     from swarmwire.deploy.live.viewer import ViewOptions
     from swarmwire.deploy.page.showing_page import show_page

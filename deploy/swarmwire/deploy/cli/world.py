@@ -33,7 +33,6 @@ from swarmwire.deploy.cli.options import (
     Ui,
     View,
 )
-from swarmwire.deploy.cli.process import INTERRUPTED
 from swarmwire.deploy.cli.run import run_shown
 
 if TYPE_CHECKING:
@@ -93,13 +92,9 @@ def world_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.comms.wire.access_control import WORLD, RunAccess
-    from swarmwire.deploy.arguments import choose_seeds
     from swarmwire.deploy.certificates.member import member
-    from swarmwire.deploy.compiling import compiling_told
-    from swarmwire.deploy.listening import Listening
-    from swarmwire.deploy.record.new_folder import default_folder
-    from swarmwire.deploy.record.recording import Recording, packet_share
-    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.deploy.config import Listening, Recording, RunConfig, choose_seeds, packet_share
+    from swarmwire.deploy.record.folder import default_folder
     from swarmwire.deploy.terminal.progress import Gathering
     from swarmwire.world.scenario_file import load_scenario
 
@@ -122,23 +117,20 @@ def world_command(
     )
     _warn(of, [*listen, *(observe or ())])
     chosen = choose_seeds(checked, seed, seeds)
-    folder = out or default_folder(scenario.stem, chosen)
     console = Console(quiet=quiet, highlight=False)
     robots = tuple(robot for _ in chosen for robot in checked.robot_names())
-    with Gathering(robots, start_with, of.network, console) as gathering, compiling_told(console):
-        simulation = Simulation(
+    at, seen_at = tuple(listen), tuple(observe or ())
+    with Gathering(robots, start_with, of.network, console) as gathering:
+        config = RunConfig(
             checked,
             seeds=chosen,
-            out=folder,
+            out=out or default_folder(scenario.stem, chosen),
             realtime=realtime,
             subtick=subtick,
             record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
-            listening=Listening(tuple(listen), tuple(observe or ()), of.network, of.access, start_with, told=gathering),
+            listening=Listening(at, seen_at, of.network, of.access, start_with, observer=gathering),
         )
-        simulation.watch(gathering)
-        result = run_shown(simulation, folder, console, view=view, ui=ui)
-    if result.ended == "interrupted":
-        raise typer.Exit(INTERRUPTED)
+        run_shown(config, console, [gathering], view=view, ui=ui)
 
 
 def _warn(of: "Member", endpoints: list[str]) -> None:

@@ -23,9 +23,9 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
-from swarmwire.deploy.endpoint import local_endpoint
 from swarmwire.deploy.live.following import Live, forget_live
 from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
+from swarmwire.deploy.runners import local_endpoint
 from swarmwire.metrics.viewer.plots import Measured
 from swarmwire.metrics.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings

@@ -14,6 +14,7 @@ from swarmwire.comms.clock import Clock, WallClock, to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.comms.wire.network import Network, is_local
+from swarmwire.deploy.config import JoinObserver
 from swarmwire.deploy.gateways.serving import ServedRobot
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
@@ -68,7 +69,7 @@ class ProgressLines(Observer):
         self._console.print(text, markup=False, soft_wrap=True)
 
 
-class Gathering(Observer):
+class Gathering(Observer, JoinObserver):
     """Told of runners that come and go, and an observer, since the waiting is over when a run begins.
 
     Who came or went and who was refused is said by the run itself; here it is what is still missing.
@@ -99,9 +100,6 @@ class Gathering(Observer):
         """Say who is missing."""
         if change.tick < 0:
             self._tell(free)
-
-    def refused(self, runner: str, why: str) -> None:
-        """The run says it."""
 
     def begin(self, static: Static) -> None:
         """Nobody is waited for any more."""

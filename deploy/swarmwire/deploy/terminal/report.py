@@ -61,9 +61,9 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
 
 
 def _who(result: Result) -> str:
-    if not result.gateways:
+    if not result.facts.gateways:
         return "all agents in this process"
-    return "behind gateways: " + ", ".join(f"{group} ({kind})" for group, kind in result.gateways.items())
+    return "behind gateways: " + ", ".join(f"{group} ({kind})" for group, kind in result.facts.gateways.items())
 
 
 def _add_stops(table: Table, result: Result) -> None:
@@ -114,7 +114,7 @@ def _lag(lag_s: float) -> str:
 def _longer(result: Result, factor: float) -> str:
     """By how much it took longer than was asked for: behind gateways, where nobody changed the speed meanwhile."""
     longer_s = result.wall_time_s - result.sim_time_s / factor
-    return f", took {_lag(longer_s)} longer" if result.gateways and longer_s >= SHOWN_S else ""
+    return f", took {_lag(longer_s)} longer" if result.facts.gateways and longer_s >= SHOWN_S else ""
 
 
 def _add_radio(table: Table, arena: ArenaResult) -> None:

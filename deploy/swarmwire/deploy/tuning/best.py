@@ -16,7 +16,7 @@ from swarmwire.deploy.campaign.schedule import Executor
 from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 from swarmwire.deploy.campaign.store import storing
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, Observer, Sweep, begin_sweep, resume_sweep
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.scenario_copy import FILES, copy_scenario
 from swarmwire.deploy.tuning.goal import Goal
 from swarmwire.deploy.tuning.spec import Tuning, scenario_file

@@ -15,8 +15,8 @@ from swarmwire.deploy.campaign.start import check_resumable, copied_overrides, p
 from swarmwire.deploy.campaign.store import locked, new_folder, storing
 from swarmwire.deploy.campaign.sweep import Observer
 from swarmwire.deploy.campaign.worker import Row, Task, TaskResult
-from swarmwire.deploy.interrupt import Interrupt
-from swarmwire.deploy.record.new_folder import stamped_folder
+from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.record.folder import stamped_folder
 from swarmwire.deploy.record.scenario_copy import Copies, copy_scenario
 from swarmwire.deploy.tuning.best import CheckRun, FreshCheck, best_of, write_best
 from swarmwire.deploy.tuning.goal import Goal, sample_of

@@ -9,10 +9,10 @@ from typing import Any
 
 from swarmwire.comms.config import did_you_mean, read_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.arguments import LARGEST_SEED, seed_list
 from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaign.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, plan_of
+from swarmwire.deploy.config import LARGEST_SEED, seed_list
 from swarmwire.deploy.tuning.goal import Goal, goal_of
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Provenance, value_text

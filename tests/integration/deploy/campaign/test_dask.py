@@ -25,9 +25,9 @@ from tests.support.deploy.commands import called
 ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
 LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]
 ODD = """
-from swarmwire.deploy.record import machine
-found = machine.versions()
-machine.versions = lambda: {**found, 'numpy': '1.0'}
+from swarmwire.deploy.record import provenance
+found = provenance.versions()
+provenance.versions = lambda: {**found, 'numpy': '1.0'}
 """
 HANGING = """
 from swarmwire.agent import Agent

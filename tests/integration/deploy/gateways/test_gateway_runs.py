@@ -42,7 +42,7 @@ def test_robots_do_what_programs_tell_them_and_others_what_their_agents_decide(s
 def test_the_summary_says_that_it_was_real_time_and_which_gateways_there_were(scenario, scripted, tmp_path) -> None:
     result = driven(scenario, scripted, tmp_path / "run").result
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert (result.mode, result.gateways) == ("realtime", {"other": "scripted"})
+    assert (result.mode, result.facts.gateways) == ("realtime", {"other": "scripted"})
     assert (summary["mode"], summary["gateways"], summary["realtime"]["factor"]) == (
         "realtime",
         {"other": "scripted"},

@@ -34,7 +34,7 @@ def test_they_find_one_heading_together(tmp_path) -> None:
     scenario = tmp_path / "mixed.toml"
     scenario.write_text(MIXED)
     result = driven(scenario, {"outside": "epuck2"}, tmp_path / "run", pace=4.0)
-    assert result.gateways == {"outside": "epuck2"}
+    assert result.facts.gateways == {"outside": "epuck2"}
     order = result.metrics["order"]
     assert (order.min or 0.0) < 0.6
     assert (order.final or 0.0) > 0.9

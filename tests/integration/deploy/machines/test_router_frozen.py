@@ -8,9 +8,8 @@ import pytest
 
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.deploy import run
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import HERE, Joiners, Watcher
 from tests.support.deploy.machines.on_machines import Started, on
@@ -54,7 +53,7 @@ def joiners(tmp_path):
 
 def simulation_of(joiners, act, *overrides):
     simulation = Simulation(
-        LOSSY, overrides=[*joiners.overrides, "duration_s=2", *overrides], listening=Listening(HERE, told=joiners)
+        LOSSY, overrides=[*joiners.overrides, "duration_s=2", *overrides], listening=Listening(HERE, observer=joiners)
     )
     simulation.watch(Watcher((lambda truth: truth.tick == 8, act)))
     return simulation

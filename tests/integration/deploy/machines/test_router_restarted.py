@@ -6,9 +6,8 @@ from pathlib import Path
 
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.certificates.member import access_in, network_in
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.registry import RunnerEvent
 from tests.integration.deploy.machines.test_three_machines import lab
 from tests.support.deploy.commands import LOSSY
@@ -72,7 +71,7 @@ def test_the_run_goes_on_where_it_was_and_says_what_happened(tmp_path):
         joiners = BehindRouter(tmp_path, certs, opened)
         opened.callback(joiners.close)
         at = ("tls/127.0.0.1:0",)
-        listening = Listening(at, network=network_in(certs, "world"), access=access_in(certs), told=joiners)
+        listening = Listening(at, network=network_in(certs, "world"), access=access_in(certs), observer=joiners)
         overrides = [*joiners.overrides, *SHORT]
         simulation = Simulation(LOSSY, overrides=overrides, listening=listening, out=tmp_path / "run")
         simulation.watch(Watcher((lambda truth: truth.tick == 8, joiners.kill_router)))

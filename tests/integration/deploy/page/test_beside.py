@@ -10,8 +10,7 @@ from rich.console import Console
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.page.beside import PageBeside
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.deploy.commands import LOSSY, called
 from tests.support.waiting import until
 

@@ -14,7 +14,7 @@ KILLED = """
 import sys
 from pathlib import Path
 from swarmwire.deploy.campaign.sweep import NoObserver
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.tuning.run import TuneObservers, begin_tune
 from tests.support.deploy.tuning.small import plan_of
 class Watcher:

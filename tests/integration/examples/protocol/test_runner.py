@@ -15,8 +15,8 @@ from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms import packets
 from swarmwire.comms.wire import frames
 from swarmwire.deploy import backends, repeat, run
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.runners import RunnerProcesses
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.integration.examples.test_examples import EXAMPLES
@@ -122,7 +122,7 @@ def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Pa
     joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
     flock = EXAMPLES / "protocol" / "flock.toml"
     with closing(joiners):
-        listening = Listening(HERE, told=joiners)
+        listening = Listening(HERE, observer=joiners)
         result = run(flock, overrides=["duration_s=3"], listening=listening, out=tmp_path / "run")
     assert result.runner_events[0].runner == "foreign"
     assert result.inputs is not None

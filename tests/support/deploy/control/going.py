@@ -6,11 +6,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from swarmwire.deploy.config import Recording
 from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import Live, read_live
-from swarmwire.deploy.record.recording import Recording
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.deploy.commands import LOSSY
 from tests.support.waiting import until
 

@@ -20,8 +20,8 @@ from swarmwire.deploy import Recording, Result, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import certificate_request
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.running import finished
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.simulation import finished
 from swarmwire.world.backends.registry import RunnerEvent
 from tests.support.deploy.commands import LOSSY
 
@@ -61,7 +61,11 @@ class GuardedWorld(Observer):
     def run(self, out: Path) -> Result:
         """The run, to its end; what went wrong while it was disturbed is raised here."""
         listening = Listening(
-            ("tls/127.0.0.1:0",), (self.observed,), network_in(self._certs, "world"), access_in(self._certs), told=self
+            ("tls/127.0.0.1:0",),
+            (self.observed,),
+            network_in(self._certs, "world"),
+            access_in(self._certs),
+            observer=self,
         )
         record = Recording(tables=False, rrd=False)
         simulation = Simulation(LOSSY, overrides=SHORT, listening=listening, out=out, record=record)

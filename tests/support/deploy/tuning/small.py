@@ -6,11 +6,11 @@ from typing import Any
 
 import polars as pl
 
-from swarmwire.deploy.arguments import seed_list
 from swarmwire.deploy.campaign.schedule import Finished
 from swarmwire.deploy.campaign.sweep import NoObserver
 from swarmwire.deploy.campaign.worker import Row, Task, TaskResult
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.config import seed_list
+from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, resume_tune
 from swarmwire.deploy.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
 from swarmwire.world.scenario.scenario import mapping_of

@@ -14,14 +14,13 @@ from swarmwire.comms.bodies import body as body_module
 from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.deploy.agents import agent_specs, check_agents
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.release import robot_settings
-from swarmwire.deploy.measuring import measuring
 from swarmwire.deploy.radio.link_trace_file import scenario_traces
+from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
-from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.deploy.config import JoinObserver
 from tests.support.deploy.watching import WATCHER
 from tests.tools.soak.agenda import Agenda, Steps
 from tests.tools.soak.invariants import Broken
@@ -21,7 +21,7 @@ AGAIN_S = 0.3
 ENDS = {0, 1, 130, -signal.SIGKILL, -signal.SIGINT}  # 1: it was told why; SIGINT: while Python was still starting
 
 
-class Actors(threading.Thread, Observer):
+class Actors(threading.Thread, Observer, JoinObserver):
     """Runners, router and observers of a schedule. They are told of the world as its onlookers are.
 
     Attributes:
@@ -57,12 +57,6 @@ class Actors(threading.Thread, Observer):
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
         """The world listens."""
         self._world = endpoints[0]
-
-    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
-        """A runner came or went."""
-
-    def refused(self, runner: str, why: str) -> None:
-        """Whoever comes back before its loss was noticed is refused, and comes again."""
 
     def begin(self, static: object) -> None:
         """The run is about to begin."""

@@ -6,10 +6,8 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.record.recording import Recording
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.config import Listening, Recording
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.tools.soak import invariants
 from tests.tools.soak.place import SCENARIO, environment
 from tests.tools.soak.schedules.actors import Actors
@@ -28,7 +26,7 @@ def play_joined(plan: Plan, folder: Path) -> list[str]:
             out=folder / "run",
             realtime=plan.speed if plan.family == "real time" else None,
             record=Recording(rrd=False),
-            listening=Listening(("tcp/127.0.0.1:0",), start_with=_start_with(plan), told=actors),
+            listening=Listening(("tcp/127.0.0.1:0",), start_with=_start_with(plan), observer=actors),
         )
         if plan.family != "real time":
             simulation.controls.set_speed(plan.speed)

@@ -8,9 +8,8 @@ from pathlib import Path
 import psutil
 
 from swarmwire.comms.errors import RunnerLost
-from swarmwire.deploy.record.recording import Recording
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.config import Recording
+from swarmwire.deploy.simulation import Simulation, finished
 from tests.tools.soak import invariants
 from tests.tools.soak.agenda import Steps
 from tests.tools.soak.place import SCENARIO

@@ -5,7 +5,7 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.campaign.worker import ALIVE_S, Alive, Task, run_task
-from swarmwire.deploy.interrupt import Interrupt
+from swarmwire.deploy.controls import Interrupt
 from tests.support.clocks import FakeClock
 
 

@@ -6,10 +6,15 @@ from threading import Barrier
 
 import pytest
 
+from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.record.new_folder import make_folder
+from swarmwire.deploy.record.folder import RunFolder
 
 RUNS = 4
+
+
+def take(folder: Path) -> None:
+    RunFolder(folder, WallClock()).failed_to_start(RuntimeError, RuntimeError("no agents"), None)
 
 
 @pytest.mark.parametrize("exists", [False, True])
@@ -25,7 +30,7 @@ def test_of_runs_that_find_a_folder_empty_at_once_one_gets_it(tmp_path, monkeypa
 
     monkeypatch.setattr(Path, "iterdir", look)
     with ThreadPoolExecutor(RUNS) as runs:
-        refusals = [run.exception() for run in [runs.submit(make_folder, folder) for _ in range(RUNS)]]
+        refusals = [run.exception() for run in [runs.submit(take, folder) for _ in range(RUNS)]]
     refused = [refusal for refusal in refusals if refusal is not None]
     assert len(refused) == RUNS - 1
     assert {type(refusal) for refusal in refused} == {BadInput}

@@ -7,8 +7,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Simulation, repeat
+from swarmwire.deploy.config import Recording
 from swarmwire.deploy.record.live_events import LiveEventsLog, read_live_events
-from swarmwire.deploy.record.recording import Recording
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.support.deploy.commands import LOSSY

@@ -90,9 +90,9 @@ def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
     def rows(gateways: dict[str, str]) -> tuple[str, str]:
         out = StringIO()
         late = RealTimeReport(1.0, 2, 9.9924)
-        run = replace(
-            result, ticks=600, sim_time_s=60.0, wall_time_s=80.64, mode="realtime", realtime=late, gateways=gateways
-        )
+        facts = replace(result.facts, gateways=gateways)
+        took = {"ticks": 600, "sim_time_s": 60.0, "wall_time_s": 80.64}
+        run = replace(result, **took, mode="realtime", realtime=late, facts=facts)
         print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
         return row(out.getvalue(), "simulated").partition(" (")[0], row(out.getvalue(), "real time")
 

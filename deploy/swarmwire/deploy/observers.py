@@ -1,20 +1,22 @@
-"""Observers cannot break a run: one that raises is reported, counted and left out from then on."""
+"""Observers that every run has: a guard around each other observer, and a warning about packets that are too large."""
 
 import traceback
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.deploy.refusals import refusal
+from swarmwire.deploy.host import refusal
 
 
 class Guarded(Observer):
-    """An observer whose errors end with it."""
+    """An observer that, once it raises, is reported, counted and left out; the run goes on."""
 
     def __init__(self, observer: Observer, say: Callable[[str], None]) -> None:
-        """`say` is told what failed."""
         self._observer, self._say = observer, say
         self.failed, self.before_agents = False, observer.before_agents
 
@@ -49,6 +51,28 @@ class Guarded(Observer):
 
 
 def _why(error: BaseException) -> str:
-    """In a line, if it is no fault of the observer's; else with the traceback."""
+    """In a line, if the machine or the input is at fault; else with the traceback."""
     told = str(error) if isinstance(error, SwarmwireError) else refusal(error)
     return f" {told}; the run goes on without it" if told else f"\n{traceback.format_exc()}"
+
+
+class TooLarge(Observer):
+    """Warns once of a packet above the medium's largest payload, which is never sent: an agent's mistake."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._told = False
+
+    def begin(self, static: Static) -> None:
+        """The run is about to start."""
+        self._names = static.robot_names
+
+    def see(self, truth: Truth) -> None:
+        """Warn of the first one."""
+        if self._told or truth.finished is None or truth.tally is None:
+            return
+        if truth.tally.fates[:, Fate.TOO_LARGE].any():
+            finished, self._told = truth.finished, True
+            first = np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0]
+            who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
+            self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")

@@ -21,7 +21,7 @@ TICKS = 5  # by which packets of the first have come, and are over
 PACKET = b"\0"
 
 
-def rehearse(world: World, medium: RadioMedium | None, metrics: Iterable[Metric]) -> None:
+def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric]) -> None:
     """Run a world and a medium that nobody needs any more: every robot drives and sends, and metrics are measured."""
     observers = [Metrics(tuple(metrics)), RadioTally()]
     for observer in observers:

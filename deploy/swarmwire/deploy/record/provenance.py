@@ -1,0 +1,178 @@
+"""From what a run was made: `run.json`, written before the first tick; enough to run a killed run again.
+
+Equal trajectory hashes are promised for one CPU type with the same code and the same versions only, so these are named.
+"""
+
+import hashlib
+import importlib
+import json
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.config import check_format, from_json
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.record.scenario_copy import changed_files
+from swarmwire.metrics.atomic import write_text
+from swarmwire.metrics.campaign.spec import CopiedFile
+from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, MetricInfo, metric_infos
+
+PACKAGES = ("swarmwire-comms", "numpy", "numba", "pymunk", "eclipse-zenoh", "msgpack")
+PARTS = ("swarmwire.comms", "swarmwire.agent", "swarmwire.world", "swarmwire.metrics", "swarmwire.deploy")
+SOURCES = (".py", ".toml")  # code, and the data sheets of bodies
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """From what a run was made, in the order of `run.json`. Paths are within the run folder."""
+
+    seeds: tuple[int, ...]  # of the arenas, in order
+    ticks: int  # that the run was to have
+    runners: int  # 0: all agents in the world's process
+    realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as may be
+    files: tuple[CopiedFile, ...]  # in the run folder, from which the run can be repeated
+    modules: Mapping[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
+    cpu: str
+    versions: Mapping[str, str]
+    gateways: Mapping[str, str]  # by group: the kind of its gateway, where it has one
+    metrics: tuple[MetricInfo, ...]  # that were measured
+    subtick_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
+
+    def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
+        """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
+        return [*changed_files(self.files, folder), *changes_since(self.modules, self.versions, self.cpu, code)]
+
+    def write(self, folder: Path) -> None:
+        """Write `run.json` into the run folder."""
+        write_text(folder / RUN_JSON, json.dumps({"format": RUN_FORMAT, **asdict(self)}, indent=2) + "\n")
+
+
+def read_facts(folder: Path) -> RunFacts:
+    """The facts of the run of this folder; BadInput if there are none."""
+    path = folder / RUN_JSON
+    if not folder.is_dir():
+        raise BadInput(str(folder), "", "expected a run folder: there is none")
+    try:
+        found: Any = from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(str(folder), "", f"expected a run folder, with its {RUN_JSON}: {error.strerror}") from None
+    except ValueError:  # no JSON, or no UTF-8
+        found = None
+    try:
+        check_format(found, RUN_FORMAT, str(path))
+        return _facts_in(found)
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
+
+
+def _facts_in(found: dict[str, Any]) -> RunFacts:
+    seeds, ticks, runners = tuple(int(seed) for seed in found["seeds"]), int(found["ticks"]), int(found["runners"])
+    if not seeds or len(set(seeds)) < len(seeds) or min(*seeds, ticks, runners) < 0:
+        raise ValueError(seeds)
+    return RunFacts(
+        seeds=seeds,
+        ticks=ticks,
+        runners=runners,
+        realtime=None if found["realtime"] is None else float(found["realtime"]),
+        files=tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
+        modules=dict(found["modules"]),
+        cpu=str(found["cpu"]),
+        versions=dict(found["versions"]),
+        gateways=dict(found["gateways"]),
+        metrics=metric_infos(found),
+        subtick_s=None if found["subtick_s"] is None else float(found["subtick_s"]),
+    )
+
+
+def known_fields(kind: type[Any], found: Mapping[str, Any]) -> dict[str, Any]:
+    """All fields of this dataclass; KeyError if one is missing. Others are passed over: added ones keep the format."""
+    return {field.name: found[field.name] for field in fields(kind)}
+
+
+def cpu() -> str:
+    """The CPU's model and the vector instructions that numpy uses on it."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        lines = info.read_text(encoding="utf-8").splitlines()
+        model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), model)
+    return f"{model} ({_simd()})"
+
+
+def versions() -> dict[str, str]:
+    """Python and the packages whose arithmetic a run depends on."""
+    return {"python": platform.python_version(), **{package: _version(package) for package in PACKAGES}}
+
+
+def _simd() -> str:
+    from numpy.lib import introspect
+
+    targets = introspect.opt_func_info(func_name="^sin$", signature="float64")
+    found = [target["current"] for target in targets.get("sin", {}).values() if target.get("current")]
+    return found[0].split(" ")[-1] if found else "baseline"
+
+
+_version = cache(version)  # reading one takes longer than a tick
+
+
+def module_digests(specs: Iterable[str]) -> dict[str, str]:
+    """sha256 by module: of swarmwire's parts, and of the outermost package around each "package.module:Class".
+
+    The digest is over the source files on the disk, sorted by name; a module that is no package is its one file. Agents
+    may be edited and loaded anew while a process lives, so theirs are read each time; swarmwire's own, hundreds of
+    files, once. What these packages import from others in turn is not followed.
+    """
+    places = [spec.rpartition(":")[0] for spec in specs]
+    own = [_outermost(place) for place in places if not place.endswith(".py")]
+    return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted({*own} - {*PARTS})}
+
+
+def changes_since(
+    modules_then: Mapping[str, str], versions_then: Mapping[str, str], cpu_then: str, code: Iterable[str]
+) -> list[str]:
+    """What differs from these digests, versions and CPU, a line each; `code`: specs of users' classes."""
+    digests, now = module_digests(code), versions()
+    return [
+        *(f"module {name} has changed since" for name, then in modules_then.items() if digests.get(name) != then),
+        *(
+            f"{name} is {now.get(name, 'not there')}; it was {then}"
+            for name, then in versions_then.items()
+            if now.get(name) != then
+        ),
+        *([f"the CPU is {cpu()}; it was {cpu_then}"] if cpu() != cpu_then else []),
+    ]
+
+
+def _outermost(module: str) -> str:
+    """The first part of a dotted name that has a source of its own: `swarmwire` alone is only a name space."""
+    names = module.split(".")
+    wholes = (".".join(names[: count + 1]) for count in range(len(names)))
+    return next((whole for whole in wholes if _origin(whole) is not None), module)
+
+
+def _origin(module: str) -> Path | None:
+    try:
+        file: str | None = getattr(importlib.import_module(module), "__file__", None)
+    except ImportError:  # it was there when the run began, and is no more
+        return None
+    return Path(file) if file else None
+
+
+def _digest(module: str) -> str:
+    """Of nothing where a module has no file: built into Python, whose version is named elsewhere."""
+    origin, whole = _origin(module), hashlib.sha256()
+    if origin is not None:
+        root = origin.parent
+        is_package = origin.name == "__init__.py"
+        files = (path for path in root.rglob("*") if path.suffix in SOURCES) if is_package else (origin,)
+        for path in sorted(files, key=lambda path: path.relative_to(root).as_posix()):
+            whole.update(f"{path.relative_to(root).as_posix()}\0".encode())
+            whole.update(hashlib.sha256(path.read_bytes()).digest())
+    return whole.hexdigest()
+
+
+_digest_once = cache(_digest)
