@@ -20,9 +20,8 @@ from swarmwire.deploy import Recording, Result, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import certificate_request
-from swarmwire.deploy.config import Listening
+from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.simulation import finished
-from swarmwire.world.backends.registry import RunnerEvent
 from tests.support.deploy.commands import LOSSY
 
 SHORT = ["duration_s=2"]
@@ -43,7 +42,7 @@ def authority(folder: Path) -> Path:
     return folder
 
 
-class GuardedWorld(Observer):
+class GuardedWorld(Observer, JoinObserver):
     """Told where the world listens, it brings the honest runners; an observer, it disturbs the run once.
 
     Attributes:
@@ -92,12 +91,6 @@ class GuardedWorld(Observer):
             robots = tuple(f"flock-{i}" for i in range(10 * place, 10 * place + 10))
             self._threads.append(threading.Thread(target=self._play, args=(name, robots)))
             self._threads[-1].start()
-
-    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
-        """Runners come and go."""
-
-    def refused(self, name: str, why: str) -> None:
-        """It is counted, too."""
 
     def see(self, truth: Truth) -> None:
         if truth.tick != AT_TICK - 1:
