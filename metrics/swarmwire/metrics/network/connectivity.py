@@ -34,12 +34,7 @@ class ComponentCount(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _components
-
-
-def _components(view: TickView) -> FloatArray | float:
-    found = view.components
-    return np.nan if found is None else found.pieces.astype(np.float64)
+        return lambda view: np.nan if view.components is None else view.components.pieces.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -57,12 +52,7 @@ class LargestComponent(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _largest_component
-
-
-def _largest_component(view: TickView) -> FloatArray | float:
-    found = view.components
-    return np.nan if found is None else found.largest / view.per_robot_alive
+        return lambda view: np.nan if view.components is None else view.components.largest / view.per_robot_alive
 
 
 @dataclass(frozen=True)

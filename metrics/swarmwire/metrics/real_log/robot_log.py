@@ -47,115 +47,6 @@ class AboutRobot:
     radio_kind: str  # "world": the packets went over a run's radio
 
 
-def read_about_robot(path: Path) -> AboutRobot:
-    """What the file says; BadInput if it is none, is damaged, or is of another format."""
-    try:
-        found: object = from_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(str(path.parent), path.name, "expected a robot's log: the file is missing") from None
-    except (OSError, ValueError) as error:
-        raise BadInput(str(path), "", f"expected what a robot says of itself: {error}") from None
-    if not isinstance(found, dict):
-        raise BadInput(str(path), "", "expected an object")
-    told = cast("dict[str, Any]", found)
-    check_format(told, LOG_FORMAT, str(path))
-    return _about_robot(told, str(path))
-
-
-def _about_robot(told: dict[str, Any], where: str) -> AboutRobot:
-    def get(name: str, kind: type | tuple[type, ...], expected: str) -> Any:
-        value = told.get(name)
-        if not isinstance(value, kind) or isinstance(value, bool):
-            raise BadInput(where, name, f"expected {expected}")
-        return value
-
-    names: list[Any] = get("robots", list, "a list of names")
-    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-        raise BadInput(where, "robots", "expected a list of names, each once")
-    name = get("name", str, "a name")
-    if name not in names:
-        raise BadInput(where, "name", f"expected one of robots, got {name!r}")
-    rate_hz = float(get("rate_hz", (int, float), "a rate in Hz"))
-    if not (isfinite(rate_hz) and rate_hz > 0.0):
-        raise BadInput(where, "rate_hz", f"expected more than 0 Hz, got {rate_hz:g}")
-    radio: dict[str, Any] = get("radio", dict, "an object")
-    if not isinstance(radio.get("kind"), str):
-        raise BadInput(where, "radio.kind", "expected a text")
-    return AboutRobot(
-        name=name,
-        swarm=get("swarm", str, "the swarm's name"),
-        robots=tuple(names),
-        agent=get("agent", str, "the agent's class"),
-        agent_sha256=get("agent_sha256", str, "a digest"),
-        params=get("params", dict, "an object"),
-        body=body_from_mapping(get("body", dict, "a body's sheet"), where),
-        rate_hz=rate_hz,
-        started_utc_ns=get("started_utc_ns", int, "whole nanoseconds since 1970"),
-        radio_kind=radio["kind"],
-    )
-
-
-class LogTable(MeasuredTable):
-    """The whole lines of a file, of which there may be none.
-
-    Attributes:
-        half_line: whether the file ended in half a line, which was dropped.
-    """
-
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Read the file, all columns as texts; BadInput unless it has these columns, or if a line has others."""
-        import polars as pl
-
-        self.where = str(path)
-        whole, half = _whole_lines(path)
-        self.half_line = half
-        try:
-            self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
-        except corruption_errors() as error:
-            raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
-        self.need(columns)
-
-    def __len__(self) -> int:
-        return len(self._frame)
-
-    def known(self, column: str, expected: str) -> FloatArray:
-        """A column (rows,) without empty fields; BadInput where there is one."""
-        values = self.numbers(column)
-        self.refuse_where(np.isnan(values), column, f"expected {expected}")
-        return values
-
-    def times_s(self) -> FloatArray:
-        """The column t_s (rows,), UTC since 1970; BadInput for what is no time."""
-        values = self.known("t_s", "a time in s")
-        self.refuse_where(np.abs(values) >= LATEST_S, "t_s", "expected a time in s since 1970")
-        return values
-
-    def whole_numbers(self, column: str) -> IntArray:
-        """A column (rows,) of whole numbers; BadInput for others."""
-        values = self.known(column, "a whole number")
-        self.refuse_where((np.abs(values) >= 2.0**53) | (values % 1 != 0), column, "expected a whole number")
-        return values.astype(np.int64)
-
-    def words(self, column: str) -> list[str]:
-        """A column (rows,) of texts, of which some may be empty."""
-        return self._frame[column].fill_null("").to_list()
-
-
-def _whole_lines(path: Path) -> tuple[bytes, bool]:
-    """The lines that were written to their end, and whether there was half of one more."""
-    try:
-        whole, end, half = path.read_bytes().rpartition(b"\n")
-    except OSError as error:
-        raise BadInput(str(path), "", f"expected a table of a robot's log: {error.strerror}") from None
-    return whole + end, bool(half)
-
-
-def _empty(columns: Sequence[str]) -> "pl.DataFrame":
-    import polars as pl
-
-    return pl.DataFrame(schema=dict.fromkeys(columns, pl.String))
-
-
 @dataclass(frozen=True)
 class Steps:
     """A row per step of the robot, in the order of time."""
@@ -238,6 +129,67 @@ def read_robot_log(folder: Path) -> RobotLog:
     return RobotLog(about, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves)
 
 
+def read_about_robot(path: Path) -> AboutRobot:
+    """What the file says; BadInput if it is none, is damaged, or is of another format."""
+    try:
+        found: object = from_json(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadInput(str(path.parent), path.name, "expected a robot's log: the file is missing") from None
+    except (OSError, ValueError) as error:
+        raise BadInput(str(path), "", f"expected what a robot says of itself: {error}") from None
+    if not isinstance(found, dict):
+        raise BadInput(str(path), "", "expected an object")
+    told = cast("dict[str, Any]", found)
+    check_format(told, LOG_FORMAT, str(path))
+    return _about_robot(told, str(path))
+
+
+class LogTable(MeasuredTable):
+    """The whole lines of a file, of which there may be none.
+
+    Attributes:
+        half_line: whether the file ended in half a line, which was dropped.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        """Read the file, all columns as texts; BadInput unless it has these columns, or if a line has others."""
+        import polars as pl
+
+        self.where = str(path)
+        whole, half = _whole_lines(path)
+        self.half_line = half
+        try:
+            self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
+        except corruption_errors() as error:
+            raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
+        self.need(columns)
+
+    def __len__(self) -> int:
+        return len(self._frame)
+
+    def known(self, column: str, expected: str) -> FloatArray:
+        """A column (rows,) without empty fields; BadInput where there is one."""
+        values = self.numbers(column)
+        self.refuse_where(np.isnan(values), column, f"expected {expected}")
+        return values
+
+    def times_s(self) -> FloatArray:
+        """The column t_s (rows,), UTC since 1970; BadInput for what is no time."""
+        values = self.known("t_s", "a time in s")
+        self.refuse_where(np.abs(values) >= LATEST_S, "t_s", "expected a time in s since 1970")
+        return values
+
+    def whole_numbers(self, column: str) -> IntArray:
+        """A column (rows,) of whole numbers; BadInput for others."""
+        values = self.known(column, "a whole number")
+        self.refuse_where((np.abs(values) >= 2.0**53) | (values % 1 != 0), column, "expected a whole number")
+        return values.astype(np.int64)
+
+    def words(self, column: str) -> list[str]:
+        """A column (rows,) of texts, of which some may be empty."""
+        return self._frame[column].fill_null("").to_list()
+
+
 def received_packets(table: LogTable) -> ReceivedPackets:
     """The rows of a received.csv, whose columns latency_s and distance_m may be missing."""
     nothing = np.full(len(table), np.nan)
@@ -255,6 +207,54 @@ def received_packets(table: LogTable) -> ReceivedPackets:
         latency_s,
         distance_m,
     )
+
+
+def _about_robot(told: dict[str, Any], where: str) -> AboutRobot:
+    def get(name: str, kind: type | tuple[type, ...], expected: str) -> Any:
+        value = told.get(name)
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise BadInput(where, name, f"expected {expected}")
+        return value
+
+    names: list[Any] = get("robots", list, "a list of names")
+    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        raise BadInput(where, "robots", "expected a list of names, each once")
+    name = get("name", str, "a name")
+    if name not in names:
+        raise BadInput(where, "name", f"expected one of robots, got {name!r}")
+    rate_hz = float(get("rate_hz", (int, float), "a rate in Hz"))
+    if not (isfinite(rate_hz) and rate_hz > 0.0):
+        raise BadInput(where, "rate_hz", f"expected more than 0 Hz, got {rate_hz:g}")
+    radio: dict[str, Any] = get("radio", dict, "an object")
+    if not isinstance(radio.get("kind"), str):
+        raise BadInput(where, "radio.kind", "expected a text")
+    return AboutRobot(
+        name=name,
+        swarm=get("swarm", str, "the swarm's name"),
+        robots=tuple(names),
+        agent=get("agent", str, "the agent's class"),
+        agent_sha256=get("agent_sha256", str, "a digest"),
+        params=get("params", dict, "an object"),
+        body=body_from_mapping(get("body", dict, "a body's sheet"), where),
+        rate_hz=rate_hz,
+        started_utc_ns=get("started_utc_ns", int, "whole nanoseconds since 1970"),
+        radio_kind=radio["kind"],
+    )
+
+
+def _whole_lines(path: Path) -> tuple[bytes, bool]:
+    """The lines that were written to their end, and whether there was half of one more."""
+    try:
+        whole, end, half = path.read_bytes().rpartition(b"\n")
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a table of a robot's log: {error.strerror}") from None
+    return whole + end, bool(half)
+
+
+def _empty(columns: Sequence[str]) -> "pl.DataFrame":
+    import polars as pl
+
+    return pl.DataFrame(schema=dict.fromkeys(columns, pl.String))
 
 
 def _steps(table: LogTable) -> Steps:

@@ -51,12 +51,6 @@ class EventLog(Observer):
         return {"events": self._events}
 
 
-def names(event: EventRecord, static: Static) -> list[list[str]]:
-    """The names of the robots that an event changed, a list per arena."""
-    changed = event.changed.reshape(static.arenas, static.robots)
-    return [[static.robot_names[index] for index in np.flatnonzero(own)] for own in changed]
-
-
 class Events(Table):
     """A row per event and arena.
 
@@ -101,13 +95,6 @@ class Events(Table):
         return None
 
 
-def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
-    """In how many arenas, of so many ticks, an event of the summary has a row."""
-    if not event["singly"]:
-        return sum(event["tick"] < done for done in ticks)
-    return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
-
-
 class EventRecorder(Observer):
     """Observer that writes `events.parquet`; what happens in a tick is on disk soon after.
 
@@ -147,6 +134,19 @@ class EventRecorder(Observer):
         """Join the parts."""
         self._writer.close()
         return {"record_events": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
+
+
+def names(event: EventRecord, static: Static) -> list[list[str]]:
+    """The names of the robots that an event changed, a list per arena."""
+    changed = event.changed.reshape(static.arenas, static.robots)
+    return [[static.robot_names[index] for index in np.flatnonzero(own)] for own in changed]
+
+
+def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
+    """In how many arenas, of so many ticks, an event of the summary has a row."""
+    if not event["singly"]:
+        return sum(event["tick"] < done for done in ticks)
+    return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
 
 
 def _frame(rows: list[dict[str, Any]]) -> "pl.DataFrame":

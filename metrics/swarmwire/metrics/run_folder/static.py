@@ -17,6 +17,17 @@ from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.run_folder.layout import STATIC, TABLES_FORMAT
 
 
+class StaticRecorder(Observer):
+    """Observer that writes `static.json`, before the first tick. No summary part."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def begin(self, static: Static) -> None:
+        """Write it."""
+        write_static(static, self._folder / STATIC)
+
+
 def write_static(static: Static, path: Path) -> None:
     """Write it aside, then rename, so that no half of it is ever seen."""
     write_text(path, json.dumps({"format": TABLES_FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
@@ -85,14 +96,3 @@ def _plain(item: Mapping[str, object]) -> dict[str, Any]:
 def _as_tuples(value: object) -> object:
     """JSON has lists where these dataclasses have tuples."""
     return tuple(_as_tuples(item) for item in cast("list[object]", value)) if isinstance(value, list) else value
-
-
-class StaticRecorder(Observer):
-    """Observer that writes `static.json`, before the first tick. No summary part."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def begin(self, static: Static) -> None:
-        """Write it."""
-        write_static(static, self._folder / STATIC)

@@ -33,19 +33,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
-CHUNK_BYTES = 4_000_000
+CHUNK_BYTES = 32_000_000  # joining parts costs three times as much as writing them
 MAX_TICKS = 4096  # in a chunk, however small the swarm
-
-
-def robot_columns(static: Static) -> tuple[str, ...]:
-    """The columns that are lists with an item per robot."""
-    sideways = any(isinstance(group.body.drive, Holonomic) for group in static.groups)
-    return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
-
-
-def movable_columns(static: Static) -> tuple[str, ...]:
-    """The columns that are lists with an item per movable obstacle."""
-    return MOVABLE if static.movable else ()
 
 
 class Ticks(Table):
@@ -107,35 +96,56 @@ class Ticks(Table):
         return _compare_finals(table.filter(tick == tick.max().over("arena")).sort("arena").collect(), summary)
 
 
-def _compare_finals(last: "pl.DataFrame", summary: Mapping[str, Any]) -> Verdict:
-    measured: list[dict[str, Any]] = per_arena(summary, "metrics")
-    for arena, metrics in enumerate(measured):
-        for name, statistics in metrics.items():
-            found = last[name][arena] if name in last.columns else "no column"
-            if found != statistics["final"]:
-                return State.DIFFERS, f"{name} ends at {found} (arena {arena}); the summary has {statistics['final']}"
-    return None
+class TickRecorder(Observer):
+    """Observer that writes `ticks.parquet`, a row per tick and arena, without holding the loop up for the disk.
 
+    An arena that has left has no more rows.
 
-def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> "dict[str, Any]":
-    """The type of each column, for a run of these robots and movable obstacles with these metrics."""
-    import polars as pl
+    Its metrics' columns are what `metrics` has measured, so that must see each tick before. Summary part:
+    `record_ticks`: rows written, and rows dropped for want of time (in real time only). Raises RecordFailed once the
+    disk refuses.
+    """
 
-    robots = static.robots
-    motion = [name for name in robot_columns(static) if name in MOTION]
-    return {
-        "tick": pl.Int64,
-        "time_s": pl.Float64,
-        "arena": pl.Int32,
-        "seed": pl.Int64,
-        **dict.fromkeys(motion, pl.Array(pl.Float32, robots)),
-        "alive": pl.Array(pl.Boolean, robots),
-        "state": pl.Array(pl.String, robots),
-        **({VALUE: pl.Array(pl.Float64, robots)} if with_value else {}),
-        **dict.fromkeys(movable_columns(static), pl.Array(pl.Float32, static.movable)),
-        **dict.fromkeys(metrics, pl.Float64),
-        **dict.fromkeys(RADIO, pl.Int64),
-    }
+    def __init__(self, folder: Path, metrics: Metrics, clock: Clock, may_drop: bool = False) -> None:
+        """Record into this run folder; a chunk is closed by size, or 2 s of `clock` after it was begun."""
+        self._folder, self._metrics, self._clock, self._may_drop = folder, metrics, clock, may_drop
+
+    def begin(self, static: Static) -> None:
+        """Open the table; BadInput if a metric is named like another column."""
+        self._names = [metric.name for metric in self._metrics.metrics]
+        for name in self._names:
+            if name in (*KEYS, *robot_columns(static), VALUE, *movable_columns(static), *RADIO):
+                raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
+        self._static = static
+        rows = static.arenas * static.robots
+        self._ticks = min(MAX_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
+        schema = tick_schema(static, self._names)
+        self._writer = TableWriter(self._folder, "ticks", schema, self._may_drop)
+        self._limit = ChunkLimit(self._ticks, self._clock)
+        self._columns = self._new_columns()
+
+    def see(self, truth: Truth) -> None:
+        """Take one tick."""
+        self._columns.add(truth, self._metrics.values)
+        if self._limit.reached(self._columns.ticks):
+            self._hand_over()
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Write what is left and join the parts."""
+        try:
+            if self._columns.ticks:
+                self._hand_over()
+        finally:
+            self._writer.close()
+        return {"record_ticks": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
+
+    def _hand_over(self) -> None:
+        columns, self._columns = self._columns, self._new_columns()
+        self._writer.put(Chunk(columns.rows, columns.frame))
+        self._limit.restart()
+
+    def _new_columns(self) -> "TickColumns":
+        return TickColumns(self._static, self._names, self._ticks)
 
 
 class TickColumns:
@@ -220,53 +230,43 @@ class TickColumns:
         return whole if running.all() else whole.filter(pl.Series(running))
 
 
-class TickRecorder(Observer):
-    """Observer that writes `ticks.parquet`, a row per tick and arena, without holding the loop up for the disk.
+def robot_columns(static: Static) -> tuple[str, ...]:
+    """The columns that are lists with an item per robot."""
+    sideways = any(isinstance(group.body.drive, Holonomic) for group in static.groups)
+    return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
 
-    An arena that has left has no more rows.
 
-    Its metrics' columns are what `metrics` has measured, so that must see each tick before. Summary part:
-    `record_ticks`: rows written, and rows dropped for want of time (in real time only). Raises RecordFailed once the
-    disk refuses.
-    """
+def movable_columns(static: Static) -> tuple[str, ...]:
+    """The columns that are lists with an item per movable obstacle."""
+    return MOVABLE if static.movable else ()
 
-    def __init__(self, folder: Path, metrics: Metrics, clock: Clock, may_drop: bool = False) -> None:
-        """Record into this run folder; a chunk is closed by size, or 2 s of `clock` after it was begun."""
-        self._folder, self._metrics, self._clock, self._may_drop = folder, metrics, clock, may_drop
 
-    def begin(self, static: Static) -> None:
-        """Open the table; BadInput if a metric is named like another column."""
-        self._names = [metric.name for metric in self._metrics.metrics]
-        for name in self._names:
-            if name in (*KEYS, *robot_columns(static), VALUE, *movable_columns(static), *RADIO):
-                raise BadInput("", f"metrics.{name}", "expected another name: ticks.parquet has a column of this name")
-        self._static = static
-        rows = static.arenas * static.robots
-        self._ticks = min(MAX_TICKS, max(1, CHUNK_BYTES // (rows * BYTES_PER_ROBOT)))
-        schema = tick_schema(static, self._names)
-        self._writer = TableWriter(self._folder, "ticks", schema, self._may_drop)
-        self._limit = ChunkLimit(self._ticks, self._clock)
-        self._columns = self._new_columns()
+def _compare_finals(last: "pl.DataFrame", summary: Mapping[str, Any]) -> Verdict:
+    measured: list[dict[str, Any]] = per_arena(summary, "metrics")
+    for arena, metrics in enumerate(measured):
+        for name, statistics in metrics.items():
+            found = last[name][arena] if name in last.columns else "no column"
+            if found != statistics["final"]:
+                return State.DIFFERS, f"{name} ends at {found} (arena {arena}); the summary has {statistics['final']}"
+    return None
 
-    def see(self, truth: Truth) -> None:
-        """Take one tick."""
-        self._columns.add(truth, self._metrics.values)
-        if self._limit.reached(self._columns.ticks):
-            self._hand_over()
 
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Write what is left and join the parts."""
-        try:
-            if self._columns.ticks:
-                self._hand_over()
-        finally:
-            self._writer.close()
-        return {"record_ticks": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
+def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> "dict[str, Any]":
+    """The type of each column, for a run of these robots and movable obstacles with these metrics."""
+    import polars as pl
 
-    def _hand_over(self) -> None:
-        columns, self._columns = self._columns, self._new_columns()
-        self._writer.put(Chunk(columns.rows, columns.frame))
-        self._limit.restart()
-
-    def _new_columns(self) -> TickColumns:
-        return TickColumns(self._static, self._names, self._ticks)
+    robots = static.robots
+    motion = [name for name in robot_columns(static) if name in MOTION]
+    return {
+        "tick": pl.Int64,
+        "time_s": pl.Float64,
+        "arena": pl.Int32,
+        "seed": pl.Int64,
+        **dict.fromkeys(motion, pl.Array(pl.Float32, robots)),
+        "alive": pl.Array(pl.Boolean, robots),
+        "state": pl.Array(pl.String, robots),
+        **({VALUE: pl.Array(pl.Float64, robots)} if with_value else {}),
+        **dict.fromkeys(movable_columns(static), pl.Array(pl.Float32, static.movable)),
+        **dict.fromkeys(metrics, pl.Float64),
+        **dict.fromkeys(RADIO, pl.Int64),
+    }

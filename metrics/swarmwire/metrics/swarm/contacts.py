@@ -31,7 +31,7 @@ class Collisions(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _with_robots
+        return lambda view: view.truth.contact_onsets[:, 0].astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,7 @@ class WallContacts(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _with_walls
-
-
-def _with_robots(view: TickView) -> FloatArray:
-    return view.truth.contact_onsets[:, 0].astype(np.float64)
-
-
-def _with_walls(view: TickView) -> FloatArray:
-    return view.truth.contact_onsets[:, 1].astype(np.float64)
+        return lambda view: view.truth.contact_onsets[:, 1].astype(np.float64)
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,7 @@ class Order(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _order
-
-
-def _order(view: TickView) -> FloatArray:
-    return agreement(*view.direction, view.alive, False)
+        return lambda view: agreement(*view.direction, view.alive, False)
 
 
 @dataclass(frozen=True)
@@ -58,11 +54,7 @@ class OrderVelocity(Metric):
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure; nothing is remembered."""
-        return _order_velocity
-
-
-def _order_velocity(view: TickView) -> FloatArray:
-    return agreement(view.velocity[:, :, 0], view.velocity[:, :, 1], view.alive, True)
+        return lambda view: agreement(view.velocity[:, :, 0], view.velocity[:, :, 1], view.alive, True)
 
 
 @dataclass(frozen=True)
