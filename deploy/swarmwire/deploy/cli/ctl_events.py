@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
 
@@ -258,6 +257,8 @@ def end_command(
 
 
 def _table(text: str) -> dict[str, Any]:
+    from swarmwire.comms.config import from_toml
+
     try:
         found = from_toml(f"event = {text}")
     except tomllib.TOMLDecodeError as error:

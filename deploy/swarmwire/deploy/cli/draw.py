@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.comms.config import from_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import USUAL_SIZE_PX, Overrides, Seed
 
@@ -70,6 +69,8 @@ def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
 
 def _is_sheet(path: Path) -> bool:
     """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
+    from swarmwire.comms.config import from_toml
+
     try:
         found = from_toml(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):

@@ -1,6 +1,5 @@
 """`swarmwire robots`: what runs on a fleet of real robots, over SSH, on all at the same time."""
 
-import asyncio
 import json
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict
@@ -48,6 +47,8 @@ T = TypeVar("T")
 
 def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays."""
+    import asyncio  # here, as --help should not wait for it
+
     from swarmwire.deploy.fleet.result import shown_on
 
     async def run() -> T:
