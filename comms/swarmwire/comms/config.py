@@ -100,16 +100,17 @@ class ExplainedEnum(IntEnum):
 
 
 def did_you_mean(known: Iterable[str], name: object = None) -> str:
-    """The text "one of a, b, c" for an error about an unknown `name`, with a suggestion if a known name is close to it.
+    """The text "one of a, b, c" for an error about an unknown `name`; a known name close to it stands first.
 
-    >>> did_you_mean(["range_m", "loss"], "range")
-    'one of range_m, loss (did you mean range_m?)'
+    >>> did_you_mean(["loss", "range_m", "model"], "range")
+    'one of range_m (did you mean this?), loss, model'
     """
     names = list(known)
     if not names:
         return "none"
     close = get_close_matches(name, names, n=1) if isinstance(name, str) else []
-    return f"one of {', '.join(names)}" + "".join(f" (did you mean {match}?)" for match in close)
+    first = [f"{match} (did you mean this?)" for match in close]
+    return f"one of {', '.join([*first, *(known for known in names if known not in close)])}"
 
 
 def from_json(text: str | bytes) -> Any:

@@ -147,7 +147,7 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
         (["--fps", "5"], "--fps", ".gif, .mp4"),
         (["--to", "a.gif", "--at", "1"], "--at", ".png"),
         (["--to", "a.gif", "--kind", "arena"], "--kind", "film"),
-        (["--kind", "arenas"], "--kind", "arena, delivery, viewer (did you mean arena?)"),
+        (["--kind", "arenas"], "--kind", "arena (did you mean this?), delivery, viewer"),
         (["--to", "a.gif", "--until", "9"], "--until", "0 to 2.9 s"),
         (["--arena", "1"], "RUN: arena", "0 to 0"),
         (["--metric", "ordr"], "--metric: ordr", "order, min_gap"),

@@ -106,7 +106,7 @@ def test_an_experiment_may_digest_by_itself(places):
         (
             'COLUMNS = ("radio.link_pdr",)',
             'COLUMNS = ("radio.link_pdf",)',
-            "radio.link_pdf: .*did you mean radio.link_pdr",
+            "radio.link_pdf: .*radio.link_pdr \\(did you mean this",
         ),
         ('COLUMNS = ("radio.link_pdr",)', "", "COLUMNS: is missing"),
     ],
@@ -126,7 +126,7 @@ def test_a_page_needs_one_place_for_the_numbers(places):
 
 def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
     assert names(places) == ("two-received",)
-    with pytest.raises(BadInput, match="did you mean two-received"):
+    with pytest.raises(BadInput, match="two-received \\(did you mean this"):
         find_experiment("two-receive", places)
     with pytest.raises(BadInput, match="expected a campaign's folder"):
         digest(find_experiment("two_received", places), places, [tmp_path / "two-losses"])

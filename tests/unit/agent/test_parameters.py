@@ -211,7 +211,7 @@ def test_an_unknown_parameter_is_refused_with_those_there_are() -> None:
     error = refused_declared({"speed_mps": 1.0, "sped": 1})
     assert error.key == "sped"
     assert error.expected == (
-        "unknown parameter of Parametrised; expected one of speed_mps, count, eager, word (did you mean speed_mps?)"
+        "unknown parameter of Parametrised; expected one of speed_mps (did you mean this?), count, eager, word"
     )
     assert refused_declared({"x": 1}, Stateless).expected == "unknown parameter of Stateless; expected none"
     assert refused_declared({"speed_mps": 1.0, "needs": 1}).key == "needs"

@@ -17,25 +17,29 @@ PRESETS = (
     "gz-rfcomms, subt, kilobot, acoustic"
 )
 KINDS = (
-    "bodies, drives, body-keys, sensors, behaviours, events, metrics, radio, presets, stages, fates, engines, drivers, "
-    "gateways, keys"
+    "bodies, drives, body-keys, sensors, behaviours, fields, events, metrics, radio, presets, stages, fates, engines, "
+    "drivers, gateways, keys"
 )
+OTHER_PRESETS = PRESETS.replace("wifi-b-1M, ", "")
 PARAMETERS = "speed_mps, separation_m, cohesion, alignment, avoidance, forward, turn_gain_per_s"
 OF_SETTINGS = [
     ("seed", "expected path=value, such as robots.flock.count=30"),
     ("name.x=1", "name.x: name holds no keys"),
     ("duration_s=inf", "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
     ("radio={}", "radio.range_m: is missing; expected a number above 0 (m), as the model unit disk has one"),
-    ("radio.preset='wifi'", f"radio.preset: expected one of {PRESETS} (did you mean wifi-b-1M?), got 'wifi'"),
+    (
+        "radio.preset='wifi'",
+        f"radio.preset: expected one of wifi-b-1M (did you mean this?), {OTHER_PRESETS}, got 'wifi'",
+    ),
     (
         "robots.flock.cuont=3",
-        "robots.flock.cuont: unknown key; expected one of body, body_overrides, count, agent, act_every_ticks, params, "
-        "radio, place (did you mean count?)",
+        "robots.flock.cuont: unknown key; expected one of count (did you mean this?), body, body_overrides, agent, "
+        "act_every_ticks, params, radio, place",
     ),
     ("events=[{at_s=1}]", f"events.0.do: is missing; expected one of {DO}"),
     (
         "events=[{at_s=1, do='kill', robots={group='flok'}}]",
-        "events.0.robots.group: expected one of flock (did you mean flock?); got 'flok'",
+        "events.0.robots.group: expected one of flock (did you mean this?); got 'flok'",
     ),
     (
         "arena.obstacles=[{shape='polygon', at=[0, 0], points=[[0, 0], [1, 1], [1, 0], [0, 1]]}]",
@@ -50,8 +54,8 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
     ),
     (
         "robots.flock.params.separation=1",
-        f"robots.flock.params.separation: unknown parameter of Flocking; expected one of {PARAMETERS} "
-        "(did you mean separation_m?)",
+        f"robots.flock.params.separation: unknown parameter of Flocking; expected one of separation_m "
+        f"(did you mean this?), {PARAMETERS.replace('separation_m, ', '')}",
     ),
     (
         "radio.measures={}",

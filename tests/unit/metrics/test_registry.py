@@ -91,7 +91,7 @@ def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed
         (item("ordre", x=1), "metrics.0.metric", "did you mean order?"),
         (stop("ordr"), "stop.metric", "did you mean order?"),
         (item("mine.py"), "metrics.0", "mine.py"),
-        (item("fragmentations", hold=1), "metrics.0.hold", "did you mean hold_s?"),
+        (item("fragmentations", hold=1), "metrics.0.hold", "hold_s (did you mean this?)"),
         (item("fragmentations", hold_s=-1), "metrics.0.hold_s", "-1.0"),
         (item("fragmentations", hold_s="x"), "metrics.0.hold_s", "'x'"),
         (item("order", gap_m=1), "metrics.0.gap_m", "none"),

@@ -31,7 +31,7 @@ REFUSED = {
     "--param linear=1": "--param linear: unknown parameter of Driving",
     "--param linear_mps=fast": "--param linear_mps: expected a number, got 'fast'",
     "--param linear_mps": "--param: expected a name and its value",
-    "--option gonne=true": "--option gonne: unknown key; expected one of gone (did you mean gone?)",
+    "--option gonne=true": "--option gonne: unknown key; expected one of gone (did you mean this?)",
     "--body epukc": "--body: expected one of",
     "--body mine.toml": "--body: expected a readable file",
     "--address nowhere": "--address: expected the path of a file; got 'nowhere'",

@@ -233,7 +233,7 @@ def test_a_long_value_is_shown_by_its_beginning(value, shown):
         ({"v": 2, "do": "pause"}, "v: expected version 1"),
         ({"v": 0, "do": "pause"}, "v: expected version 1"),
         ({"v": 1}, "do: expected one of pause, resume"),
-        ({"v": 1, "do": "paus"}, "did you mean pause?"),
+        ({"v": 1, "do": "paus"}, "pause (did you mean this?)"),
         ({"v": 1, "do": ["pause"]}, "do: expected one of"),
         ({"v": 1, "do": "pause", "n": 1}, "n: unknown key of 'pause'; expected none"),
         ({"v": 1, "do": "step", "n": 0}, "n: expected a whole number of ticks from 1 to"),

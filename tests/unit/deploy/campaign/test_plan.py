@@ -48,7 +48,7 @@ def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
 @pytest.mark.parametrize(
     ("texts", "told"),
     [
-        (["radio.losss=0,0.5"], r"--vary radio.losss=0,0.5: radio.losss: unknown key; .*did you mean loss"),
+        (["radio.losss=0,0.5"], r"--vary radio.losss=0,0.5: radio.losss: unknown key; .*loss \(did you mean this"),
         (["robots.pair.params.sepa=1,2"], r"--vary robots.pair.params.sepa=1,2: .*sepa: "),
         (["robots.par.count=1,2"], r"--vary robots.par.count=1,2: robots.par.body: "),
         (["robots.pair.count.x=1,2"], r"--vary robots.pair.count.x=1,2: .*robots.pair.count"),

@@ -75,5 +75,5 @@ def test_a_machine_with_its_own_files_alone_needs_no_register(issued, tmp_path):
 def test_a_purpose_that_nobody_looks_for_is_refused():
     for purpose in PURPOSES:
         assert certificate_request("a", purpose=purpose).purpose == purpose
-    with pytest.raises(BadInput, match="did you mean runner"):
+    with pytest.raises(BadInput, match=r"runner \(did you mean this"):
         certificate_request("a", purpose="runer")
