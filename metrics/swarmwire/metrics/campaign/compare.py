@@ -16,7 +16,8 @@ from swarmwire.metrics.campaign.select import Selection, point_pairs, shared_pat
 from swarmwire.metrics.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.sample import LEVEL
-from swarmwire.metrics.statistics.summary import Summary, interval_text, number_text, quartiles_text, summary
+from swarmwire.metrics.statistics.summary import Summary, interval_text, quartiles_text, summary
+from swarmwire.metrics.text import number_text
 
 
 @dataclass(frozen=True)

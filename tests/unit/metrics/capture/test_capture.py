@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import pcapng
-from swarmwire.metrics.capture.link_headers import link_of
-from swarmwire.metrics.capture.pcapng import Frame, frames_on_air
+from swarmwire.metrics.capture.link_headers import Frame, link_of
+from swarmwire.metrics.capture.pcapng import frames_on_air
 from swarmwire.metrics.run_folder.packets import Packets
 from tests.support.metrics.capture.reading import Captured, read
 from tests.unit.world.scenario.test_bodies import radio_of
