@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written under another name beside their place, then renamed.
+"""Atomic writes: a file is written under another name beside its place, then renamed.
 
 Against a killed process and a full disk; there is no sync to disk for a power cut.
 """
@@ -15,7 +15,7 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @contextmanager
 def atomic_write(to: Path) -> Generator[Path]:
-    """A path to write to; when the block ends well that file takes its place, which it may replace, else it is gone.
+    """A path to write to: its file replaces `to` when the block ends without error, else it is removed.
 
     OSError if nothing can be written there.
     """
@@ -29,7 +29,7 @@ def atomic_write(to: Path) -> Generator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file so that no half of it is ever seen; OSError if the disk will not."""
+    """Write a text file as a whole; OSError if the disk refuses."""
     with atomic_write(path) as aside:
         aside.write_text(text, encoding="utf-8")
 

@@ -47,7 +47,7 @@ class Metric(ABC):
 class Sampled(Metric):
     """A metric that is measured at the start, then in the first tick at or after each multiple of `every_s`.
 
-    In between it has the value of the last sample, whoever has died since; 0 samples every tick.
+    In between it has the value of the last sample, even if robots have died since; 0 samples every tick.
     """
 
     every_s: float = parameter(1.0, help="from one sample to the next; 0: every tick", unit="s", at_least=0.0)

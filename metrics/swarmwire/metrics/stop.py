@@ -1,4 +1,4 @@
-"""When an arena is over before its time: a metric that has compared as asked with a number for long enough."""
+"""Stop conditions: an arena ends early once a metric has been beyond a limit for long enough."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Condition:
 
 
 class StopConditions(Observer):
-    """Observer that finds arenas over.
+    """Observer that ends arenas.
 
     Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.
 

@@ -16,9 +16,9 @@ SUFFIXES = (".csv", ".parquet")
 
 
 def corruption_errors() -> tuple[type[BaseException], ...]:
-    """Its errors, and its panics: a damaged Parquet file may break what its own code takes for granted.
+    """What polars raises for a damaged file: its errors, and panics where its own assumptions break.
 
-    A panic is no Exception. polars tells of it on stderr, and goes on.
+    A panic is no Exception; polars also prints it on stderr.
     """
     import polars as pl
 
@@ -40,7 +40,7 @@ def read_parquet(file: Path, columns: list[str] | None = None, cure: str = "") -
 def refuse_corrupt(files: Iterable[Path], cure: str = "") -> None:
     """BadInput for the first of these Parquet files that is damaged, or has a column of another type than one before.
 
-    For where reading them together failed, which does not tell of which it did.
+    Used after reading them together failed, to find the file.
     """
     kinds: dict[str, pl.DataType] = {}
     for file in files:

@@ -1,4 +1,4 @@
-"""One tick as metrics see it: the truth, and what several metrics share, worked out once."""
+"""The view of one tick that metrics read: the truth, and values that several metrics share, computed once."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -74,7 +74,7 @@ class TickView:
         return _direction(self.pose)
 
     def once(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What `make` returned when it was first asked for by this key in this tick."""
+        """The value that `make` returns for this key, computed once a tick."""
         if key not in self._shared:
             self._shared[key] = make()
         return self._shared[key]

@@ -95,7 +95,7 @@ def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted
 class Fragmentations(OfFragmentation):
     """Times that the radio graph's components rose above 1 and stayed there for at least `hold_s`.
 
-    Counted at the end of that hold; what an event is, `metrics/network/fragmentation.py` says. NaN without a radio.
+    Counted at the end of that hold. NaN without a radio.
     """
 
     name = "fragmentations"
@@ -119,7 +119,7 @@ class Fragmentations(OfFragmentation):
 class Fragmented(OfFragmentation):
     """1 while a fragmentation event lasts, 0 else: its mean is the share of the time.
 
-    What an event is, `metrics/network/fragmentation.py` says. It is 1 from the tick in which the event is counted, as
+    It is 1 from the tick in which the event is counted, as
     nobody knows before that the split will last: the share of the time from falling apart to being whole again is this
     mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
     """

@@ -27,7 +27,7 @@ _BINS = 2 + math.ceil(math.log(LARGEST_NS) / _LOG_GROWTH)
 
 
 class Latencies:
-    """Tells the two latencies of each packet received.
+    """Computes the two latencies of each received packet.
 
     On air: from sending to hearing. To the agent: from sending to the start of the first tick, of those that begin
     when it was known to be received or later, at which the receiver acts.
@@ -65,8 +65,8 @@ def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
 class _Latency(OfWindow):
     """A mean in s over the packets received that became known in the last `window_s`, a broadcast once per receiver.
 
-    What a latency is, `metrics/network/latency.py` says; percentiles over the run stand in the summary's `radio`. 0
-    or more; NaN without a radio, or if nothing was received in the window.
+    Percentiles over the run are in the summary's `radio`. 0 or more; NaN without a radio, or if nothing
+    was received in the window.
     """
 
     unit = "s"

@@ -1,4 +1,4 @@
-"""Logs of real robots, measured: by the very metrics of a run."""
+"""Logs of real robots, measured by the metrics of a run."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ LACKS: dict[Need, str] = {
 
 @dataclass(frozen=True)
 class MeasuredLog:
-    """What metrics say of a log, tick by tick."""
+    """The metrics of a log, tick by tick."""
 
     static: Static
     duration_s: float
@@ -41,10 +41,9 @@ class MeasuredLog:
 def measured_log(
     logs: RealLogs, metrics: Sequence[Metric], place: Static | None = None, longest_s: float = math.inf
 ) -> MeasuredLog:
-    """Measure those of the metrics that the log can tell; BadInput where the robots did not run at the same time.
+    """Measure the metrics for which the log has the data; BadInput where the robots did not run at the same time.
 
-    `place` tells the arena that the robots were in, for metrics that ask for it. What comes after
-    `longest_s` is left out, of the radio's account, too.
+    `place` describes the arena, for metrics that need it. Ticks and packets after `longest_s` are left out.
     """
     run = real_run(logs, place)
     ticks = math.floor(min(longest_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1

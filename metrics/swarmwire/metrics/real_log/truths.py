@@ -24,7 +24,7 @@ from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
 from swarmwire.metrics.real_log.robot_log import RobotLog
 from swarmwire.metrics.real_log.time_base import TimeBase, poses_at, time_base
 
-MARGIN_M = 1.0  # around where the robots were, of an arena that nobody tells
+MARGIN_M = 1.0  # around where the robots were, of an arena that is unknown
 AFTER_ALL_NS = 2**62
 
 
@@ -89,7 +89,7 @@ class _Motion:
 
 
 def real_run(logs: RealLogs, place: Static | None = None) -> RealRun:
-    """The logs on their common time base; `place` tells the arena that the robots were in, if anything does.
+    """The logs on their common time base; `place` describes the arena, if known.
 
     BadInput where the robots did not run at the same time.
     """
@@ -180,7 +180,7 @@ class RadioTruth:
 
 
 def radio_truth(logs: RealLogs, base: TimeBase) -> RadioTruth:
-    """A loss is final as the packet is sent: nobody knows when it would have been received."""
+    """A loss is final when the packet is sent: logs do not say when it would have been received."""
     nodes = [Node(robot.name, robot.sent, robot.received, (base.start_s, base.end_s)) for robot in logs.robots]
     own = own_packets(nodes, logs.where)
     rows = _rows(link_packets(nodes, own), own, len(nodes), base)
@@ -213,7 +213,7 @@ def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: Ti
 
     to = with_large(links.to, [of.to[rows] for _, of, rows in large])
     sent_ns = with_large(_ns(links.sent_s, base), [_ns(of.sent_s[rows], base) for _, of, rows in large])
-    # A packet cannot arrive before it is sent, whatever clocks say.
+    # A packet cannot arrive before it is sent, whatever the clocks.
     final_ns = np.maximum(_ns(np.where(received, links.received_s, base.start_s), base), sent_ns[: len(received)])
     # Packets that may still have been received after the last tick are not lost.
     late = ~received & (links.sent_s > base.end_s - usual_latency_s(links))

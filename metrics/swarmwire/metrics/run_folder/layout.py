@@ -1,4 +1,4 @@
-"""The files of a run folder by name, their formats, and what run.json lists of the metrics."""
+"""The files of a run folder, their formats, the columns of `ticks`, and the metrics as run.json lists them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ STATIC = "static.json"  # arena, bodies and names: what does not change
 RECORDING = "run.rrd"  # for the viewer
 DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
 INPUTS = "inputs/actions.frames"  # what came from outside
-LIVE_EVENTS = "live_events.jsonl"  # what people did to it while it went on
-LOG = "log.txt"  # what people were told
+LIVE_EVENTS = "live_events.jsonl"  # commands of people during the run
+LOG = "log.txt"  # messages, each with its time
 DIGEST_BYTES = 8  # of each tick in DIGESTS
 SUMMARY_FORMAT = 1  # of summary.json
 RUN_FORMAT = 1  # of run.json
@@ -47,7 +47,7 @@ class MetricInfo:
 
 
 def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
-    """What it says of itself."""
+    """The information that run.json keeps of a metric."""
     least, largest = (None if bound is None or isinf(bound) else float(bound) for bound in metric.bounds)
     return MetricInfo(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
 

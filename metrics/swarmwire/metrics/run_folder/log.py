@@ -1,4 +1,4 @@
-"""`log.txt`: what people were told during a run, each line with the time at which they were."""
+"""`log.txt`: the messages of a run, each with its time."""
 
 from pathlib import Path
 

@@ -30,10 +30,10 @@ POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is 
 class Packets(Table):
     """A row per (packet, receiver within reach), if packets are recorded.
 
-    Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` tells how many it was meant
-    for), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns, final_at_ns,
-    fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air; null: unknown),
-    payload (bytes, the tag first).
+    Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
+    receivers), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns,
+    final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air;
+    null: unknown), payload (bytes, the tag first).
     """
 
     name = "packets"
@@ -54,7 +54,7 @@ class Packets(Table):
             "on_air_at_ns": pl.Int64,
             "final_at_ns": pl.Int64,
             "fate": pl.Enum(FATE_NAMES),
-            "rssi_dbm": pl.Float32,  # null: the radio knows none
+            "rssi_dbm": pl.Float32,  # null: unknown to the radio
             "size_bytes": pl.Int32,
             "topic": pl.String,
             "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept

@@ -42,7 +42,7 @@ class Ticks(Table):
 
     Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
     command_forward_mps, command_turn_radps (as applied) and, if a robot can move sideways, command_left_mps, all
-    float32, alive, state ("": none named); if a robot ever told a number, value (float64; null: none told); if
+    float32, alive, state ("": none named); if a robot ever noted a number, value (float64; null: none yet); if
     obstacles are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the
     scenario's order; each metric (a count's total so far; null: undefined); sent, received, in_range since the tick
     before (null without a radio).

@@ -242,7 +242,7 @@ def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck
     if whole.exists():
         fault = _file_fault(whole, columns)
         if fault is None:
-            # A run killed between the two leaves both; whoever reads takes the whole.
+            # A run killed between the two leaves both; readers take the whole.
             return TableCheck(State.INTACT, [whole], "its parts were not cleared away" if parts else "")
         return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():

@@ -1,7 +1,7 @@
 """A table on disk: numbered part files while a run goes on, one file once it is over.
 
-`NAME/part-000000.parquet` and so on become `NAME.parquet`. Each file is written aside and renamed, so whatever carries
-its name is whole: a Parquet file that is cut off is unreadable.
+`NAME/part-000000.parquet` and so on become `NAME.parquet`. Each file is written aside and renamed, so a file of that
+name is whole: a Parquet file that is cut off is unreadable.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,7 +37,7 @@ class TableWriter:
     """Writes a table of this name and schema (name to polars type) into a run folder.
 
     While the queue is full `put` holds its caller back, or, if it `may_drop`, drops the chunk and counts its rows. Once
-    the disk refuses a part, `put` and `close` say so by RecordFailed; what was written stays.
+    the disk refuses a part, `put` and `close` raise RecordFailed; what was written stays.
     """
 
     def __init__(self, folder: Path, name: str, schema: Mapping[str, Any], may_drop: bool = False) -> None:
@@ -76,7 +76,7 @@ class TableWriter:
     def _work(self) -> None:
         while (chunk := self._queue.get()) is not None:
             if self._fault is not None:
-                self.dropped += chunk.rows  # taken all the same, so that nobody waits for room
+                self.dropped += chunk.rows  # taken all the same, so that `put` does not wait for room
                 continue
             try:
                 self._write(chunk.frame())
@@ -105,7 +105,7 @@ class TableWriter:
 
 
 class ChunkLimit:
-    """Tells when a chunk is due that began when this was made or last `restart`ed."""
+    """Decides when the chunk is due that began at creation or at the last `restart`."""
 
     def __init__(self, size: int, clock: Clock, share: float = 0.0) -> None:
         """It is due at this size, in rows or bytes, or 2 s of `clock` after it began.
@@ -144,8 +144,8 @@ def parts_of(folder: Path, name: str) -> list[Path]:
 def scan_files(files: list[Path]) -> "pl.LazyFrame":
     """The rows of a table's files, one or more, in order.
 
-    What only later files have, since it was not there to be told before, is null in the rows of those before, of lists
-    of a fixed length each item. Raises what polars raises of files that are damaged or of other types.
+    A column that only later files have is null in the rows before; in a column of fixed-length lists each item is null.
+    Raises polars' errors for files that are damaged or have other types.
     """
     import polars as pl
 

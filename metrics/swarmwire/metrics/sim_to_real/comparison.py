@@ -217,7 +217,7 @@ _Number = tuple[str, str, str, Callable[[_Whole], float | None]]  # name, unit, 
 
 
 def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> str | None:
-    """Why numbers that only totals tell are not of the time that is compared; None: they are."""
+    """Why the totals of runs or log do not cover the compared time; None: they do."""
     if duration_s < WHOLE * log.duration_s:
         return f"the log's are of {number_text(log.duration_s)} s, of which {number_text(duration_s)} s are compared"
     longest_s = max((run.duration_s for run in emulated.runs if run.radio), default=0.0)
@@ -230,7 +230,7 @@ def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
 
 
 def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> Iterator[RadioValue]:
-    """Traffic, delivery ratio and latencies over this time: to the agent, where robots know no others.
+    """Traffic, delivery ratio and latencies over this time: to the agent, where logs have no others.
 
     The delivery ratio is of all intended receivers, in range or not. Runs that are longer have what their counts of
     each tick tell; none has anything if the log is longer.
@@ -249,7 +249,7 @@ def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
 
 
 def _within(run: EmulatedRun, emulated: EmulatedRuns, duration_s: float) -> _Whole:
-    """The whole of a run, if it is that long; else what counts of each tick tell of its beginning."""
+    """The totals of a run, if it is that long; else the sums of its first ticks' counts."""
     radio = run.radio or {}
     if duration_s >= WHOLE * run.duration_s:
         return _Whole(radio, run.duration_s, emulated.robots)

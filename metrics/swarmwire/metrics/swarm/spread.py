@@ -31,7 +31,7 @@ class Cohesion(Metric):
 
     The radius of the least circle around the centroid that holds all centres: the smaller, the more cohesive. One robot
     that stays behind decides it; `dispersion` weighs all. On a torus the centroid is taken from the circular mean of
-    the places, distances are the shortest (`centroid.py`), and what has no centroid is NaN.
+    the places, distances are the shortest, and what has no centroid is NaN.
 
     Source: R. Olfati-Saber, Flocking for multi-agent dynamic systems, IEEE TAC 51 (2006), section IX: cohesion radius.
     """
@@ -74,7 +74,7 @@ class Dispersion(Metric):
     The least is that of the densest packing, near a hexagonal one, of as many discs: 6 for 7 of them, 48 for 19. It
     grows with the square of their number even so: compare it with that, or runs with equally many robots. r is the
     radius of the body; of mixed bodies r^2 is the mean of their squares over the robots alive. On a torus the centroid
-    is taken from the circular mean of the places, distances are the shortest (`centroid.py`), and what has no centroid
+    is taken from the circular mean of the places, distances are the shortest, and what has no centroid
     is NaN; so is an arena in which no robot is alive.
 
     Source: M. Gauci et al., Self-organized aggregation without computation, IJRR 33 (2014), eq. 1.
@@ -116,7 +116,7 @@ class Rotation(Metric):
 
     1 when all head along circles around the centroid, one way round; 0 when they cancel, head outwards, or all one
     way. A robot at the centroid has no r_i and adds 0. A robot that drives backwards counts by where it looks. On a
-    torus the centroid is taken from the circular mean of the places, and r_i is the shortest way (`centroid.py`): it
+    torus the centroid is taken from the circular mean of the places, and r_i is the shortest way: it
     means little unless the swarm is much smaller than the arena. NaN if no robot is alive, or without a centroid.
 
     Source: I. D. Couzin et al., Collective memory and spatial sorting in animal groups, J. Theor. Biol. 218 (2002),
