@@ -5,11 +5,14 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from swarmwire.comms.errors import Interrupted
-from swarmwire.deploy.controls import Interrupt
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.controls import Interrupt
 
 FAILED = 1  # the run failed: an agent's error, a runner lost
 DIFFERENT = 1  # a repetition came out differently, or there is nothing to compare it with
@@ -27,7 +30,7 @@ def program() -> Path:
 
 
 @contextmanager
-def leaving_when_hung_up(interrupt: Interrupt) -> Generator[None]:
+def leaving_when_hung_up(interrupt: "Interrupt") -> Generator[None]:
     """Leave the command after the block if SIGHUP came in it, without a word: to print would fail."""
     try:
         yield
