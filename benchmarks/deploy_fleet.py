@@ -23,9 +23,8 @@ from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.host_side.system import facts
 from swarmwire.deploy.fleet.packages import LockedEnvironments, Target
-from tests.support.deploy.fleet.fake_host import new_key, write_key
-from tests.support.deploy.fleet.small_fleet import AGENT
-from tests.support.deploy.fleet.sshd import SSHD
+from tests.support.deploy.fleet.fleets import AGENT
+from tests.support.deploy.fleet.hosts import SSHD, new_key, write_key
 
 KINDS = ("asyncssh", "openssh") if SSHD else ("asyncssh",)  # the last is the one that robots are more like
 FLEET = """format = 1

@@ -26,7 +26,7 @@ from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
 from tests.docs.pages import ROOT, blocks_of, files_of
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
 TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)

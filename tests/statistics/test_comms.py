@@ -11,8 +11,7 @@ from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Antenna, Fading, Noise, Reception
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
-from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import at, make_medium, packets, run
+from tests.support.comms.radio import at, make_medium, packets, run, with_access
 
 CSMA = replace(with_access("csma-802154"), send_offset="uniform", queue_limit=10**6)
 DCF_B = replace(

@@ -9,8 +9,7 @@ from swarmwire.comms.draws import purpose, uniform
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed, towards
-from tests.support.world.pairs import assert_same_on_average
-from tests.support.world.samples import commanded, posed
+from tests.support.world.scenes import assert_same_on_average, commanded, posed
 
 TURN = purpose("turns of blind walkers")
 OBSTACLES = [

@@ -15,7 +15,7 @@ from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import run
 from tests.support.agent.hosts import spec
 from tests.support.agent.made_up_world import MadeUpWorld, made_up_world
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 END = frames.encode("end", -1, {})
 TIMEOUT_S = 60.0

@@ -15,9 +15,9 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.ros2.links import close, open_client
 from tests.support.agent.drivers.ros2.bases import HASHES, RosBase, base_and_driver, turtlebot
+from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
-from tests.support.waiting import until
 
 TRANSPORTS = pytest.mark.parametrize("transport", ["bridge", "rmw"])
 ALL = frozenset({"scan", "proximity", "odometry", "imu", "compass", "battery", "light"})

@@ -31,9 +31,9 @@ from swarmwire.comms.wire.sessions import (
     open_world,
     unix_endpoint,
 )
-from tests.support.comms.radio.parameter_modules import MODULES
+from tests.support.clocks import until
+from tests.support.comms.radio import MODULES
 from tests.support.swarms import ANY_PORT, peers
-from tests.support.waiting import until
 
 NOBODY = "tcp/127.0.0.1:9"  # the discard port, on which nothing listens
 # A session whose close takes long, as on a machine that is busy.

@@ -29,8 +29,8 @@ from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.metrics.run_folder.writer import part_file, parts_of
 from tests.support.deploy.commands import LOSSY, called, family, runners_of, started, swarmwire
-from tests.support.deploy.recorded import record_run
-from tests.support.deploy.recorded import started as started_run
+from tests.support.deploy.runs import record_run
+from tests.support.deploy.runs import started as started_run
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
 GONE_S = 20.0  # of a machine that is busy: they are gone in a fraction of a second

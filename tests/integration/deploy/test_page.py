@@ -15,9 +15,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.page.beside import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
+from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY, called
-from tests.support.deploy.page.browsing import chromium, family, paged
-from tests.support.waiting import until
+from tests.support.deploy.page import chromium, family, paged
 
 TICKS = """(count) => new Promise((done) => {
   const news = new EventSource("news"), ticks = [];

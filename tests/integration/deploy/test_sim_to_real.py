@@ -12,8 +12,7 @@ import tomli_w
 from swarmwire.deploy import run
 from swarmwire.deploy.campaign.sweep import sweep
 from tests.support.deploy.commands import LOSSY, called
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import METRICS, SMALL, flock, watched
+from tests.support.metrics.real_logs import METRICS, SMALL, as_logs, flock, watched
 
 
 @pytest.fixture(scope="module")

@@ -20,9 +20,9 @@ from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.viewer import Drawer, ViewOptions, whole
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.screenshot import end, free_port, is_open, program
+from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.watching import At
-from tests.support.waiting import until
+from tests.support.deploy.runs import At
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 

@@ -34,10 +34,9 @@ from swarmwire.metrics.sim_to_real.texts import (
     verdict,
 )
 from swarmwire.metrics.statistics.sample import UNKNOWN
-from tests.support.deploy.campaign.small import InThisProcess
+from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.commands import LOSSY
-from tests.support.metrics.real_log.as_logs import BEGAN_S, Watched, as_logs
-from tests.support.metrics.real_log.emulated import SMALL, watched
+from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, watched
 
 NAMES = (
     "order",

@@ -9,10 +9,10 @@ import pytest
 from swarmwire.agent.drivers.driver import Command, DriverLost
 from swarmwire.agent.on_robot.safety import Watchdog
 from swarmwire.comms.clock import to_s
+from tests.support.clocks import until
 from tests.support.robots.faulty_link import Before, ByteByByte, CutAfter, FaultyLink, Late, Nothing
 from tests.support.robots.rig import OwnWireRig, Rig, opened, readings, sense_until_lost
 from tests.support.robots.rigs import RIGS
-from tests.support.waiting import until
 
 SLACK_S = 2.0  # of a machine that is busy
 OWN = [name for name, kind in RIGS.items() if issubclass(kind, OwnWireRig)]

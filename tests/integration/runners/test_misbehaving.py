@@ -22,12 +22,10 @@ from swarmwire.deploy.control.run_finder import Announced, found_runs
 from swarmwire.deploy.live.following import read_live
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
+from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import HERE, Joiners
-from tests.support.runners.played import Played
-from tests.support.runners.pranks import BESIDE, EARLY, INSTEAD, Prank
-from tests.support.runners.raw_runner import Says, Turn
-from tests.support.waiting import until
+from tests.support.runners import BESIDE, EARLY, INSTEAD, Played, Prank, Says, Turn
 
 PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"
 ROW = re.compile(r"^\| (.+?) \| (.*?`.+?) \|", re.M)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.support.deploy.recorded import record_run
+from tests.support.deploy.runs import record_run
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken
 from tests.tools.soak.samples import Sample

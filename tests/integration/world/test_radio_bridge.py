@@ -28,10 +28,9 @@ from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from swarmwire.world.gateways.tracker import EmulatedTracker
-from tests.support.clocks import FakeClock
+from tests.support.clocks import FakeClock, until
 from tests.support.metrics.truths import static
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, peers, received_by, words
-from tests.support.waiting import until
 
 MEASURES = ("range_m", "bearing_rad")
 AIR = BridgedRadio(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))

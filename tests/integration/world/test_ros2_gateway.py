@@ -13,9 +13,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.ros2.links import close
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.publishers import Rate
+from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent
-from tests.support.waiting import until
-from tests.support.world.gateways.ros2.nodes import (
+from tests.support.world.gateways import (
     ALIVE,
     PROPER,
     TICK_NS,

@@ -31,7 +31,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.registry import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
-from tests.support.waiting import TIMEOUT_S, until
+from tests.support.clocks import TIMEOUT_S, until
 
 RUN = "r1"
 ROWS = [0, 1, 2, 3, 4]

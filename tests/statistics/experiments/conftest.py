@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from docs.experiments.places import Places
-from tests.support.deploy.campaign.small import scenario_in
+from tests.support.deploy.campaign import scenario_in
 
 CAMPAIGN = """
 format = 1

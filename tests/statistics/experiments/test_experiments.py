@@ -20,9 +20,8 @@ from docs.experiments.places import HERE
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.deploy.scenario_parts import measuring
 from swarmwire.world.scenario_file import load_scenario
-from tests.support.experiments.miniature import miniature
-from tests.support.experiments.vicsek_reference import mean_direction, mean_order
-from tests.support.metrics.swarm.swarms import said, stand
+from tests.support.experiments import mean_direction, mean_order, miniature
+from tests.support.metrics.swarms import said, stand
 
 SCENARIOS: Path = HERE.campaigns / "scenarios"
 COUNT, SPACING = "robots.flock.count", "robots.flock.place.spacing_m"

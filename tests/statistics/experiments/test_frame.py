@@ -16,7 +16,7 @@ from docs.experiments.places import HERE
 from docs.experiments.running import run
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
-from tests.support.deploy.campaign.small import InThisProcess
+from tests.support.deploy.campaign import InThisProcess
 
 
 def ran(places, seeds=None) -> tuple[str, str]:

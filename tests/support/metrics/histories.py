@@ -11,7 +11,7 @@ from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from tests.support.metrics.swarm.swarms import mixed, rolled
+from tests.support.metrics.swarms import mixed, rolled
 from tests.support.metrics.truths import static, tally, truth
 
 Array = np.ndarray[Any, Any]

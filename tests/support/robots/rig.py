@@ -17,7 +17,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.world.gateways.gateway import Gateway
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width): of the driver's robot
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from swarmwire.deploy.live.following import Live, read_live
 from tests.support.deploy.commands import ROOT
-from tests.support.deploy.watching import WATCHER
+from tests.support.deploy.runs import WATCHER
 from tests.tools.soak.supervised import PYTHON, Supervised, family
 
 HERE = Path(__file__).parent

@@ -20,8 +20,7 @@ from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
-from tests.support.comms.radio.phy.radios import WIFI_B
-from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium
+from tests.support.comms.radio import RATE_HZ, WIFI_B, Run, at, everybody, make_medium
 
 # Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.
 POSE = at((-1, 0.5), (-0.5, -0.5), (-0.2, 0.3), (0.3, -0.2), (0.6, 0.7), (1, -0.7))

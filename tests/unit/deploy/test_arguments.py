@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
 from swarmwire.world.scenario_file import scenario_from
-from tests.support.world.samples import changed
+from tests.support.world.scenes import changed
 
 SCENARIO = scenario_from(changed("seed", 5), "mine.toml")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.deploy.certificates.folder import begin_authority
-from tests.support.deploy.certificates.dated import DatedFakeClock
+from tests.support.deploy.certificates import DatedFakeClock
 from tests.support.deploy.commands import LOSSY, called
 
 DO = "blackout, fail, gain, impulse, jammer, kill, partition, ramp, revive"

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
-from tests.support.deploy.layouts import run_spread
+from tests.support.deploy.runs import run_spread
 
 PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
 

@@ -9,7 +9,7 @@ from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.deploy.layouts import run_spread
+from tests.support.deploy.runs import run_spread
 
 SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
 JAMMED = ROOT / "scenarios" / "jammed.toml"

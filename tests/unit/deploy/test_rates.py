@@ -5,7 +5,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.layouts import PER_ROBOT, run_spread
+from tests.support.deploy.runs import PER_ROBOT, run_spread
 
 MIXED = """
 format = 1

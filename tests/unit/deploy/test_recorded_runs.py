@@ -15,8 +15,7 @@ from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.metrics.run_folder.writer import write_file
 from tests.support.clocks import GoingClock
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.layouts import run_spread
-from tests.support.deploy.recorded import hastily, record_run
+from tests.support.deploy.runs import hastily, record_run, run_spread
 
 EVENTS = [
     "duration_s=6",

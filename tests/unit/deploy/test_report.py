@@ -5,7 +5,7 @@ import pytest
 from tests.support.deploy.commands import called
 from tests.support.metrics.campaign.campaigns import write_campaign
 from tests.support.metrics.recorded import wandering
-from tests.support.metrics.report.run_folders import run_folder
+from tests.support.metrics.report import run_folder
 from tests.support.metrics.truths import static
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")

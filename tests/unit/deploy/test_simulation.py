@@ -9,7 +9,7 @@ from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy import Simulation, run
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.layouts import run_spread
+from tests.support.deploy.runs import run_spread
 
 SHORT = ["duration_s=2"]
 

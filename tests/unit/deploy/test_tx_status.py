@@ -7,7 +7,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Result, Simulation, run
 from tests.support.agent.hosts import PLAYERS
-from tests.support.deploy.layouts import PER_ROBOT, run_spread
+from tests.support.deploy.runs import PER_ROBOT, run_spread
 
 # One group acts in every third tick only, and some of the other are dead for a while.
 SCENARIO = f"""

@@ -16,7 +16,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.world import world as world_module
 from swarmwire.world.actuation.actuators import Actuators, ShownLeds, drive_limits_of, take_commands
 from swarmwire.world.world import World
-from tests.support.world.samples import commanded, posed
+from tests.support.world.scenes import commanded, posed
 
 FORCES = {"max_force_n": 1.5, "max_torque_nm": 1.5}
 HOLONOMIC = {"kind": "holonomic", "max_speed_mps": 0.5, "max_angular_radps": 3.0, **FORCES}

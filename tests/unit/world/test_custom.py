@@ -21,7 +21,7 @@ from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
 from tests.support.world import custom_code
-from tests.support.world.samples import commanded
+from tests.support.world.scenes import commanded
 
 CODE = Path(__file__).parents[2] / "support" / "world" / "custom_code.py"
 PAINT, PAINTER = f"{CODE}:Paint", f"{CODE}:Painter"

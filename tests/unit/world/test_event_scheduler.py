@@ -20,7 +20,7 @@ from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import changed, commanded, posed
+from tests.support.world.scenes import changed, commanded, posed
 
 TWO = [[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]]
 ENGINES = ["discs", "pymunk"]

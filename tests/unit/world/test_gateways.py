@@ -22,10 +22,10 @@ from swarmwire.world.gateways.ros2 import Ros2Gateway
 from swarmwire.world.subtick import Subticks
 from tests.support.agent.hosts import MEASURES, received_from
 from tests.support.clocks import FakeClock
-from tests.support.world.gateways.scripted import ScriptedGateway, ScriptedOptions
+from tests.support.world.gateways import ScriptedGateway, ScriptedOptions
 
 TICK_NS = NS_PER_S // 10
-HERE = "tests.support.world.gateways.scripted:ScriptedGateway"
+HERE = "tests.support.world.gateways:ScriptedGateway"
 
 
 class Inner:

@@ -11,7 +11,7 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import changed, posed
+from tests.support.world.scenes import changed, posed
 from tests.unit.world.test_event_scheduler import Ahead, Watch
 
 RATE_HZ = 10

@@ -27,9 +27,8 @@ from swarmwire.world.world import World
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, make_medium, scattered
-from tests.support.comms.radio.traffic import RADIOS
-from tests.support.world.samples import SAMPLE
+from tests.support.comms.radio import RADIOS, RATE_HZ, TICK_NS, make_medium, scattered
+from tests.support.world.scenes import SAMPLE
 
 AIRTIME_NS = 96_000  # of a packet's three bytes
 PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"\0\0"]))

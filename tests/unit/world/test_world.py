@@ -17,7 +17,7 @@ from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
-from tests.support.world.samples import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
+from tests.support.world.scenes import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
 
 POSES = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 ALIVE = np.ones(6, np.bool_)

@@ -16,7 +16,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
 from tests.support.agent.on_robot.installed import Command, deeds, install
 from tests.support.agent.on_robot.scripted import PLAYERS
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 FIRST_STEPS = 2
 PYTHON = [sys.executable, "-I", "-S", "-c"]

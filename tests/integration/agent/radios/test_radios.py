@@ -17,6 +17,7 @@ from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
+from tests.support.clocks import until
 from tests.support.swarms import (
     ANY_PORT,
     KEYS,
@@ -32,7 +33,6 @@ from tests.support.swarms import (
     received_by,
     words,
 )
-from tests.support.waiting import until
 
 NEEDS = {"range_m": "radio.range", "bearing_rad": "radio.bearing", "rssi_dbm": "radio.rssi"}
 

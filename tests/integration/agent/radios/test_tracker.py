@@ -17,9 +17,8 @@ from swarmwire.agent.radios.zenoh_radio import range_bearing
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, ask_all
-from tests.support.clocks import FakeClock
+from tests.support.clocks import FakeClock, until
 from tests.support.swarms import KEYS, ROBOTS, KeptLog, meet, peers, radio, received_by, words
-from tests.support.waiting import until
 
 NOW_NS = 1_767_225_600 * NS_PER_S
 metres = st.floats(-50, 50)

@@ -17,7 +17,7 @@ from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.integration.deploy.campaign.test_resume import VARY, Killed, dying_at
 from tests.support.damaged import damaged
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 
 ASKED_SINGLY = {"seeds": 2, "vary": VARY, "batch": 1}
 

@@ -18,8 +18,7 @@ from swarmwire.deploy.campaign.schedule import execute, tasks_of
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.terminal import sweep_progress
 from swarmwire.metrics.campaign.spec import read_campaign
-from tests.support.deploy.campaign.cluster import children, cluster
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.commands import called
 
 ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}

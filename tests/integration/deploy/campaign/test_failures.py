@@ -1,7 +1,7 @@
 """What fails is a row that says why, and stops nothing else."""
 
 from swarmwire.deploy import sweep
-from tests.support.deploy.campaign.small import rows_in, series_in
+from tests.support.deploy.campaign import rows_in, series_in
 
 
 def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):

@@ -10,7 +10,7 @@ from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import store
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.metrics.campaign.spec import read_campaign
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 2, "vary": VARY, "batch": 2}

@@ -7,7 +7,7 @@ import pytest
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign.store import StorageFailed
 from tests.integration.deploy.campaign.test_resume import ASKED, dying_at
-from tests.support.deploy.campaign.small import rows_in
+from tests.support.deploy.campaign import rows_in
 from tests.support.deploy.commands import called
 
 FULL = OSError(errno.ENOSPC, "No space left on device")

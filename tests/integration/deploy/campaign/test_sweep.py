@@ -9,7 +9,7 @@ import pytest
 from swarmwire.deploy import RunFolder, run, sweep
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.metrics.campaign.spec import read_campaign
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 
 VARY = {"radio.loss": "0:0.8:2", "robots.pair.count": [2, 3]}
 

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaign.spec import campaign_file, spec_in
 from swarmwire.deploy.terminal import sweep_progress
-from tests.support.deploy.campaign.small import rows_in
+from tests.support.deploy.campaign import rows_in
 from tests.support.deploy.commands import called
 
 CAMPAIGN = """

@@ -14,10 +14,9 @@ from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.local import LocalExecutor, Silence
 from swarmwire.deploy.campaign.schedule import execute
 from swarmwire.deploy.campaign.worker import Task
-from tests.support.clocks import FakeClock
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.clocks import FakeClock, until
+from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.commands import ROOT
-from tests.support.waiting import until
 
 VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble

@@ -19,12 +19,12 @@ from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.certificates.register import REVOKED, certificate_request
 from swarmwire.deploy.gateways.gateways import Gateways
-from tests.support.deploy.certificates.dated import DatedFakeClock
-from tests.support.deploy.certificates.peers import (
+from tests.support.deploy.certificates import (
     KEYS,
     PATIENT_MS,
     REFUSED_MS,
     ROBOTS,
+    DatedFakeClock,
     Inbox,
     Links,
     at_once,
@@ -34,7 +34,7 @@ from tests.support.deploy.certificates.peers import (
     stranger,
     wait_for_listeners,
 )
-from tests.support.deploy.gateways.driven import DrivenRobots
+from tests.support.deploy.gateways import DrivenRobots
 
 HERE = ("127.0.0.1",)
 EVERYTHING = (KEYS.any_radio, KEYS.any_pose, KEYS.bridge_received("flock-0"))

@@ -25,8 +25,8 @@ from swarmwire.comms.wire.sessions import (
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import network_in
 from swarmwire.deploy.certificates.register import certificate_request
-from tests.support.deploy.certificates.peers import WITHIN_S, at_once, wait_for_listeners
-from tests.support.waiting import until
+from tests.support.clocks import until
+from tests.support.deploy.certificates import WITHIN_S, at_once, wait_for_listeners
 
 KEYS, SEEN = Keys("run1"), ObserverKeys("run1")
 ACCESS = RunAccess(("a", "b", "gone"), ("wall",), ("alice",), ("gate", "gate2"), ("gone",))

@@ -26,10 +26,10 @@ from swarmwire.deploy.live.following import RunGone, read_live
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.run_folder.reader import RunFolder
+from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY, started
-from tests.support.deploy.control.going import at_tick, going
+from tests.support.deploy.runs import at_tick, going
 from tests.support.metrics.truths import static
-from tests.support.waiting import until
 
 SHORT = "duration_s=5"
 KILL = {"do": "kill", "robots": {"names": ["flock-1", "flock-2"]}}

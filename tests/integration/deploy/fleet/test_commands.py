@@ -13,7 +13,7 @@ from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, endpoints_of, ope
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.fleet import check as check_module
 from swarmwire.deploy.fleet import units as estop_module
-from tests.support.deploy.fleet.small_fleet import AGENT
+from tests.support.deploy.fleet.fleets import AGENT
 
 PLAIN = Network(listen=("tcp/127.0.0.1:0",))
 KEYS = SwarmKeys("lab")

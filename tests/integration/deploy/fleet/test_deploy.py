@@ -7,9 +7,8 @@ import stat
 import pytest
 
 from swarmwire.deploy.fleet import deploy as deploy_module
-from tests.support.deploy.fleet.fake_host import new_key, write_key
-from tests.support.deploy.fleet.small_fleet import AGENT
-from tests.support.deploy.fleet.sshd import openssh
+from tests.support.deploy.fleet.fleets import AGENT
+from tests.support.deploy.fleet.hosts import new_key, openssh, write_key
 
 STUMBLES = AGENT + "# stumbles on robots\n"
 SLOW_TO_WRITE = "ulimit -f 100"  # blocks of half a kilobyte that a file may have: a disk that fills up on the way

@@ -15,8 +15,8 @@ from swarmwire.deploy import Recording, Result, Simulation, repeat, run
 from swarmwire.deploy.gateways import undriven
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import ROOT, called
-from tests.support.deploy.gateways.driven import driven as driven_run
-from tests.support.world.gateways.scripted import ScriptedGateway
+from tests.support.deploy.gateways import driven as driven_run
+from tests.support.world.gateways import ScriptedGateway
 
 FAST = 100.0  # times real time
 BARE = Recording(tables=False, rrd=False)

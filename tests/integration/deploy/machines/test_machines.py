@@ -19,12 +19,10 @@ from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run
 from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.certificates.register import certificate_request
-from tests.support.deploy.certificates.peers import at_once, wait_for_listeners
+from tests.support.deploy.certificates import at_once, wait_for_listeners
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.machines.guarded_world import AT_TICK, GuardedWorld, authority
-from tests.support.deploy.machines.guarded_world import SHORT as SHORT_RUN
-from tests.support.deploy.machines.namespaces import machines
-from tests.support.deploy.machines.on_machines import on
+from tests.support.deploy.machines import AT_TICK, GuardedWorld, authority, machines, on
+from tests.support.deploy.machines import SHORT as SHORT_RUN
 
 SHORT = "duration_s=3"
 SETTINGS = ("duration_s=5000", "run.on_runner_loss=stand", "run.runner_timeout_s=3")

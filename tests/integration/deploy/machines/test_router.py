@@ -21,7 +21,7 @@ from tests.integration.deploy.machines.test_machines import lab
 from tests.support.deploy.commands import LOSSY, called
 from tests.support.deploy.joiners import HERE as LOCALHOST
 from tests.support.deploy.joiners import Joiners, Watcher
-from tests.support.deploy.machines.on_machines import Started, on
+from tests.support.deploy.machines import Started, on
 
 HERE = ("127.0.0.1",)
 TCP = ("--listen", "tcp/127.0.0.1:0", "--connect", "tcp/127.0.0.1:1")

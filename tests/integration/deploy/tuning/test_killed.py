@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from tests.support.deploy.commands import ROOT, called
-from tests.support.deploy.tuning.small import scenario_in, trials_in, tuned
+from tests.support.deploy.tuning import scenario_in, trials_in, tuned
 
 KILLED = """
 import sys
@@ -16,7 +16,7 @@ from pathlib import Path
 from swarmwire.deploy.campaign.sweep import NoObserver
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.tuning.run import TuneObservers, begin_tune
-from tests.support.deploy.tuning.small import plan_of
+from tests.support.deploy.tuning import plan_of
 class Watcher:
     def begin(self, tuning, trials): print("begins", flush=True)
     def see(self, trial): print("trial", flush=True)

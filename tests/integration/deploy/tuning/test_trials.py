@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.deploy import run
 from swarmwire.deploy.tuning.run import NothingFound
-from tests.support.deploy.tuning.small import AT, gone_on_with, trials_in, tuned
+from tests.support.deploy.tuning import AT, gone_on_with, trials_in, tuned
 
 pytestmark = pytest.mark.usefixtures("here")
 

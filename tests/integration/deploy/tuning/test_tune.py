@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.tuning.best import gained
 from swarmwire.deploy.tuning.study import FILE
 from swarmwire.metrics.campaign.folder import CampaignFolder
-from tests.support.deploy.tuning.small import gone_on_with, trials_in, tuned
+from tests.support.deploy.tuning import gone_on_with, trials_in, tuned
 
 pytestmark = pytest.mark.usefixtures("calculated")
 

@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.deploy.terminal import tune_progress
 from tests.support.deploy.commands import called
-from tests.support.deploy.tuning.small import AT, trials_in
+from tests.support.deploy.tuning import AT, trials_in
 
 GOAL = ("--goal", "min bowl")
 

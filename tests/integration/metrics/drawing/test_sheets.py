@@ -18,7 +18,7 @@ from swarmwire.metrics.drawing.bodies import draw_body, facts_of
 from swarmwire.metrics.drawing.body_view import draw_from_above
 from swarmwire.metrics.drawing.radio import draw_coverage, draw_distances
 from swarmwire.metrics.run_folder.reader import RunFolder
-from tests.support.metrics.radio_runs import DISK, ticks
+from tests.support.metrics.radio import DISK, ticks
 from tests.support.metrics.recorded import links, record
 from tests.support.metrics.truths import departed, static, truth
 

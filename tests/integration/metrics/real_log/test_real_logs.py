@@ -14,8 +14,7 @@ from swarmwire.metrics.real_log.measured_log import measured_log, why_not
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.truths import real_run
 from swarmwire.metrics.registry import METRICS
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import flock
+from tests.support.metrics.real_logs import as_logs, flock
 
 NAMES = (
     "order",

@@ -24,7 +24,7 @@ from swarmwire.metrics.report.charts_models import (
 )
 from swarmwire.metrics.report.page import as_svg, page, write_report
 from tests.support.metrics.campaign.campaigns import write_campaign
-from tests.support.metrics.report.pages import Page, check_alone
+from tests.support.metrics.report import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 LOSS = [0.0, 0.2, 0.4, 0.6]

@@ -25,9 +25,9 @@ from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.text import number
 from tests.support.metrics.films import two_groups
-from tests.support.metrics.radio_runs import DISK, RADIOS, ticks
+from tests.support.metrics.radio import DISK, RADIOS, ticks
 from tests.support.metrics.recorded import links, record, wandering
-from tests.support.metrics.report.run_folders import run_folder
+from tests.support.metrics.report import run_folder
 from tests.support.metrics.truths import departed, static, tally
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")

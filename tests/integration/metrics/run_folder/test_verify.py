@@ -18,8 +18,7 @@ from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.tables import TABLES
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.metrics.recorded import links, record, wandering
-from tests.support.metrics.summaries import made_up_summary
+from tests.support.metrics.recorded import links, made_up_summary, record, wandering
 from tests.support.metrics.truths import static, tally, watch
 
 TICKS, ARENAS = 10, 2

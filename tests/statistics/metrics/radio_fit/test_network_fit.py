@@ -18,8 +18,7 @@ from swarmwire.metrics.radio_fit.losses import LossFit
 from swarmwire.metrics.radio_fit.tables import network_comments, network_rows, network_table
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from tests.statistics.metrics.radio_fit.test_radio_fit import is_found
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import flock, watched
+from tests.support.metrics.real_logs import as_logs, flock, watched
 
 AIRTIME_S = 14 * 8 / 250_000  # of a beacon, which the radio adds to its latency
 HEAD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given\n"

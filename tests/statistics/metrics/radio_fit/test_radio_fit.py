@@ -13,7 +13,7 @@ from swarmwire.metrics.radio_fit.losses import LossFit, expected_runs, fit_losse
 from swarmwire.metrics.radio_fit.path_loss import PathLossFit
 from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, link_covariance
 from swarmwire.metrics.radio_fit.tables import Row, parameter_rows, radio_table, residual_rows
-from tests.support.metrics.radio_fit.synthetic import (
+from tests.support.metrics.radio import (
     EXPONENT,
     NOISE_DB,
     RSSI_AT_1_M_DBM,

@@ -18,8 +18,7 @@ from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.commands import LOSSY
 from tests.support.metrics.campaign.campaigns import write_campaign
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import watched
+from tests.support.metrics.real_logs import as_logs, watched
 from tests.tools.fuzz.target import FolderTarget, check_refusal
 
 TABLES: tuple[Callable[[RunFolder], Any], ...] = (

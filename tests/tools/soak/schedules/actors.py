@@ -8,7 +8,7 @@ from pathlib import Path
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.config import JoinObserver
-from tests.support.deploy.watching import WATCHER
+from tests.support.deploy.runs import WATCHER
 from tests.tools.soak.agenda import Agenda, Steps
 from tests.tools.soak.invariants import Broken
 from tests.tools.soak.place import SCENARIO

@@ -11,8 +11,8 @@ import numpy as np
 import psutil
 
 from swarmwire.deploy import sweep
-from tests.support.deploy.campaign.small import rows_in, scenario_in, series_in
-from tests.support.waiting import until
+from tests.support.clocks import until
+from tests.support.deploy.campaign import rows_in, scenario_in, series_in
 from tests.tools.soak.invariants import Broken
 from tests.tools.soak.schedules.joined import nothing_left, own_temporary
 from tests.tools.soak.schedules.plan import Plan

@@ -11,7 +11,7 @@ from swarmwire.deploy import repeat
 from swarmwire.metrics.run_folder.layout import DIGESTS
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.waiting import until
+from tests.support.clocks import until
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken
 from tests.tools.soak.place import SCENARIO

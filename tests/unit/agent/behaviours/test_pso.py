@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestVector
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from tests.support.agent.behaviours.one_particle import HERE, One, place
+from tests.support.agent.behaviours import HERE, One, place
 
 FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
 CALM = {"inertia": 0.0, "own_weight": 0.0, "neighbour_weight": 0.0}  # the robot stays where it is

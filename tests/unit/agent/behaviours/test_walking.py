@@ -29,7 +29,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
-from tests.support.agent.behaviours.walker import Walker
+from tests.support.agent.behaviours import Walker
 from tests.support.agent.hosts import group
 
 SCENARIO = Path("scenarios/behaviours/random_walk.toml")

@@ -20,8 +20,7 @@ from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.installed import DRIVING, deeds, install, robot_flags
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, UTC_NS, DatedFakeClock
-from tests.support.clocks import FakeClock
-from tests.support.waiting import until
+from tests.support.clocks import FakeClock, until
 
 HERE = Pose(0.0, 0.0, 0.0)
 REFUSED = {

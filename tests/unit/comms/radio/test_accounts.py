@@ -15,9 +15,23 @@ from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, living, make_medium, packets, run, scattered
-from tests.support.comms.radio.traffic import OBSTACLES, RADIOS, random_traffic, run_disrupted
+from tests.support.comms.radio import (
+    METHODS,
+    OBSTACLES,
+    RADIOS,
+    TICK_NS,
+    Run,
+    at,
+    everybody,
+    living,
+    make_medium,
+    packets,
+    random_traffic,
+    run,
+    run_disrupted,
+    scattered,
+    with_access,
+)
 
 BOTH, FIRST, NONE = np.array([True, True]), np.array([True, False]), np.zeros(0, np.int64)
 ROBOTS = 3

@@ -18,9 +18,20 @@ from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_medium, packets, run, scattered
-from tests.support.comms.radio.traffic import RADIOS, random_traffic
+from tests.support.comms.radio import (
+    METHODS,
+    RADIOS,
+    RATE_HZ,
+    TICK_NS,
+    Run,
+    everybody,
+    make_medium,
+    packets,
+    random_traffic,
+    run,
+    scattered,
+    with_access,
+)
 
 ROBOTS = 7
 RADIO = Radio(

@@ -21,11 +21,22 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
 from swarmwire.comms.radio.stages.losses import LOSS_MODELS
 from swarmwire.comms.radio.traces import LinkTraces
-from tests.support.comms.radio.bursts import BurstLinks
-from tests.support.comms.radio.measured import TRIO, trace_of
-from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, Run, at, everybody, living, make_medium, run, scattered
-from tests.support.comms.radio.runs import packets as packets_at
+from tests.support.comms.radio import (
+    RATE_HZ,
+    SIZE_M,
+    TRIO,
+    BurstLinks,
+    Run,
+    at,
+    everybody,
+    living,
+    make_medium,
+    run,
+    scattered,
+    trace_of,
+    with_access,
+)
+from tests.support.comms.radio import packets as packets_at
 
 POSE = at((0, 0), (1, 0), (0, 1))
 RATIOS = LinkTraces(

@@ -21,9 +21,17 @@ from swarmwire.comms.radio.phy.propagation import cut_off_dbm, range_of, receive
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.reception.receiver import chunk_success
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.parameter_modules import MODULES
-from tests.support.comms.radio.phy.radios import IEEE_802_15_4
-from tests.support.comms.radio.runs import SIZE_M, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio import (
+    IEEE_802_15_4,
+    MODULES,
+    SIZE_M,
+    at,
+    everybody,
+    make_medium,
+    packets,
+    run,
+    scattered,
+)
 from tests.unit.world.scenario.test_bodies import radio_of
 
 NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")

@@ -29,7 +29,7 @@ from swarmwire.comms.radio.timing import (
     ieee80211b_ns,
     ieee80211g_ns,
 )
-from tests.support.comms.radio.runs import TICK_NS, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered
 
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s

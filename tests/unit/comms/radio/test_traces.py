@@ -13,10 +13,22 @@ from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.measured import TRIO, numbers_received, trace_of
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, make_medium, packets, run, scattered
-from tests.support.comms.radio.traffic import random_traffic
+from tests.support.comms.radio import (
+    METHODS,
+    TICK_NS,
+    TRIO,
+    Run,
+    at,
+    everybody,
+    make_medium,
+    numbers_received,
+    packets,
+    random_traffic,
+    run,
+    scattered,
+    trace_of,
+    with_access,
+)
 
 ROBOTS = 3
 ROWS = [(20, 2, 0, 0.3), (0, 0, 1, 1.0), (10, 0, 1, 0.5), (5, 1, 0, 0.0), (30, 0, 1, 0.25)]

@@ -17,9 +17,19 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import RadioMedium
-from tests.support.comms.radio.bursts import BurstLinks
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import RATE_HZ, SIZE_M, Run, at, everybody, make_medium, packets, scattered
+from tests.support.comms.radio import (
+    METHODS,
+    RATE_HZ,
+    SIZE_M,
+    BurstLinks,
+    Run,
+    at,
+    everybody,
+    make_medium,
+    packets,
+    scattered,
+    with_access,
+)
 
 PAIR = at((0, 0), (1, 0))
 LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, measures=Measures(range=RangeMeasure(0.1)))

@@ -10,8 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.certificates import folder as certificate_folder
 from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, renew_authority, revoke
 from swarmwire.deploy.certificates.register import REGISTER, REVOKED, Register, certificate_request, date_now
-from tests.support.deploy.certificates.dated import DatedFakeClock
-from tests.support.deploy.certificates.made import certificate, issued
+from tests.support.deploy.certificates import DatedFakeClock, certificate, issued
 
 
 def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
-from tests.support.deploy.certificates.dated import DatedFakeClock
+from tests.support.deploy.certificates import DatedFakeClock
 from tests.support.deploy.commands import called
 
 FLEET = """

@@ -9,7 +9,7 @@ from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates.folder import issue, revoke
 from swarmwire.deploy.certificates.member import access_in, name_in, network_in
 from swarmwire.deploy.certificates.register import PURPOSES, certificate_request
-from tests.support.deploy.certificates.dated import DatedFakeClock
+from tests.support.deploy.certificates import DatedFakeClock
 
 
 @pytest.fixture

@@ -11,8 +11,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from swarmwire.deploy.certificates.folder import issue
 from swarmwire.deploy.certificates.register import DAY, certificate_request, date_now
-from tests.support.deploy.certificates.dated import DatedFakeClock
-from tests.support.deploy.certificates.made import certificate, issued
+from tests.support.deploy.certificates import DatedFakeClock, certificate, issued
 
 
 def test_a_ca_signs_certificates_and_lists_for_ten_years(folder: Path, clock: DatedFakeClock):

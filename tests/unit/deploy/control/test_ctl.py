@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.ctl_events import selection_of
-from tests.support.deploy.control.going import going
-from tests.support.waiting import until
+from tests.support.clocks import until
+from tests.support.deploy.runs import going
 
 
 @pytest.fixture(autouse=True)

@@ -8,9 +8,9 @@ from swarmwire.deploy import repeat, run
 from swarmwire.deploy.control.remote_control import Refused
 from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
+from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.control.going import at_tick, going
-from tests.support.waiting import until
+from tests.support.deploy.runs import at_tick, going
 
 SHORT = "duration_s=5"
 KILL = {"do": "kill", "robots": {"names": ["flock-1", "flock-2"]}}

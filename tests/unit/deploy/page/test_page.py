@@ -12,8 +12,8 @@ import pytest
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.page.news import KEPT, NewsThread
-from tests.support.deploy.page.stand_in import StandIn
-from tests.support.waiting import until
+from tests.support.clocks import until
+from tests.support.deploy.page import StandIn
 
 pytest.importorskip("fastapi", reason="needs the extra [ui]")
 

@@ -16,8 +16,8 @@ from swarmwire.metrics.network.radio_tally import RadioTally
 from swarmwire.metrics.run_folder import links as links_table
 from swarmwire.metrics.run_folder.links import LinkCounts
 from swarmwire.metrics.run_folder.robots import RobotCounts
-from tests.support.comms.radio.runs import make_medium, packets
-from tests.support.metrics.radio_runs import radio_runs, rows_of
+from tests.support.comms.radio import make_medium, packets
+from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch
 

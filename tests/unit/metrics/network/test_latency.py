@@ -13,8 +13,8 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
 from swarmwire.metrics.network.latency import LARGEST_NS, RELATIVE_ERROR, LatencyOnAir, LatencyToAgent, LogHistogram
-from tests.support.comms.radio.runs import make_medium, packets
-from tests.support.metrics.radio_runs import radio_runs, rows_of
+from tests.support.comms.radio import make_medium, packets
+from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
 

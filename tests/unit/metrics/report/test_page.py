@@ -5,7 +5,7 @@ import re
 import pytest
 
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Report, Section, Table, as_svg, blank_figure, page
-from tests.support.metrics.report.pages import Page, check_alone
+from tests.support.metrics.report import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 

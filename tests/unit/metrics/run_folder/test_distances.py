@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.metrics.run_folder import distances
 from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
-from tests.support.metrics.radio_runs import radio_runs, rows_of
+from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, static, truth
 

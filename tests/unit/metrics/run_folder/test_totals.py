@@ -16,9 +16,8 @@ from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.robots import RobotRecorder
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.metrics.radio_runs import DISK, ticks
-from tests.support.metrics.recorded import links, record
-from tests.support.metrics.summaries import made_up_summary
+from tests.support.metrics.radio import DISK, ticks
+from tests.support.metrics.recorded import links, made_up_summary, record
 from tests.support.metrics.truths import departed, static, truth, watch
 
 TOTALS = ("radio_robots", "radio_distances", "radio_links")

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.swarm.aggregation import Aggregation, AggregationHop, AggregationTime
-from tests.support.metrics.swarm.swarms import mixed, said, stand, swarms, told
+from tests.support.metrics.swarms import mixed, said, stand, swarms, told
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
 gaps = st.sampled_from([None, 0.01, 0.4, 2.0])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.swarm.motion import Deadlocked
-from tests.support.metrics.swarm.swarms import rolled, stand, told
+from tests.support.metrics.swarms import rolled, stand, told
 from tests.support.metrics.truths import static, truth
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.metrics.swarm.motion import Oscillation
-from tests.support.metrics.swarm.swarms import rolled, stand, told
+from tests.support.metrics.swarms import rolled, stand, told
 from tests.support.metrics.truths import measured, static, truth
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.metrics.swarm.order import OrderLocal
-from tests.support.metrics.swarm.swarms import said, stand, swarms
+from tests.support.metrics.swarms import said, stand, swarms
 from tests.support.metrics.truths import measured, poses, static, truth
 
 

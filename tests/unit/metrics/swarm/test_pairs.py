@@ -12,7 +12,7 @@ from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.swarm.contacts import smallest_gap_m
 from swarmwire.metrics.swarm.pairs import NearPairs
 from swarmwire.metrics.tick_view import TickView
-from tests.support.metrics.swarm.swarms import Swarm, rolled, said, stand, swarms
+from tests.support.metrics.swarms import Swarm, rolled, said, stand, swarms
 from tests.support.metrics.truths import measured, static, truth
 
 

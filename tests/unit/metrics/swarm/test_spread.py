@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 
-from tests.support.metrics.swarm.centroids import away_m
-from tests.support.metrics.swarm.swarms import mixed, rolled, said, stand, swarms
+from tests.support.metrics.swarms import away_m, mixed, rolled, said, stand, swarms
 
 
 @given(swarms())

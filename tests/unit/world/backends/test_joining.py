@@ -21,7 +21,7 @@ from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group
-from tests.support.waiting import until
+from tests.support.clocks import until
 from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
 
 Made = Lockstep | RealTime

@@ -31,7 +31,7 @@ from tests.support.world.locksteps import (
     request,
     rows_of,
 )
-from tests.support.world.samples import changed
+from tests.support.world.scenes import changed
 
 LAYOUT = {"x": ("<i8", ())}
 KEPT = dict.fromkeys(("flock", "scouts", "lone"), LAYOUT)

@@ -15,7 +15,7 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, load_of
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.world import World
-from tests.support.world.samples import commanded, posed, wandering
+from tests.support.world.scenes import commanded, posed, wandering
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 CLOSING_STEPS = [2, 3, 5, 10, 20]

@@ -16,7 +16,7 @@ from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import SAMPLE, changed
+from tests.support.world.scenes import SAMPLE, changed
 
 GREY = np.full((20, 40), 254, np.uint8)
 GREY[:, 0] = GREY[0] = 0

@@ -18,7 +18,7 @@ from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors import loading
-from tests.support.world.samples import SAMPLE
+from tests.support.world.scenes import SAMPLE
 
 SIGNAL = {"model": "log-distance"}
 FAULTS: list[tuple[dict[str, Any], str]] = [

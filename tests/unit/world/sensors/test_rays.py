@@ -18,8 +18,7 @@ from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Scene
 from swarmwire.world.world import World
-from tests.support.world.samples import posed
-from tests.support.world.scenes import read, scene, staged
+from tests.support.world.scenes import posed, read, scene, staged
 
 EPUCK = load_body("epuck")
 REACH_M = 10 * EPUCK.radius_m  # five diameters

@@ -24,8 +24,7 @@ from swarmwire.world.sensors.loading import sensor_of, truth_of
 from swarmwire.world.sensors.rays import ProximitySensor
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 from swarmwire.world.world import World
-from tests.support.world.samples import SENSORS, commanded, posed
-from tests.support.world.scenes import read, scene, staged
+from tests.support.world.scenes import SENSORS, commanded, posed, read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 # ARGoS's foot-bot, ideal rays, an infinite wall dead ahead: gap from wall to body in m, length of the mean vector.

@@ -20,8 +20,7 @@ from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler
 from swarmwire.world.sensors.sensor import Scene
 from swarmwire.world.world import World
-from tests.support.world.samples import commanded, posed
-from tests.support.world.scenes import read, scene, staged
+from tests.support.world.scenes import commanded, posed, read, scene, staged
 
 EPUCK = load_body("epuck")
 SHEET = BatterySpec(capacity_wh=0.01, idle_w=1.0, drive_w_per_mps=20.0, led_w=0.5)

@@ -15,8 +15,18 @@ from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
-from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
-from tests.support.comms.radio.runs import Run, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio import (
+    METHODS,
+    Run,
+    at,
+    drawing,
+    everybody,
+    make_medium,
+    packets,
+    run,
+    scattered,
+    with_access,
+)
 
 ROBOTS = 8
 

@@ -15,8 +15,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered
+from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
 
 NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the path loss is constant
 # Senders that collide now and then, around a receiver that hears some of them barely.

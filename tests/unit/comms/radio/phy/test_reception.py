@@ -18,9 +18,22 @@ from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
 from swarmwire.comms.radio.phy.results import ResultBuffer
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
-from tests.support.comms.radio.phy.radios import ALL_GIVEN, METHODS, with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, everybody, living, make_medium, packets, run, scattered
-from tests.support.comms.radio.traffic import OBSTACLES, random_traffic
+from tests.support.comms.radio import (
+    ALL_GIVEN,
+    METHODS,
+    OBSTACLES,
+    TICK_NS,
+    Run,
+    at,
+    everybody,
+    living,
+    make_medium,
+    packets,
+    random_traffic,
+    run,
+    scattered,
+    with_access,
+)
 
 ROBOTS = 12
 
