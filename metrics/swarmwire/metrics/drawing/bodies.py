@@ -114,8 +114,8 @@ def _noise(half_width: float) -> list[str]:
     return [f"noise ±{half_width:g} of 1"] if half_width else []
 
 
-def _error(told: str, size: float) -> str:
-    return f"error {told}" if size else "no error"
+def _error(text: str, size: float) -> str:
+    return f"error {text}" if size else "no error"
 
 
 def _count(number: int, what: str) -> str:

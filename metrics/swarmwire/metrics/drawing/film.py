@@ -159,9 +159,9 @@ def footage(
     for option, value in (("--fps", frames_per_s), ("--speed", speed)):
         if value is not None and not 0 < value <= 1000:
             raise BadInput(option, "", f"expected a number above 0 and at most 1000, got {value:g}")
-    wanted = frames_per_s or usual_frames_per_s
-    chosen = speed or _speed(end - start, wanted)
-    shown = frames_per_s or min(wanted, rate_hz * chosen)
+    at_most = frames_per_s or usual_frames_per_s
+    chosen = speed or _speed(end - start, at_most)
+    shown = frames_per_s or min(at_most, rate_hz * chosen)
     step_s = chosen / shown
     frames = _frames(end - start, step_s)
     if frames > MAX_FRAMES:

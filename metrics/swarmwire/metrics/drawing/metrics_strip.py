@@ -23,7 +23,7 @@ _MAX_POINTS = 1500  # of a curve: more than a plot has pixels
 _HEAD_IN, _FOOT_IN, _NUMBERS_IN, _APART_IN = 0.2, 0.18, 0.3, 0.16
 
 
-def told_of(name: str, facts: Facts) -> MetricInfo:
+def info_of(name: str, facts: Facts) -> MetricInfo:
     """Unit, kind and bounds of a metric, from the run or the registry; of an unknown one its name alone."""
     if name in facts:
         return facts[name]
@@ -34,12 +34,12 @@ def told_of(name: str, facts: Facts) -> MetricInfo:
 
 def is_count(name: str, facts: Facts = UNKNOWN) -> bool:
     """Whether the metric adds up over the run."""
-    return told_of(name, facts).kind == "count"
+    return info_of(name, facts).kind == "count"
 
 
 def limits(name: str, value: FloatArray, facts: Facts = UNKNOWN) -> tuple[float, float]:
     """0 to 1 for shares, else from 0 or the least value to the greatest, with some air."""
-    if told_of(name, facts).bounds == (0.0, 1.0):
+    if info_of(name, facts).bounds == (0.0, 1.0):
         return -0.03, 1.05
     known = value[np.isfinite(value)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
@@ -50,24 +50,24 @@ def limits(name: str, value: FloatArray, facts: Facts = UNKNOWN) -> tuple[float,
 
 def titled(name: str, facts: Facts = UNKNOWN) -> str:
     """The name in words, with its unit if it has one."""
-    unit = told_of(name, facts).unit
+    unit = info_of(name, facts).unit
     words = name.replace("_", " ")
     return f"{words} ({unit})" if unit else words
 
 
-def choose(metrics: Mapping[str, FloatArray], wanted: Sequence[str] | None) -> list[str]:
+def choose(metrics: Mapping[str, FloatArray], selected: Sequence[str] | None) -> list[str]:
     """The metrics to plot: the selected ones, or the first few of the default ones that have a value.
 
     BadInput for a metric that was not recorded, or for too many.
     """
-    if wanted is None:
+    if selected is None:
         return [name for name in PREFERRED if name in metrics and np.isfinite(metrics[name]).any()][:USUAL_PLOTS]
-    for name in wanted:
+    for name in selected:
         if name not in metrics:
             raise BadInput("--metric", name, f"was not recorded; expected {did_you_mean(metrics, name)}")
-    if len(wanted) > MAX_PLOTS:
-        raise BadInput("--metric", "", f"expected {MAX_PLOTS} at most, got {len(wanted)}")
-    return list(wanted)
+    if len(selected) > MAX_PLOTS:
+        raise BadInput("--metric", "", f"expected {MAX_PLOTS} at most, got {len(selected)}")
+    return list(selected)
 
 
 class MetricStrip:

@@ -66,8 +66,8 @@ def draw_ratio(axes: Any, table: "pl.DataFrame", range_m: float | None) -> None:
     axes.set_xlim(0.0, float(edges_m[-1]))
     axes.set_ylim(-0.03, 1.05)
     if not known.any():
-        said: Look = {"transform": axes.transAxes, "ha": "center", "va": "center", "fontsize": TEXT_PT, "color": SOFT}
-        axes.text(0.5, 0.5, "packets were on their way for too long:\nthe distance is not known", **said)
+        style: Look = {"transform": axes.transAxes, "ha": "center", "va": "center", "fontsize": TEXT_PT, "color": SOFT}
+        axes.text(0.5, 0.5, "packets were on their way for too long:\nthe distance is not known", **style)
     if range_m is not None and range_m < edges_m[-1]:
         axes.axvline(range_m, color=SOFT, lw=0.7, alpha=0.7, ls="--")
         at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}

@@ -252,14 +252,14 @@ def _notes_network_fit(
     if isinstance(latency, LatencyFit) and latency.negative > 0.0:
         notes.append(f"{latency.negative:.1%} of the packets came before they were sent: clocks are apart")
     if isinstance(latency, LatencyFit) and (latency.delays is not None or latency.apart > OTHER_SHAPE):
-        told = ", ".join(f"{1e3 * value:.3g}" for value in latency.percentiles_s)
+        percentiles = ", ".join(f"{1e3 * value:.3g}" for value in latency.percentiles_s)
         other = "no distribution of [radio.delays] fits clearly better"
         if latency.delays is not None:
             other = (
                 f"[radio.delays] is {latency.delays.distribution}, {latency.delays.apart:.2g} from them by Kolmogorov "
                 f"and Smirnov's distance, uniform jitter {latency.apart:.2g}"
             )
-        notes.append(f"latencies are not uniform (p50, p90, p99: {told} ms): {other}")
+        notes.append(f"latencies are not uniform (p50, p90, p99: {percentiles} ms): {other}")
     if isinstance(losses, LossFit) and losses.loss.value > 0.0:
         notes.append(
             "all losses count here, those of obstacles and of collisions too; a scenario that makes such losses itself "

@@ -36,8 +36,8 @@ def column_axes(
     axes = plain_axes(figure, place, "")
     axes.tick_params(which="both", labelsize=LETTERS_PT, labelcolor=INK, pad=2.5)
     axes.yaxis.set_major_formatter(short)
-    said: Look = {"fontsize": TEXT_PT + 0.5, "color": INK, "ha": "left", "va": "top"}
-    figure.text(0.06 / COLUMN_IN, 1.0 - 0.06 / height_in, title, **said)
+    style: Look = {"fontsize": TEXT_PT + 0.5, "color": INK, "ha": "left", "va": "top"}
+    figure.text(0.06 / COLUMN_IN, 1.0 - 0.06 / height_in, title, **style)
     axes.set_xlabel(x_label, fontsize=TEXT_PT, color=SOFT, labelpad=3)
     return figure, axes
 

@@ -84,13 +84,13 @@ def choose_responses(samples: Samples, names: Sequence[str]) -> ChosenResponses:
     BadInput for an unknown name.
     """
     known = samples.folder.responses
-    asked = tuple(dict.fromkeys(find_response(name, known) for name in names))
-    never = tuple(response for response in known if response not in asked and not samples.all(response).observed.any())
+    named = tuple(dict.fromkeys(find_response(name, known) for name in names))
+    never = tuple(response for response in known if response not in named and not samples.all(response).observed.any())
     there = [response for response in known if response not in never]
-    constant = tuple(response for response in there if response not in asked and not _varies(samples, response))
+    constant = tuple(response for response in there if response not in named and not _varies(samples, response))
     vary = [response for response in there if response not in constant]
     usual = sorted((response for response in vary if response.is_usual), key=_rank)
-    shown = asked or tuple((usual or vary)[:MOST])
+    shown = named or tuple((usual or vary)[:MOST])
     return ChosenResponses(shown, tuple(response for response in vary if response not in shown), constant, never)
 
 

@@ -89,8 +89,8 @@ def rounding_of(values: Sequence[float], spreads: Sequence[float] = ()) -> Round
         return Rounding(None)
     if all(value.is_integer() for value in map(float, known)):
         return Rounding(0)
-    wanted = _decimals(median(widths), _DIGITS_OF_SPREAD) if widths else _decimals(median(known), _DIGITS)
-    decimals = max(0, min(wanted, _decimals(greatest, _MAX_DIGITS)))
+    needed = _decimals(median(widths), _DIGITS_OF_SPREAD) if widths else _decimals(median(known), _DIGITS)
+    decimals = max(0, min(needed, _decimals(greatest, _MAX_DIGITS)))
     return Rounding(decimals if decimals <= _MAX_DECIMALS else None)
 
 
@@ -232,8 +232,8 @@ class Samples:
     def reached(self, response: Response, rows: Sequence[tuple[int, ...]]) -> BoolArray:
         """Of the same shape: whether the value was observed, not cut off."""
         found = [[self._of_point(response.column, point) for point in points] for points in rows]
-        whether = [[replace(sample, value=sample.observed.astype(np.float64)) for sample in row] for row in found]
-        return _side_by_side(whether) == 1.0
+        observed = [[replace(sample, value=sample.observed.astype(np.float64)) for sample in row] for row in found]
+        return _side_by_side(observed) == 1.0
 
     def summary(self, response: Response, points: tuple[int, ...]) -> Summary:
         """The summary of these runs."""

@@ -156,7 +156,7 @@ def _resilience_figure(response: Response, levels: Levels, left: FloatArray, fit
     title = f"{'1 / ' if response.kind == 'time' else ''}{response_title(response)}, relative to none lost"
     name = figure_name("resilience", response.column, levels.path)
     drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.path)
-    if fits.told:
+    if fits.is_clear:
         verdict = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
     else:
         verdict = "AIC does not tell the two shapes apart"
@@ -165,7 +165,7 @@ def _resilience_figure(response: Response, levels: Levels, left: FloatArray, fit
 
 
 def _words(response: Response, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
-    better = ("better" if fits.told else "no worse") if fit is fits.better else ""
+    better = ("better" if fits.is_clear else "no worse") if fit is fits.better else ""
     three, one = Rounding(3).text, Rounding(1).text
     slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
     shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)

@@ -182,5 +182,5 @@ def _table(rows: list[_Row]) -> Table:
     along = {row[1] for row in rows}
     caption = f"Change points along `{along.pop()}`" if len(along) == 1 else "Change points"
     kept = [place for place in range(len(columns)) if place not in (1, 2) or len({row[place] for row in rows}) > 1]
-    told = tuple(tuple(row[place] for place in kept) for row in rows)
-    return Table(tuple(columns[place] for place in kept), told, caption, folded=len(rows) > _MAX_OPEN_ROWS)
+    shown = tuple(tuple(row[place] for place in kept) for row in rows)
+    return Table(tuple(columns[place] for place in kept), shown, caption, folded=len(rows) > _MAX_OPEN_ROWS)

@@ -83,9 +83,9 @@ def _course(run: RunData) -> list[tuple[str, str]]:
     summary = run.summary
     if summary is None:
         reached = f"recorded up to {number(float(run.film.time_s[-1]))} s" if isinstance(run.film, Film) else "no tick"
-        asked = run.started.get("ticks")
-        wanted = f" of {number(asked / run.static.rate_hz)} s" if isinstance(asked, int) else ""
-        return [("ended", f"no summary: it was killed, or goes on; {reached}{wanted}")]
+        planned = run.started.get("ticks")
+        of_planned = f" of {number(planned / run.static.rate_hz)} s" if isinstance(planned, int) else ""
+        return [("ended", f"no summary: it was killed, or goes on; {reached}{of_planned}")]
     runners = summary["runners"]
     backend = (
         "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
@@ -131,39 +131,39 @@ def _machine(run: RunData) -> list[tuple[str, str]]:
     known = run.summary or run.started
     versions: dict[str, str] = known.get("versions") or {}
     rows = [("CPU", str(known["cpu"]))] if "cpu" in known else []
-    told = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return [*rows, ("versions", told)] if told else rows
+    listed = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return [*rows, ("versions", listed)] if listed else rows
 
 
 def _problems(run: RunData) -> list[str]:
     """Paragraphs on problems of the run, which readers need to judge its results."""
     summary, arenas = run.summary, run.static.arenas
-    said: list[str] = []
+    problems: list[str] = []
     if arenas > 1:
-        said.append(
+        problems.append(
             f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so."
         )
     if summary is None:
-        return said
+        return problems
     counts = {name: value for name, value in summary["counts"].items() if value}
     if counts:
-        said.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
+        problems.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
     lost: list[Any] = summary["lost_runners"]
     if lost:
-        said.append(f"Lost runners: {'; '.join(map(str, lost))}.")
+        problems.append(f"Lost runners: {'; '.join(map(str, lost))}.")
     changes: list[dict[str, Any]] = summary["runner_events"]
     moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
     if moved:
-        said.append(f"Runners that came and went: {'; '.join(moved)}.")
+        problems.append(f"Runners that came and went: {'; '.join(moved)}.")
     dropped = {name: part["dropped"] for name, part in summary["record"].items() if part.get("dropped")}
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
-        said.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
+        problems.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
     readings: dict[str, list[str]] = summary["global_sensors"]
     if readings:
         bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in readings.items())
-        said.append(f"Bodies that know more than their surroundings: {bodies}.")
-    return said
+        problems.append(f"Bodies that know more than their surroundings: {bodies}.")
+    return problems
 
 
 def run_report(folder: Path) -> Report:

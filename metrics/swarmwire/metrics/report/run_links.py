@@ -69,8 +69,8 @@ def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
     bar = figure.colorbar(shown, cax=below, orientation="horizontal", ticks=[0.0, 0.5, 1.0], format="{x:.0%}")
     bar.outline.set_visible(False)
     below.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
-    said = {"fontsize": SMALL_PT, "color": SOFT, "va": "center"}
-    figure.text((COLUMN_IN - 1.8) / COLUMN_IN, 0.295 / height_in, "pale grey: never in range", ha="right", **said)
+    style = {"fontsize": SMALL_PT, "color": SOFT, "va": "center"}
+    figure.text((COLUMN_IN - 1.8) / COLUMN_IN, 0.295 / height_in, "pale grey: never in range", ha="right", **style)
     return figure
 
 
@@ -106,14 +106,14 @@ def links(run: RunData) -> Figure | str:
             "Delivery ratio of each link: received, of the packets on air while the receiver was in range and sight."
         )
         return Figure(NAME, as_svg(link_matrix(run.static, link_pdr), NAME), caption)
-    told = link_pdr[in_range >= MIN_PACKETS]
-    if not len(told):
+    busy = link_pdr[in_range >= MIN_PACKETS]
+    if not len(busy):
         return f"Delivery by link: no link had {MIN_PACKETS} packets in range."
     caption = (
-        f"Delivery ratios of the {counted(len(told), 'link')} with at least {MIN_PACKETS} packets in range; "
-        f"the dashed line is their median, {share(float(np.median(told)))}."
+        f"Delivery ratios of the {counted(len(busy), 'link')} with at least {MIN_PACKETS} packets in range; "
+        f"the dashed line is their median, {share(float(np.median(busy)))}."
     )
-    return Figure(NAME, as_svg(link_histogram(told), NAME), caption)
+    return Figure(NAME, as_svg(link_histogram(busy), NAME), caption)
 
 
 def _counted(run: RunData) -> "pl.DataFrame | str":

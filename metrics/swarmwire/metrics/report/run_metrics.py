@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.metrics_strip import is_count, told_of
+from swarmwire.metrics.drawing.metrics_strip import info_of, is_count
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.report.page import Section, Table
 from swarmwire.metrics.report.run_data import RunData
@@ -24,7 +24,7 @@ def measured(run: RunData) -> Section:
     if not values:
         return Section("Metrics", ("No metric was recorded.",))
     rows = tuple(
-        (name, *(number(found[key]) for key in STATISTICS), *_about(told_of(name, facts)))
+        (name, *(number(found[key]) for key in STATISTICS), *_about(info_of(name, facts)))
         for name, found in values.items()
         if any(found[key] is not None for key in STATISTICS)
     )
@@ -95,10 +95,10 @@ def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
 
     def row(arena: int) -> tuple[str, ...]:
         radio = run.of_arena("radio", arena)
-        told = (f"{radio['sent']:,}", share(radio["link_pdr"])) if radio else ("–", "–")
+        packets = (f"{radio['sent']:,}", share(radio["link_pdr"])) if radio else ("–", "–")
         end = ends[arena]
         ended = (end["ended"], number(end["sim_time_s"]), number(end["stop_time_s"]))
-        return (str(run.static.seeds[arena]), *ended, *told, f"{hashes[arena][:16]}…")
+        return (str(run.static.seeds[arena]), *ended, *packets, f"{hashes[arena][:16]}…")
 
     return row
 

@@ -169,9 +169,9 @@ def _draw_time_scale(figure: Any, layout: Layout, end_s: float) -> None:
     axes.set(xlim=(0, TIME_PARTS), ylim=(0, 1))
     for place, color in enumerate(time_colors()):
         axes.axvspan(place, place + 1, color=color, lw=0)
-    said = {"fontsize": SMALL_PT, "color": SOFT, "va": "center"}
-    axes.text(-0.3, 0.4, "0", ha="right", **said)
-    axes.text(TIME_PARTS + 0.3, 0.4, f"{end_s:.4g} s", ha="left", **said)
+    style = {"fontsize": SMALL_PT, "color": SOFT, "va": "center"}
+    axes.text(-0.3, 0.4, "0", ha="right", **style)
+    axes.text(TIME_PARTS + 0.3, 0.4, f"{end_s:.4g} s", ha="left", **style)
 
 
 def _entries(static: Static, arena: int, everybody_alive: bool) -> list[Any]:
@@ -206,9 +206,9 @@ def where(run: RunData) -> list[Figure]:
 
 
 def _left_out(paths: Paths, ticks: int, robots: int) -> str:
-    said = ""
+    note = ""
     if len(paths.robots) < robots:
-        said += f" The ways of {len(paths.robots):,} of {counted(robots, 'robot')} are drawn."
+        note += f" The ways of {len(paths.robots):,} of {counted(robots, 'robot')} are drawn."
     if len(paths.ticks) < ticks:
-        said += f" Of {ticks:,} ticks {len(paths.ticks):,} are drawn, evenly spread."
-    return said
+        note += f" Of {ticks:,} ticks {len(paths.ticks):,} are drawn, evenly spread."
+    return note

@@ -114,8 +114,8 @@ def latency_histogram(air_s: FloatArray, agent_s: FloatArray) -> Any:
 
 def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms: FloatArray, color: str) -> Any:
     late_ms = percentiles(latency_ms)
-    told = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, late_ms, strict=True))
-    axes = plain_axes(figure, (0.11, foot, 0.86, 0.325), f"{name}: {told} ms")
+    percents = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, late_ms, strict=True))
+    axes = plain_axes(figure, (0.11, foot, 0.86, 0.325), f"{name}: {percents} ms")
     counts = np.histogram(np.clip(latency_ms, edges_ms[0], edges_ms[-1]), edges_ms)[0]
     axes.stairs(100.0 * counts / len(latency_ms), edges_ms, fill=True, color=color, alpha=0.75)
     if edges_ms[0] > 0.0:
@@ -177,15 +177,15 @@ def radio(run: RunData) -> Section:
     if not run.has_radio:
         return Section(TITLE, ("The robots have no radio.",))
     found = run.of_arena("radio")
-    said = [_account(found, run.static.arenas)] if found else []
+    account = [_account(found, run.static.arenas)] if found else []
     drawn = [distances(run), latencies(run), links(run)]
     figures = [part for part in drawn if isinstance(part, Figure)]
     missing = [part for part in drawn if isinstance(part, str)]
     if missing and run.started:
         missing.append("A repetition records it, and is the same run:")
         again = Listing(f"swarmwire repeat {run.shown_name} --packets all --links --out {_again(run)}")
-        return Section(TITLE, (*said, *figures, *missing, again, *fates(run)))
-    return Section(TITLE, (*said, *figures, *missing, *fates(run)))
+        return Section(TITLE, (*account, *figures, *missing, again, *fates(run)))
+    return Section(TITLE, (*account, *figures, *missing, *fates(run)))
 
 
 def _again(run: RunData) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, is_count, limits, titled, told_of
+from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
 from swarmwire.metrics.drawing.style import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Section, Table, as_svg, blank_figure
@@ -179,7 +179,7 @@ def curves(film: Film, names: tuple[str, ...] | list[str]) -> list[Curve]:
 
 
 def _is_time(name: str, facts: Facts) -> bool:
-    return told_of(name, facts).kind == "time"
+    return info_of(name, facts).kind == "time"
 
 
 def _moments(run: RunData, film: Film) -> list[Lane]:

@@ -50,7 +50,7 @@ class Degradation:
         return min((self.linear, self.exponential), key=lambda fit: fit.aic)
 
     @property
-    def told(self) -> bool:
+    def is_clear(self) -> bool:
         """Whether AIC tells the forms apart, by 2 or more."""
         return abs(self.linear.aic - self.exponential.aic) >= TELLING
 

@@ -83,13 +83,13 @@ class RerunRecording(Observer):
         rows = self._rows
         rows.begin_tick(truth.tick, truth.time_ns)
         self._arena_view.add(rows, truth)
-        told = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
+        texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             if event.singly and not robots:
                 continue
-            told.append(f"{event.words}: {robots or 'no robot'}")
-        for text in told:
+            texts.append(f"{event.words}: {robots or 'no robot'}")
+        for text in texts:
             rows.add("events", rr.TextLog.columns, text=[text])
         self._plots.add(rows, self._metrics.latest, truth)
         self._ticks += 1

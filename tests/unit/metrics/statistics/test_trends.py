@@ -24,8 +24,8 @@ def test_the_lower_aic_is_that_of_the_true_form(seed):
     assert line is not None
     assert exponential is not None
     assert (line.better.form, exponential.better.form) == ("linear", "exponential")
-    assert line.told
-    assert exponential.told
+    assert line.is_clear
+    assert exponential.is_clear
     assert line.better.r_squared > 0.9
 
 
@@ -67,7 +67,7 @@ def test_what_does_not_fall_has_no_slope_and_the_forms_are_not_told_apart():
     flat = degradation(SHARE, np.full((10, 3), 0.8))
     assert flat is not None
     assert flat.linear.b == pytest.approx(0.0, abs=1e-12)
-    assert not flat.told
+    assert not flat.is_clear
     assert flat.better.form == "linear"
 
 
