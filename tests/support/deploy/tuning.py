@@ -7,9 +7,10 @@ from typing import Any
 import polars as pl
 import pytest
 
+from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import Finished
 from swarmwire.deploy.campaign.sweep import NoObserver
-from swarmwire.deploy.campaign.worker import Row, Task, TaskResult
+from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.config import seed_list
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.tuning import run

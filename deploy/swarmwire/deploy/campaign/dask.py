@@ -135,15 +135,17 @@ class DaskExecutor:
         self._open.close()
 
     def _leave(self) -> None:
-        with suppress(TimeoutError, OSError, RuntimeError):  # the scheduler is gone, or mute
-            call = self._client.scheduler.unregister_worker_plugin
-            self._client.sync(call, name=self._campaign, callback_timeout=CLOSE_S)
+        if self._begun:
+            with suppress(TimeoutError, OSError, RuntimeError):  # the scheduler is gone, or mute
+                call = self._client.scheduler.unregister_worker_plugin
+                self._client.sync(call, name=self._campaign, callback_timeout=CLOSE_S)
         with suppress(TimeoutError):
             self._client.close(timeout=CLOSE_S)  # its tasks are cancelled with it
 
     def _begin(self) -> None:
         """Prepare all workers; there are no files, and no campaign.json, before the first task."""
         modules = tuple(read_campaign(self._scenario.parent).modules)
+        self._begun = True
         plugin = dumps(Preparation(self._campaign, environment(modules), _files(self._scenario)))
         call = self._client.scheduler.register_worker_plugin  # `Client.register_plugin` has no time limit
         try:
@@ -156,7 +158,6 @@ class DaskExecutor:
             if answer["status"] == "error":
                 raise self._failed(f"worker {worker}: {answer['exception_text']}")
         self._client.subscribe_topic(self._campaign, self._worker_came)
-        self._begun = True
 
     def _worker_came(self, event: tuple[float, Mapping[str, str]]) -> None:
         """Report a worker that came later and does not fit, and another type of CPU."""
@@ -290,7 +291,7 @@ def environment(modules: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def fault_of(here: Mapping[str, Any], there: Mapping[str, Any]) -> str:
-    """The first difference between the environments of campaign and worker; "" if they fit, whatever their CPUs."""
+    """The first difference between the environments of campaign and worker; "" if they fit; CPUs may differ."""
     for name, version in here["versions"].items():
         if there["versions"].get(name) != version:
             return f"{name} is {there['versions'].get(name, 'not there')}; here it is {version}"
@@ -336,7 +337,7 @@ def work(task: Task, campaign: str) -> TaskResult:
 
     def wanted() -> bool:
         """Whether dask still waits for this: not after a cancellation, the campaign's death or the scheduler's."""
-        faulthandler.dump_traceback_later(MAX_SILENCE_S, exit=True, file=sys.__stderr__)
+        faulthandler.dump_traceback_later(MAX_SILENCE_S, exit=True)
         state = worker.state.tasks.get(key)
         return worker.status in WORKER_ANY_RUNNING and state is not None and state.state != "cancelled"
 

@@ -31,6 +31,10 @@ EXPECTED = (
 LOG = "log"
 MAX_VALUES = 100_000
 RANGE_KEYS = ("from", "to", "count", "scale")
+Point = dict[str, Any]  # by path: the value
+GRID, LIST, RANDOM, LATIN = KINDS = ("grid", "list", "random", "latin")
+DRAWN = (RANDOM, LATIN)
+MAX_POINTS = 100_000
 
 
 @dataclass(frozen=True)
@@ -61,35 +65,35 @@ class Vary:
 
     path: str
     values: tuple[Any, ...] | Range
-    said: str  # by whoever asked for it, for messages
+    where: str  # for messages: the option, or file and key, that varies it
 
     def refused(self, expected: str) -> BadInput:
         """The error that says what was expected of it."""
-        return BadInput(self.said, "", expected)
+        return BadInput(self.where, "", expected)
 
 
 def vary_of(text: str) -> Vary:
     """What `--vary PATH=…` says; BadInput if it is none of the forms."""
-    said = f"--vary {text}"
+    where = f"--vary {text}"
     path, equals, values = text.partition("=")
     path = ".".join(key.strip() for key in path.split("."))
     if not equals or not all(path.split(".")) or not values.strip():
-        raise BadInput(said, "", EXPECTED)
-    return _checked(Vary(path, _range_of(values, said) or tuple(_list_of(values)), said))
+        raise BadInput(where, "", EXPECTED)
+    return _checked(Vary(path, _range_of(values, where) or tuple(_list_of(values)), where))
 
 
-def vary_from(path: str, given: object, said: str) -> Vary:
+def vary_from(path: str, given: object, where: str) -> Vary:
     """What a campaign's file or a mapping says: a list, a table with from, to, count and scale, or a text as above."""
     if isinstance(given, str):
         return vary_of(f"{path}={given}")
     if isinstance(given, Mapping):
-        return _checked(Vary(path, _range_from(cast("Mapping[str, Any]", given), said), said))
+        return _checked(Vary(path, _range_from(cast("Mapping[str, Any]", given), where), where))
     if isinstance(given, list | tuple):
-        return _checked(Vary(path, tuple(cast("list[Any]", given)), said))
-    raise BadInput(said, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {given!r}")
+        return _checked(Vary(path, tuple(cast("list[Any]", given)), where))
+    raise BadInput(where, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {given!r}")
 
 
-def _range_of(text: str, said: str) -> Range | None:
+def _range_of(text: str, where: str) -> Range | None:
     """The range that a text describes; None if it is a list of values."""
     parts = [part.strip() for part in text.split(":")]
     first = _number(parts[0])
@@ -99,17 +103,17 @@ def _range_of(text: str, said: str) -> Range | None:
     parts = parts[: len(parts) - log]
     last = _number(parts[1]) if len(parts) in (2, 3) else None
     if last is None or (len(parts) == 3 and not parts[2].isdecimal()):
-        raise BadInput(said, "", EXPECTED)
+        raise BadInput(where, "", EXPECTED)
     return Range(first, last, int(parts[2]) if len(parts) == 3 else None, log)
 
 
-def _range_from(table: Mapping[str, Any], said: str) -> Range:
+def _range_from(table: Mapping[str, Any], where: str) -> Range:
     ends = [_number(str(table.get(key))) for key in ("from", "to")]
     count, scale = table.get("count"), table.get("scale", "linear")
     known = set(table) <= set(RANGE_KEYS) and scale in ("linear", LOG)
     if not known or None in ends or not (count is None or type(count) is int):
         expected = 'expected { from = 0.0, to = 0.8, count = 9 }, with scale = "log" for equal ratios'
-        raise BadInput(said, "", f"{expected}; got {dict(table)}")
+        raise BadInput(where, "", f"{expected}; got {dict(table)}")
     first, last = (cast("Fraction", end) for end in ends)
     return Range(first, last, count, scale == LOG)
 
@@ -173,12 +177,6 @@ def toml_value(value: object) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return "[" + ", ".join(toml_value(item) for item in cast("Sequence[object]", value)) + "]"
     return json.dumps(value)
-
-
-Point = dict[str, Any]  # by path: the value
-GRID, LIST, RANDOM, LATIN = KINDS = ("grid", "list", "random", "latin")
-DRAWN = (RANDOM, LATIN)
-MAX_POINTS = 100_000
 
 
 def points_of(
@@ -248,7 +246,7 @@ def _drawn(
 
 
 def _random(varied: Sequence[Vary], count: int, seed: int) -> FloatArray:
-    """Shares in [0, 1), (points, paths): each path has draws of its own, whatever else is varied."""
+    """Shares in [0, 1), (points, paths): each path has draws of its own, independent of what else is varied."""
     columns = [uniform(derive_key("design", seed, vary.path), np.arange(count), 0, 0, 0) for vary in varied]
     return np.stack(columns, axis=1)
 
@@ -280,7 +278,7 @@ def _point(varied: Sequence[Vary], values: Sequence[Any]) -> Point:
 
 
 def whole_numbers(scenario: Scenario) -> Callable[[str], bool]:
-    """The function that tells of a path whether its value must be a whole number; of unknown paths it says no."""
+    """A function of a path: whether its value must be a whole number; False for unknown paths."""
     schema, mapping = scenario_schema(), mapping_of(scenario)
 
     def is_whole(path: str) -> bool:

@@ -134,7 +134,7 @@ class WorkerProcess:
     """A worker as its campaign sees it; it ends with `end`, or with this process.
 
     Attributes:
-        ready: whether it has said that it can work.
+        ready: whether it has reported that it can work.
         task: its task.
         silence: since it was given that, or sent anything.
     """
@@ -217,7 +217,7 @@ class Silence:
 
 
 def send(stream: BinaryIO, message: Message) -> None:
-    """Write a message, all of it; OSError if nobody reads any more."""
+    """Write a message, all of it; OSError if the reader is gone."""
     body = msgpack.packb(message)
     stream.write(len(body).to_bytes(LENGTH_BYTES, "little") + body)
     stream.flush()
@@ -243,7 +243,7 @@ def main(name: str) -> None:
     send(results, {"ready": name})
 
     def alive() -> bool:
-        with suppress(OSError):  # nobody is there any more: the other thread ends this process
+        with suppress(OSError):  # the campaign is gone: the other thread ends this process
             send(results, {"alive": name})
         return True
 
@@ -252,7 +252,7 @@ def main(name: str) -> None:
 
 
 def _take_tasks(given: BinaryIO, tasks: SimpleQueue[Task]) -> None:
-    """Take in tasks; end this process at once when nobody is there to give more."""
+    """Take in tasks; end this process at once when the campaign is gone."""
     while (message := receive(given)) is not None:
         tasks.put(msgspec.convert(message, Task))
     os._exit(0)

@@ -30,6 +30,7 @@ BATCH_S = 30_000  # simulated, over all arenas: beyond, a batch has fewer than M
 MAX_ROBOTS = 5_000  # in a world of several arenas: from there on batches gain nothing, and memory is dear
 ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
 POLL_S = 0.1  # at most, until a wish to stop is seen
+Keep = Callable[[Task, TaskResult], None]
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Executor(Protocol):
         ...
 
     def submit(self, task: Task) -> None:
-        """Take a task; SwarmwireError if there is nobody any more to do it."""
+        """Take a task; SwarmwireError if no worker is left to do it."""
         ...
 
     def finished(self, timeout_s: float) -> list[Finished]:
@@ -144,9 +145,6 @@ def _task(campaign: Campaign, folder: CampaignFolder, point: int, runs: Sequence
         series=campaign.series,
         record_to=str(folder.run_folder(runs[0])) if recorded else None,
     )
-
-
-Keep = Callable[[Task, TaskResult], None]
 
 
 def execute(tasks: Iterable[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool] = lambda: False) -> bool:

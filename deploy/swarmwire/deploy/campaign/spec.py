@@ -18,6 +18,8 @@ from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 
 MAX_RUNS = 10_000_000
+FORMAT = 1
+SCENARIO_KEYS = ("arena", "robots", "duration_s")  # that a campaign's file never has
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Plan:
 
 
 def plan_of(spec: SweepSpec) -> Plan:
-    """The plan of what was asked; BadInput for the first point that cannot be run, and all that is no good."""
+    """Check a campaign; BadInput for the first point that cannot be run, and for anything else that is invalid."""
     scenario = _scenario_of(spec)
     for vary in spec.varied:
         if vary.path in FIXED or vary.path == "format":
@@ -121,17 +123,13 @@ def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:
 
 
 def _blamed(error: BadInput, varied: Sequence[Vary], point: Point) -> BadInput:
-    """The fault of a point, told by what varies: of a value that is wrong by itself, or of all that meet there."""
+    """The error of a point, by what varies: one value that is wrong by itself, or all that meet there."""
     for vary in varied:
         if f"{error.key}.".startswith(f"{vary.path}.") or error.where.startswith(f"--set {vary.path}="):
-            return BadInput(vary.said, error.key, error.expected)
+            return BadInput(vary.where, error.key, error.expected)
     if not point:
         return error
     return BadInput(" ".join(f"--vary {text}" for text in overrides_of(point)), error.key, error.expected)
-
-
-FORMAT = 1
-SCENARIO_KEYS = ("arena", "robots", "duration_s")  # that a campaign's file never has
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from swarmwire.deploy.campaign.store import new_folder
 from swarmwire.deploy.record.folder import stamped_folder
 from swarmwire.deploy.record.provenance import changes_since, cpu, module_digests, versions
 from swarmwire.deploy.record.scenario_copy import Copies, changed_files, copied_mapping, copy_scenario
-from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Campaign, CopiedFile, Provenance, write_campaign
+from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Campaign, CopiedFile, Design, Provenance, write_campaign
 from swarmwire.world.scenario.scenario import Scenario
 
 SAME = ("files", "overrides", "design", "seeds", "vary", "points")  # of a plan and of the campaign that it resumes
@@ -43,7 +43,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
     return Campaign(
         **provenance(scenario, command, plan.code, copy_scenario(scenario, spec.seeds, scenario_folder, copies)),
         name=spec.name or scenario.name,
-        design=spec.design,
+        design=cast("Design", spec.design),  # `points_of` has checked it
         seeds=spec.seeds,
         vary=plan.vary(),
         points=plan.points,

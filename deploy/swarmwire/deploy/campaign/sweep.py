@@ -97,7 +97,7 @@ def sweep(
     table with from, to, count (and scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random"
     and "latin" with so many `points` from ranges without count. `out` is a new or empty folder,
     campaigns/<scenario>-<UTC> by default. At most `batch` arenas are one world. With `series` each tick's metrics
-    are kept, too; runs of `record_seeds` get run folders. Ctrl-C ends it; `resume` goes on.
+    are kept, too; runs of `record_seeds` get run folders. Ctrl-C ends it; `resume` continues it.
 
     Raises BadInput for anything wrong with these, before anything is run, and StorageFailed when the disk is full. What
     a run raises is in its row.

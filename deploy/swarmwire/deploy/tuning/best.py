@@ -29,6 +29,8 @@ from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 from swarmwire.world.scenario_file import load_scenario
 
 FILE = "best.toml"
+CHECK = "check"
+BASELINE = "baseline"
 
 
 def best_of(trials: Sequence[Trial], goal: Goal) -> Trial | None:
@@ -51,10 +53,6 @@ def write_best(folder: Path, tuning: Tuning, trial: Trial) -> Path:
             (Path(aside) / FILES).replace(folder / FILES)
         (Path(aside) / SCENARIO).replace(folder / FILE)
     return folder / FILE
-
-
-CHECK = "check"
-BASELINE = "baseline"
 
 
 @dataclass(frozen=True)

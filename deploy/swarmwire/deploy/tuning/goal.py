@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.worker import Row
+from swarmwire.deploy.campaign.columns import Row
 from swarmwire.metrics.campaign.folder import response_sample
 from swarmwire.metrics.campaign.spec import Response, Stat, find_statistic
 from swarmwire.metrics.statistics.sample import Sample

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Protocol
 
 from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaign.spec import Plan
 from swarmwire.deploy.campaign.start import check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaign.store import locked, new_folder, storing
 from swarmwire.deploy.campaign.sweep import Observer
-from swarmwire.deploy.campaign.worker import Row, Task, TaskResult
+from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder
 from swarmwire.deploy.record.scenario_copy import Copies, copy_scenario
@@ -33,6 +34,8 @@ from swarmwire.deploy.tuning.study import StudyFile, Trial, TrialResult, importa
 from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.campaign.spec import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.run_folder.writer import PARQUET
+
+FILE = "trials.parquet"
 
 
 def default_tuning_folder(scenario: str) -> Path:
@@ -79,9 +82,6 @@ def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
     if not search.choices:
         return search
     return replace(search, overrides=tuple(copied_overrides(ends, point, copies)[0] for point in ends.points))
-
-
-FILE = "trials.parquet"
 
 
 def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
@@ -236,7 +236,7 @@ class Tuned:
     tuning: Tuning
     trials: tuple[Trial, ...]  # that are over
     best: Trial | None
-    importance: Mapping[str, float]  # by path; empty where nothing can be told
+    importance: Mapping[str, float]  # by path; empty where it is unknown
     check: FreshCheck | None  # None: interrupted before its end
 
     @property
@@ -255,7 +255,7 @@ def begin_tune(plan: TuningPlan, folder: Path, command: str, workers: int | None
 def resume_tune(
     folder: Path, workers: int | None, observers: TuneObservers, *, trials: int | None = None, force: bool = False
 ) -> Tuned:
-    """Run what is missing of the tuning in this folder, to so many trials if that is said.
+    """Run what is missing of the tuning in this folder, up to `trials` if given.
 
     Raises BadInput if the folder holds no tuning, has more trials, its scenario's files have changed, or, unless
     `force`, the code, versions or CPU have; StorageFailed when the disk is full; NothingFound when all trials failed.

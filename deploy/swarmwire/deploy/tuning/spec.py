@@ -21,6 +21,12 @@ from swarmwire.world.scenario.scenario import Scenario
 
 EXPECTED = "expected PATH=LOW:HIGH, such as radio.range_m=1:5, with :log for equal ratios, or choices: PATH=a,b,c"
 Parameter = int | float | str  # as Optuna knows it: of choices the text
+SAMPLERS = ("tpe", "random")
+MAX_TRIALS = 100_000
+MAX_PARALLEL = 1000
+OPTION = "--check-seeds"
+ABOUT = "tuning.json"
+FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -61,18 +67,18 @@ class Search:
 
 def search_of(text: str) -> Vary:
     """What `--search PATH=…` says; BadInput if it is none of the forms."""
-    said = f"--search {text}"
+    where = f"--search {text}"
     try:
-        vary = replace(vary_of(text), said=said)
+        vary = replace(vary_of(text), where=where)
     except BadInput as error:
-        raise BadInput(said, "", EXPECTED if error.expected == OF_VARY else error.expected) from None
+        raise BadInput(where, "", EXPECTED if error.expected == OF_VARY else error.expected) from None
     if isinstance(vary.values, Range) and vary.values.count is not None:
         raise vary.refused(EXPECTED)
     return vary
 
 
 def search_from(vary: Vary, is_whole: Callable[[str], bool]) -> Search:
-    """The search of what was asked; numbers are whole where the scenario's are. BadInput for an empty range."""
+    """The search over what varies; numbers are whole where the scenario's are. BadInput for an empty range."""
     of = vary.values
     if not isinstance(of, Range):
         search = Search(vary.path, choices=of)
@@ -87,11 +93,6 @@ def search_from(vary: Vary, is_whole: Callable[[str], bool]) -> Search:
     if whole and of.log and low < 1:
         raise vary.refused("expected LOW of at least 1 for equal ratios (log)")
     return Search(vary.path, low, high, whole, of.log)
-
-
-SAMPLERS = ("tpe", "random")
-MAX_TRIALS = 100_000
-MAX_PARALLEL = 1000
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class TuningPlan:
 
 
 def tuning_plan(spec: TuningSpec) -> TuningPlan:
-    """The plan of what was asked; BadInput for all that is no good."""
+    """Check a tuning; BadInput for anything that is invalid."""
     _check_numbers(spec)
     _check_paths(spec.searched)
     own = plan_of(SweepSpec(spec.scenario, spec.seeds, overrides=spec.overrides))
@@ -167,15 +168,12 @@ def _check_paths(searched: Sequence[Vary]) -> None:
 def _ends(spec: TuningSpec, vary: Vary, search: Search) -> Plan:
     """The scenario at all choices of a search, or at both its ends, all else as it is; BadInput if one is no good."""
     try:
-        ends = Vary(vary.path, search.trials, vary.said)
+        ends = Vary(vary.path, search.trials, vary.where)
         return plan_of(SweepSpec(spec.scenario, spec.seeds, (ends,), LIST, overrides=spec.overrides))
     except BadInput as error:
         if error.where.startswith("--vary "):  # elsewhere than at the path itself
-            raise BadInput(vary.said, error.key, error.expected) from None
+            raise BadInput(vary.where, error.key, error.expected) from None
         raise
-
-
-OPTION = "--check-seeds"
 
 
 def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
@@ -190,10 +188,6 @@ def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
     if common:
         raise BadInput(OPTION, "", f"expected other seeds than those of the trials; {common[0]} is among both")
     return seeds
-
-
-ABOUT = "tuning.json"
-FORMAT = 1
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,10 @@ from swarmwire.deploy.tuning.spec import Parameter, Search, Tuning
 State = Literal["running", "complete", "failed"]  # running: under way, or it was when the tuning was ended
 
 WHEN = "in tick "  # so begins the line below a traceback that says when in the run it was
+FILE = "study.journal"
+NAME = "swarmwire"
+STATES: Mapping[TrialState, State] = {TrialState.COMPLETE: "complete", TrialState.FAIL: "failed"}
+MIN_TRIALS = 10  # complete ones: fewer do not suffice
 
 
 @dataclass(frozen=True)
@@ -105,11 +109,6 @@ def quietly() -> Generator[None]:
         yield
     finally:
         optuna.logging.set_verbosity(before)
-
-
-FILE = "study.journal"
-NAME = "swarmwire"
-STATES: Mapping[TrialState, State] = {TrialState.COMPLETE: "complete", TrialState.FAIL: "failed"}
 
 
 class StudyFile:
@@ -210,13 +209,10 @@ def _sampler(tuning: Tuning, first: int) -> BaseSampler:
     return TPESampler(seed=seed, constant_liar=True)
 
 
-MIN_TRIALS = 10  # complete ones: of fewer nothing can be told
-
-
 def importance_of(study: StudyFile) -> Mapping[str, float]:
-    """The share of each path, by falling importance, 1 in all; empty of one path alone, or where nothing can be told.
+    """The share of each path, by falling importance, 1 in all; empty of one path alone, or where it is unknown.
 
-    It tells how differently a parameter is spread in the best tenth of the trials and in all of them.
+    It measures how differently a parameter is spread in the best tenth of the trials and in all of them.
     """
     complete = [trial for trial in study.frozen() if trial.state == TrialState.COMPLETE]
     if len(complete) < MIN_TRIALS or len(complete[0].params) < 2:

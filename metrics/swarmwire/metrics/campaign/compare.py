@@ -19,6 +19,21 @@ from swarmwire.metrics.statistics.sample import LEVEL
 from swarmwire.metrics.statistics.summary import Summary, interval_text, quartiles_text, summary
 from swarmwire.metrics.text import number_text
 
+SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean", "limit")
+COLUMNS = ("response", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
+MEANINGS = {
+    "Wilcoxon signed-rank": (
+        "B - A of numbers in pairs: the median of the differences seed by seed, of pairs alone (A, B: of all runs); "
+        "p: Wilcoxon's signed-rank test."
+    ),
+    "Mann-Whitney": "B - A of numbers without pairs: the difference of the medians; p: the test of Mann and Whitney.",
+    "paired Gehan": (
+        "B - A of times in pairs: the difference of Kaplan and Meier's medians, resampled seed by seed; "
+        "p: the paired Wilcoxon test for censored times."
+    ),
+    "log-rank": "B - A of times without pairs: the difference of Kaplan and Meier's medians; p: the log-rank test.",
+}
+
 
 @dataclass(frozen=True)
 class Row:
@@ -87,9 +102,6 @@ def _responses(first: Selection, second: Selection, names: Sequence[str]) -> lis
     return [response for response in common if response.is_usual] or common
 
 
-SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean", "limit")
-
-
 def write_comparison(comparison: Comparison, to: Path) -> None:
     """Write a row per response and pair of points; BadInput unless the path is that of a .csv that can be written.
 
@@ -133,19 +145,6 @@ def _summary(letter: str, of: Summary) -> dict[str, float]:
 
 
 # Heads of a comparison's table.
-COLUMNS = ("response", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
-MEANINGS = {
-    "Wilcoxon signed-rank": (
-        "B - A of numbers in pairs: the median of the differences seed by seed, of pairs alone (A, B: of all runs); "
-        "p: Wilcoxon's signed-rank test."
-    ),
-    "Mann-Whitney": "B - A of numbers without pairs: the difference of the medians; p: the test of Mann and Whitney.",
-    "paired Gehan": (
-        "B - A of times in pairs: the difference of Kaplan and Meier's medians, resampled seed by seed; "
-        "p: the paired Wilcoxon test for censored times."
-    ),
-    "log-rank": "B - A of times without pairs: the difference of Kaplan and Meier's medians; p: the log-rank test.",
-}
 
 
 def cells(comparison: Comparison, row: Row) -> tuple[str, ...]:

@@ -30,19 +30,19 @@ if TYPE_CHECKING:
     import polars as pl
 
 SIM_TIME = "sim_time_s"
-CHANGES_UNDERFOOT = 3  # times that the parts of a campaign that goes on may be joined while they are read
+MAX_RETRIES = 3  # times that the parts of a running campaign may be joined while they are read
 NUMBERS = ("run", "point", "seed")
 NEEDED = (*NUMBERS, "ended", SIM_TIME)
 
 
 class CampaignFolder:
-    """What was asked for, and what came of each run, as it was on disk when first asked for.
+    """The campaign and the results of its runs, as they are on disk at the first access.
 
     BadInput where it is no campaign, is of another format, or a file is damaged.
     """
 
     def __init__(self, path: Path | str) -> None:
-        """Read what was asked for; BadInput unless the folder holds a campaign."""
+        """Read `campaign.json`; BadInput unless the folder holds a campaign."""
         self.path = Path(path)
         if not self.path.is_dir():
             raise BadInput(str(path), "", "expected a campaign's folder: there is none")
@@ -73,7 +73,7 @@ class CampaignFolder:
         """
         import polars as pl
 
-        for _ in range(CHANGES_UNDERFOOT):
+        for _ in range(MAX_RETRIES):
             files = self._files()
             try:
                 frames = [read_parquet(file) for file in files]
@@ -94,13 +94,13 @@ class CampaignFolder:
 
     @property
     def missing(self) -> tuple[int, ...]:
-        """Numbers of the runs that were asked for and have no row (yet)."""
+        """Numbers of the runs that have no row (yet)."""
         there: set[int] = set(self._column("run").tolist())
         return tuple(run for run in range(self.about.runs) if run not in there)
 
     @property
     def finished(self) -> bool:
-        """Whether every run that was asked for has ended, well or not."""
+        """Whether every run has ended, well or not."""
         return not self.missing
 
     def response(self, name: str) -> Response:
@@ -112,7 +112,7 @@ class CampaignFolder:
         return find_statistic(name, self.responses, str(self.path))
 
     def sample(self, column: str, point: int) -> Sample:
-        """The values of a response over the seeds of a design point, in the seeds' order as they were asked for.
+        """The values of a response over the seeds of a design point, in the order of the campaign's seeds.
 
         A number that is null is undefined; a time that is null is right-censored at its run's end. BadInput for an
         response or a point that there is not.
@@ -146,7 +146,7 @@ class CampaignFolder:
         return self.runs[name].to_numpy()
 
     def _numbers(self, name: str) -> FloatArray:
-        """A column of numbers (runs,), NaN where it is null; all NaN before any run has told of it."""
+        """A column of numbers (runs,), NaN where it is null; all NaN before any run has this column."""
         import polars as pl
 
         if name not in self.runs.columns:

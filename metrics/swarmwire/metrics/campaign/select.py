@@ -15,7 +15,7 @@ from swarmwire.metrics.campaign.spec import point_text, same_value, value_from, 
 class Selection:
     """Points of a campaign, by their numbers."""
 
-    text: str  # as it was asked for
+    text: str  # FOLDER@path=value, for messages
     campaign: CampaignFolder
     points: tuple[int, ...]
     pinned: frozenset[str]  # parameters of which one value was chosen
@@ -88,7 +88,7 @@ def shared_paths(first: Selection, second: Selection) -> tuple[str, ...]:
 
 
 def point_pairs(first: Selection, second: Selection) -> list[PointPair]:
-    """Points that agree in what both vary, in the first's order; BadInput if there are none, or nothing tells which."""
+    """Points that agree in what both vary, in the first's order; BadInput if there are none, or if their pairs are ambiguous."""
     paths = shared_paths(first, second)
     if not paths and len(first.points) > 1 and len(second.points) > 1:
         expected = f"expected a parameter that both vary: {_paths(first)} and {_paths(second)}; choose points with @"

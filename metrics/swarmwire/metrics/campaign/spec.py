@@ -20,7 +20,7 @@ from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.statistics.sample import Kind
 
 CAMPAIGN_FORMAT = 1  # of campaign.json and of the tables beside it; another is refused
-ABOUT = "campaign.json"  # what was asked for, written first
+ABOUT = "campaign.json"  # the campaign, written first
 SUMMARY = "summary.parquet"  # a row per run, once all have ended
 PARTS = "parts"  # the same rows before that, a file for each task
 FAILED = "failed"  # in the column `ended`
@@ -56,7 +56,7 @@ class Response:
 
     @property
     def is_usual(self) -> bool:
-        """Whether it is told of where none is named: a time, the last value of a metric, or the link PDR."""
+        """Whether reports show it by default: a time, the last value of a metric, or the link PDR."""
         return self.kind == "time" or self.column.endswith(FINAL) or self.column == LINK_PDR
 
 

@@ -94,7 +94,7 @@ def test_a_cluster_gives_the_rows_and_series_of_one_machine_and_is_left_as_it_wa
 
 def test_an_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, one_worker):
     kill = ['robots.pair.params.how="kill"']
-    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=kill)
+    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, batch=2, overrides=kill)
     assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died"]
     assert one_worker.nannies[0].is_running()
 
@@ -147,9 +147,9 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
     same(tmp_path / "c", reference)
 
 
-@pytest.mark.slow  # dask waits five seconds at least
+@pytest.mark.slow  # dask waits fifteen seconds at least
 def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference):
-    with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="5s") as there:  # in place of five minutes
+    with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="15s") as there:  # in place of five minutes
 
         def freeze_it():
             there.add_worker()

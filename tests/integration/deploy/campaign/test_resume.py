@@ -1,5 +1,6 @@
 """A campaign that was ended at any moment is gone on with, and comes to what it would have come to."""
 
+import errno
 import json
 from shutil import copytree
 
@@ -9,8 +10,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import store
 from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.commands import called
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 2, "vary": VARY, "batch": 2}
@@ -136,3 +139,52 @@ def test_a_folder_that_is_no_campaign_is_refused_in_a_line(tmp_path, text):
 def test_a_folder_is_for_one_process_at_a_time(whole):
     with store.locked(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
         resume(whole)
+
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_disk_that_is_full_at_some_time_loses_nothing_that_is_done(tmp_path, scenario, here, monkeypatch):
+    folder, count = tmp_path / "c", 3
+    with monkeypatch.context() as patched:
+        dying_at(patched, count, FULL)
+        with pytest.raises(StorageFailed) as told:
+            sweep(scenario, out=folder, **ASKED)
+    assert str(told.value).startswith(f"{folder}: ")
+    assert "No space left on device" in str(told.value)
+    assert str(told.value).endswith(f"swarmwire sweep --resume {folder}")
+    assert len(rows_in(folder)) == 2 * (count // 2)
+    assert here[0].closed
+    assert resume(folder).is_over
+    assert len(rows_in(folder)) == 4
+
+
+def test_the_command_line_says_so_in_one_line(tmp_path, scenario, here, monkeypatch, capsys):
+    with monkeypatch.context() as patched:
+        dying_at(patched, 2, FULL)
+        code, _, errors = called(
+            patched, capsys, "sweep", scenario, "--seeds", "2", "--batch", "1", "--out", tmp_path / "c"
+        )
+    assert code == 1
+    assert errors.startswith(f"error: {tmp_path / 'c'}: ")
+    assert errors.count("\n") == 1
+
+
+def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, here, monkeypatch):
+    import polars as pl
+
+    sink = pl.LazyFrame.sink_parquet
+
+    def full(frame, path, **options):
+        if "worker-" in str(path):
+            raise pl.exceptions.ComputeError("No space left on device (os error 28)")
+        return sink(frame, path, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pl.LazyFrame, "sink_parquet", full)
+        with pytest.raises(StorageFailed, match="No space left"):
+            sweep(scenario, out=tmp_path / "c", **ASKED)
+    assert len(rows_in(tmp_path / "c")) == 4
+    assert not list((tmp_path / "c" / "series").glob("worker-*"))
+    assert resume(tmp_path / "c").is_over
+    assert "series" in [path.name for path in (tmp_path / "c").iterdir()]

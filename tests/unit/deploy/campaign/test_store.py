@@ -1,8 +1,11 @@
 """What `sweep` writes, statistics read: a campaign's folder by its writer, seen through its reader."""
 
+import polars as pl
 import pytest
 
+from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.store import CampaignFolder as Written
+from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import Campaign, CopiedFile, Response, write_campaign
@@ -74,3 +77,35 @@ def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
     written.keep(TaskResult((row(2, **{"order.final": 0.7}),)))
     again = CampaignFolder(written.path).sample("order", 1)
     assert (again.value.tolist(), again.failed) == ([0.7], 0)
+
+
+@pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
+def test_a_resumed_campaign_names_a_damaged_table_also_where_polars_panics(written, monkeypatch, damage):
+    read, part = pl.read_parquet, written.path / "parts" / "part-00000001.parquet"
+
+    def damaged(file, **options):
+        if file == part:
+            raise damage
+        return read(file, **options)
+
+    monkeypatch.setattr(pl, "read_parquet", damaged)
+    for call in (written.rows, written.ended, written.clear, lambda: written.finish(1)):
+        with pytest.raises(BadInput) as refused:
+            call()
+        assert refused.value.where == str(part)
+        assert "--resume runs again" in refused.value.expected
+
+
+@pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
+def test_a_series_that_is_damaged_while_it_is_joined_is_one_line(written, monkeypatch, damage):
+    frame = pl.DataFrame({"run": [3], "tick": [0], "order": [0.5]})
+    (written.path / "series").mkdir()
+    frame.write_parquet(written.path / "series" / "part-00000003.parquet")
+
+    def damaged(*_, **__):
+        raise damage
+
+    monkeypatch.setattr(pl.LazyFrame, "sink_parquet", damaged)
+    with pytest.raises(StorageFailed, match="--resume") as failed:
+        written.finish(1)
+    assert "\n" not in str(failed.value)
