@@ -88,7 +88,10 @@ def shared_paths(first: Selection, second: Selection) -> tuple[str, ...]:
 
 
 def point_pairs(first: Selection, second: Selection) -> list[PointPair]:
-    """Points that agree in what both vary, in the first's order; BadInput if there are none, or if their pairs are ambiguous."""
+    """Points that agree in what both vary, in the first's order.
+
+    BadInput if there are none, or if their pairs are ambiguous.
+    """
     paths = shared_paths(first, second)
     if not paths and len(first.points) > 1 and len(second.points) > 1:
         expected = f"expected a parameter that both vary: {_paths(first)} and {_paths(second)}; choose points with @"
