@@ -18,7 +18,8 @@ import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, Phase, settings
 
-# The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
+# The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`, `soak` for
+# `make soak`, in which tests/integration/test_fuzz.py goes on for hours.
 _SHARED: dict[str, Any] = {
     "deadline": None,
     "derandomize": True,
@@ -29,6 +30,7 @@ _SHARED: dict[str, Any] = {
 }
 settings.register_profile("quick", max_examples=20, **_SHARED)
 settings.register_profile("full", max_examples=100, **_SHARED)
+settings.register_profile("soak", max_examples=1000, **_SHARED)
 PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "quick")
 settings.load_profile(PROFILE)
 
