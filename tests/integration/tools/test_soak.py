@@ -9,10 +9,9 @@ import pytest
 from tests.support.deploy.runs import record_run
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken
-from tests.tools.soak.samples import Sample
-from tests.tools.soak.schedules.plan import draw
-from tests.tools.soak.schedules.play import play
-from tests.tools.soak.verdict import flatness
+from tests.tools.soak.plan import draw
+from tests.tools.soak.plays import play
+from tests.tools.soak.samples import Sample, flatness
 
 ROBOTS = ("a", "b")
 JOINED = ("joined", "r0", ROBOTS, -1)

@@ -15,8 +15,8 @@ import numpy as np
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.control.remote_control import controlling
-from tests.tools.soak.agenda import Agenda
-from tests.tools.soak.place import Kind, Place, environment
+from tests.tools.soak.place import Kind, Place
+from tests.tools.soak.processes import Agenda, environment
 from tests.tools.soak.samples import Samples
 from tests.tools.soak.troubles import Troubles
 
@@ -57,8 +57,8 @@ class Hour:
         self.places = [Place(kind, folder.absolute() / kind.name, env) for kind in kinds(processes)]
         self._samples = Samples(folder / "samples.csv")
         self._log = (folder / "troubles.jsonl").open("w", buffering=1)
-        self.places[0].look_on(["observer-calm", "page-calm", "tab-calm", "observer", "page", "tab"])
-        self.places[1].look_on(["observer-calm", "observer"])
+        self.places[0].observe(["observer-calm", "page-calm", "tab-calm", "observer", "page", "tab"])
+        self.places[1].observe(["observer-calm", "observer"])
         rngs = np.random.default_rng(seed).spawn(len(self.places))
         self.troubles = [
             Troubles(place, rng, self._teller(place.kind.name), TIMEOUT_S)

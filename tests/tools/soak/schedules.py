@@ -1,5 +1,9 @@
-"""Many schedules, a few at a time: each in a child of this process, which has imported all that they need."""
+"""`python -m tests.tools.soak.schedules --count 200 --seed 1`: random schedules of faults, each in its own process.
 
+A schedule that fails is named with its seed; `--only SEED` plays it alone, and shows what it does.
+"""
+
+import argparse
 import contextlib
 import faulthandler
 import json
@@ -17,9 +21,24 @@ from pathlib import Path
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from tests.tools.soak.invariants import Broken
-from tests.tools.soak.schedules.plan import draw
-from tests.tools.soak.schedules.play import play
-from tests.tools.soak.supervised import family
+from tests.tools.soak.plan import draw
+from tests.tools.soak.plays import play
+from tests.tools.soak.processes import family
+
+
+def main() -> int:
+    """The exit code: 0 if all held."""
+    parser = argparse.ArgumentParser("python -m tests.tools.soak.schedules", description=__doc__)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1, help="of the first; the others follow")
+    parser.add_argument("--jobs", type=int, default=2, help="how many are played at the same time")
+    parser.add_argument("--only", type=int, metavar="SEED", help="this one, here")
+    parser.add_argument("--out", type=Path, help="a file for a line of each, as it is over")
+    given = parser.parse_args()
+    if given.only is not None:
+        return play_one(given.only)
+    return play_all(range(given.seed, given.seed + given.count), given.jobs, given.out)
+
 
 LIMIT_S = 600.0  # of one schedule, on a machine that is busy
 EACH_S = 0.05
@@ -120,3 +139,7 @@ def _code(pid: int, *, is_late: bool) -> int | None:
     os.kill(pid, signal.SIGKILL)
     os.waitpid(pid, 0)
     return HUNG
+
+
+if __name__ == "__main__":
+    sys.exit(main())

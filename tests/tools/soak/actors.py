@@ -3,17 +3,18 @@
 import signal
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+
+import psutil
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.config import JoinObserver
 from tests.support.deploy.runs import WATCHER
-from tests.tools.soak.agenda import Agenda, Steps
 from tests.tools.soak.invariants import Broken
-from tests.tools.soak.place import SCENARIO
-from tests.tools.soak.schedules.plan import Fault, Plan
-from tests.tools.soak.supervised import PYTHON, Supervised
+from tests.tools.soak.plan import Fault, Plan
+from tests.tools.soak.processes import PYTHON, SCENARIO, Agenda, Steps, Supervised
 
 EACH_S = 0.01
 END_S = 120.0  # a runner that cannot reach its world any more gives up after 30 s; a machine may be busy
@@ -162,3 +163,40 @@ class Actors(threading.Thread, Observer, JoinObserver):
     def _route(self):
         return (*PYTHON, "swarmwire.deploy", "router", "--listen", self._front or "tcp/127.0.0.1:0", "--connect",
                 self._world)  # fmt: skip
+
+
+class Nursed(Actors):
+    """Runners that are the run's own, and observers. Who is dead stays so: nobody starts another."""
+
+    def _tend(self, now_ns: int) -> None:
+        if self.tick >= 0:
+            for one in self.observers.values():
+                one.tend(now_ns)
+
+    def _steps(self, fault: Fault) -> Steps:
+        if fault.who in self.observers:
+            yield from super()._steps(fault)
+            return
+        own = self._own()
+        at = int(fault.who.removeprefix("r"))
+        if at >= len(own):
+            return
+        if fault.what in ("killed", "leaves"):
+            _send(own[at], signal.SIGKILL if fault.what == "killed" else signal.SIGTERM)
+            return
+        _send(own[at], signal.SIGSTOP)
+        yield fault.for_s
+        _send(own[at], signal.SIGCONT)
+
+    def _own(self) -> list[psutil.Process]:
+        found: list[psutil.Process] = []
+        for one in psutil.Process().children():
+            with suppress(psutil.Error):  # an agent host whose runners are all dead has ended
+                if "swarmwire.agent.agent_host" in one.cmdline():
+                    found += sorted(one.children(), key=lambda child: child.pid)
+        return found
+
+
+def _send(process: psutil.Process, number: signal.Signals) -> None:
+    with suppress(psutil.NoSuchProcess):
+        process.send_signal(number)

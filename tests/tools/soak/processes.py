@@ -1,15 +1,20 @@
-"""A process that somebody looks after: it is started again some time after it has ended, as systemd would."""
+"""Processes of a soak, which start again some time after they ended, and steps that act on them."""
 
+import heapq
+import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from itertools import count
 from pathlib import Path
 
 import psutil
 
 from swarmwire.comms.clock import to_ns
+from tests.support.deploy.commands import ROOT
 
+SCENARIO = Path(__file__).parent / "soak.toml"
 PYTHON = (sys.executable, "-m")
 LET_GO_S = 10.0  # how long a process that is asked to end may take
 
@@ -104,3 +109,38 @@ def family(pid: int) -> list[psutil.Process]:
         return psutil.Process(pid).children(recursive=True)
     except psutil.NoSuchProcess:
         return []
+
+
+def environment(temporary: Path) -> Mapping[str, str]:
+    """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
+    own = temporary / "own"
+    own.mkdir(parents=True, mode=0o700)
+    return {
+        **os.environ,
+        "TMPDIR": str(temporary),
+        "XDG_RUNTIME_DIR": str(own),
+        "PYTHONPATH": str(ROOT),
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+
+
+Steps = Generator[float]
+
+
+class Agenda:
+    """Generators that are under way, each taken up again when it is due."""
+
+    def __init__(self) -> None:
+        self._due: list[tuple[int, int, Steps]] = []
+        self._serial = count()
+
+    def begin(self, steps: Steps, now_ns: int) -> None:
+        """Have it act now, and go on when it wants to."""
+        wait_s = next(steps, None)
+        if wait_s is not None:
+            heapq.heappush(self._due, (now_ns + to_ns(wait_s), next(self._serial), steps))
+
+    def step(self, now_ns: int) -> None:
+        """All that is due."""
+        while self._due and self._due[0][0] <= now_ns:
+            self.begin(heapq.heappop(self._due)[2], now_ns)
