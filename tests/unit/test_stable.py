@@ -8,7 +8,7 @@ from tests.tools.stable import kept
 
 DECIDE = (
     "no longer there. If that is wanted, raise the version (docs/stability.md says where it stands), tell users in "
-    "CHANGELOG.md, and write the list again: `python -m tests.tools.stable`."
+    "CHANGELOG.md, and write the list again: `python -m tests.tools.stable.kept`."
 )
 
 
