@@ -25,7 +25,7 @@ from uuid import uuid4
 import distributed
 from distributed import Status, WorkerPlugin, get_worker
 from distributed.exceptions import WorkerStartTimeoutError
-from distributed.protocol.pickle import dumps
+from distributed.protocol import pickle
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 from distributed.worker import WORKER_ANY_RUNNING, Worker
@@ -146,7 +146,9 @@ class DaskExecutor:
         """Prepare all workers; there are no files, and no campaign.json, before the first task."""
         modules = tuple(read_campaign(self._scenario.parent).modules)
         self._begun = True
-        plugin = dumps(Preparation(self._campaign, environment(modules), _files(self._scenario)))
+        plugin: bytes = cast(Any, pickle).dumps(
+            Preparation(self._campaign, environment(modules), _files(self._scenario))
+        )
         call = self._client.scheduler.register_worker_plugin  # `Client.register_plugin` has no time limit
         try:
             found: dict[str, Any] = self._client.sync(

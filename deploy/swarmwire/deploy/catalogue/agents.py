@@ -68,6 +68,7 @@ def _parameter(of: Declared, comment: str) -> Parameter:
 def message_fields() -> list[Entry]:
     """The types of a message's fields."""
     hints = {name: get_args(getattr(agent, name)) for name in agent.__all__}
+    found: dict[str, np.dtype[Any]]
     found = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
     return [
         Entry("field", name, _range(of), (("in a message", f"value: {name}"), ("bytes on air", str(of.itemsize))))

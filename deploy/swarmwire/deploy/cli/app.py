@@ -11,7 +11,8 @@ from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.certs import certs_app
 from swarmwire.deploy.cli.compare import compare_command
-from swarmwire.deploy.cli.ctl_events import ctl_app
+from swarmwire.deploy.cli.ctl import ctl_app
+from swarmwire.deploy.cli.ctl_events import events_app
 from swarmwire.deploy.cli.draw import draw_command
 from swarmwire.deploy.cli.export import export_command
 from swarmwire.deploy.cli.inspect import (
@@ -69,6 +70,7 @@ def options(
 app.command("new", rich_help_panel=RUN)(new_command)
 app.command("run", rich_help_panel=RUN)(run_command)
 app.command("repeat", rich_help_panel=RUN)(repeat_command)
+ctl_app.add_typer(events_app)
 app.add_typer(ctl_app, name="ctl", rich_help_panel=RUN)
 app.command("view", rich_help_panel=VIEW)(view_command)
 app.command("ui", rich_help_panel=VIEW)(ui_command)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
+from swarmwire.deploy.cli.ctl import Chosen, control_of, tell
 
 if TYPE_CHECKING:
     from swarmwire.deploy.control.remote_control import RemoteControl
@@ -23,8 +23,10 @@ ForS = Annotated[
     float | None, typer.Option("--for", help="Undone after so many simulated seconds. Default: not.", metavar="S")
 ]
 
+events_app = typer.Typer()
 
-@ctl_app.command("kill")
+
+@events_app.command("kill")
 def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> None:
     """Kill robots: they stop where they stand, and say nothing.
 
@@ -39,7 +41,7 @@ def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> N
     give(context.obj, {"do": "kill", "robots": selection_of(robots), "for_s": for_s})
 
 
-@ctl_app.command("revive")
+@events_app.command("revive")
 def revive_command(context: typer.Context, robots: Which) -> None:
     """Have robots that were killed act again, with a fresh memory.
 
@@ -50,7 +52,7 @@ def revive_command(context: typer.Context, robots: Which) -> None:
     give(context.obj, {"do": "revive", "robots": selection_of(robots)})
 
 
-@ctl_app.command("impulse")
+@events_app.command("impulse")
 def impulse_command(
     context: typer.Context,
     robots: Which,
@@ -72,7 +74,7 @@ def impulse_command(
 RADIO = "radio."
 
 
-@ctl_app.command("partition")
+@events_app.command("partition")
 def partition_command(
     context: typer.Context,
     halves: Annotated[
@@ -112,7 +114,7 @@ def partition_command(
     give(context.obj, table)
 
 
-@ctl_app.command("jam")
+@events_app.command("jam")
 def jam_command(
     context: typer.Context,
     robots: Annotated[
@@ -144,7 +146,7 @@ def jam_command(
     give(context.obj, table)
 
 
-@ctl_app.command("set")
+@events_app.command("set")
 def set_command(
     context: typer.Context,
     settings: Annotated[list[str], typer.Argument(help="Numbers of the radio, such as loss=0.5.", metavar="KEY=VALUE")],
@@ -192,7 +194,7 @@ def _place(text: str) -> list[float]:
 COLUMNS = ("number", "tick", "event", "")
 
 
-@ctl_app.command("event")
+@events_app.command("event")
 def event_command(
     context: typer.Context,
     table: Annotated[
@@ -210,7 +212,7 @@ def event_command(
     give(context.obj, _table(table))
 
 
-@ctl_app.command("events")
+@events_app.command("events")
 def events_command(context: typer.Context) -> None:
     """List the run's events, the scenario's and those given: number, tick, what, and whether it is over.
 
@@ -241,7 +243,7 @@ def events_command(context: typer.Context) -> None:
     print_rows(COLUMNS, rows, Console(highlight=False))
 
 
-@ctl_app.command("end")
+@events_app.command("end")
 def end_command(
     context: typer.Context,
     number: Annotated[int, typer.Argument(help="Of the event, as `events` tells it.", min=0, metavar="NUMBER")],

@@ -26,6 +26,7 @@ FULL, RING = "radio.range_m=3", "radio.range_m=0.8"
 BASE_M, MAX_MPS = 0.14, 0.1
 SCENARIO = Path("scenarios/behaviours/lennard_jones_flocking.toml")
 RAYS = load_body("flockbot").proximity
+assert RAYS is not None
 RESPONSE = RAYS.response
 DIAMETER_M = 0.07
 ANGLES = [-30, 0, 30, 60, 90, 120, 150, 180, 210, 240, 270, 300]

@@ -1,7 +1,8 @@
 """Workers of this machine: their messages, and how long one may send nothing."""
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.deploy.campaign.local import MAX_SILENCE_S, Silence, receive, send
+from swarmwire.deploy.campaign.local import Silence, receive, send
+from swarmwire.deploy.campaign.worker import MAX_SILENCE_S
 from tests.support.clocks import FakeClock
 
 

@@ -25,6 +25,7 @@ from tests.support.world.brute_force import Sample, sample
 from tests.support.world.scenes import read, scene
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
+assert FOOTBOT.proximity is not None
 BEACON = replace(FOOTBOT, leds=Leds(angles_deg=(0.0,), height_m=0.085, radius_m=0.09, beacon_height_m=0.174249733))
 HIGH = CameraSpec(height_m=0.2887, aperture_deg=70.0)
 GREEN = 0x00FF00
