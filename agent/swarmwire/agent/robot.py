@@ -82,8 +82,7 @@ class Robot(RobotHandle[float]):
 
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
         row = self._row
-        columns = self._context.columns(sensor)
-        values = [column.item(row) if column.ndim == 1 else column[row] for column in columns]
+        values = [of.item(row) if of.ndim == 1 else of[row] for of in self._context.columns(sensor)]
         return sensor.one(*values, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.one(*values)
 
 

@@ -60,8 +60,7 @@ class StepContext:
     def columns(self, sensor: SensorProperty[Any, Any]) -> list[FloatArray]:
         """The fields of a built-in sensor, (n, …) each; NotDeclared if the agent's needs do not name the sensor."""
         self._require(sensor.name)
-        fields = self.readings.fields
-        return [fields[column] for column in sensor.columns]
+        return [*map(self.readings.fields.__getitem__, sensor.columns)]
 
     def fields(self, sensor: str) -> dict[str, FloatArray]:
         """All fields of a sensor, (n, …) each, by name; NotDeclared if the agent's needs do not name the sensor."""
@@ -220,9 +219,8 @@ class StepContext:
     def _actions(self) -> Actions:
         sent = SentPackets.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
-        names = {"notes": tuple(self._states)}
         tables = {
-            name: SparseTable.of(self.readings.rows, values, names.get(name, ()))
+            name: SparseTable.of(self.readings.rows, values, tuple(self._states) if name == "notes" else ())
             for name, values in self._tables.items()
         }
         return Actions(self.readings.rows, self.drive, *command, sent, **tables)
