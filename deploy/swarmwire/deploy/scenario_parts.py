@@ -12,8 +12,8 @@ from swarmwire.comms.plugins import resolve
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.traces import LinkTraces
+from swarmwire.metrics.measure import Condition
 from swarmwire.metrics.registry import MetricEntry, MetricSelection, select_metrics
-from swarmwire.metrics.stop import Condition
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.tables import MetricTable

@@ -13,14 +13,14 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
-from swarmwire.metrics.campaign.select import select
+from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RobotLog
 from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.sim_to_real.runs import EmulatedRuns, runs_of_campaign, runs_of_folder
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World

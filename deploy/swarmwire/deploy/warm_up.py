@@ -13,7 +13,7 @@ from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 

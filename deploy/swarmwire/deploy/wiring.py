@@ -37,12 +37,12 @@ from swarmwire.deploy.runners import check_socket, new_run_id
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, new_medium
 from swarmwire.deploy.warm_up import warm_up
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.measure import StopConditions as MetricStopConditions
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.run_folder.layout import RECORDING, metric_info
 from swarmwire.metrics.run_folder.table import RecordOptions
 from swarmwire.metrics.run_folder.tables import recorders
-from swarmwire.metrics.stop import StopConditions as MetricStopConditions
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 
 from docs.experiments.figures._pso_samples import EVERY_S, HALF, at, mean_distances, times, values
-from swarmwire.metrics.drawing.style import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.drawing.canvas import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
 from swarmwire.metrics.report.axes import ordered_colors
 from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.sample import Sample

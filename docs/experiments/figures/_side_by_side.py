@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.style import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
 from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
 from swarmwire.metrics.statistics.sample import Interval

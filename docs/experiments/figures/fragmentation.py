@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.style import SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, plain_axes
 from swarmwire.metrics.report.axes import ordered_colors
 from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval

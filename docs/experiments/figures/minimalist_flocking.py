@@ -62,7 +62,7 @@ def swarms(runs: Mapping[str, pl.DataFrame]) -> dict[tuple[str, int], pl.DataFra
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Survival curves: a row for each series, a column for each share; full lines by one hop, dashed by clusters."""
-    from swarmwire.metrics.drawing.style import INK, SOFT, TEXT_PT, plain_axes
+    from swarmwire.metrics.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
     from swarmwire.metrics.report.axes import ordered_colors
     from swarmwire.metrics.report.page import blank_figure
 

@@ -16,7 +16,7 @@ from docs.experiments.figures._pso_panels import (
 )
 from docs.experiments.figures._pso_samples import FIRST, HALF, at, digested, times, values
 from docs.experiments.figures._pso_tables import against_model, variants_table
-from swarmwire.metrics.drawing.style import ACCENT, CURVE, SMALL_PT, SOFT, Look
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, Look
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
 

@@ -1,10 +1,16 @@
-"""Numbers and names as text, for pages, figures, tables and terminals."""
+"""Numbers and names as text, for pages, figures, tables, terminals and JSON."""
 
 import math
 from collections.abc import Sequence
 
 UNKNOWN_TEXT = "–"  # in place of a number
 _WHOLE = 1000.0  # numbers from here on are written without decimals
+
+
+def json_number(number: float) -> float | None:
+    """A Python float, or None for what is not a number: undefined, or nothing to measure."""
+    value = float(number)
+    return None if math.isnan(value) else value
 
 
 def number(value: float | None) -> str:

@@ -6,10 +6,9 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure
+from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.swarm.aggregation import Aggregation
 from swarmwire.metrics.swarm.order import Order
-from swarmwire.metrics.tick_view import TickView
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.aggregation import OfClosePairs
 from swarmwire.metrics.swarm.pairs import radii_m
-from swarmwire.metrics.tick_view import TickView
 
 
 @dataclass(frozen=True)

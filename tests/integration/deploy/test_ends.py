@@ -24,9 +24,8 @@ from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.recording_check import check_recording
 from swarmwire.metrics.run_folder.table import State
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.run_folder.verify import check_recording, verify
 from swarmwire.metrics.run_folder.writer import part_file, parts_of
 from tests.support.deploy.commands import LOSSY, called, family, runners_of, started, swarmwire
 from tests.support.deploy.runs import record_run

@@ -9,10 +9,9 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
 from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.metrics.campaign.select import select
+from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.real_log.measured_log import measured_log
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.sim_to_real.comparison import (
@@ -23,8 +22,7 @@ from swarmwire.metrics.sim_to_real.comparison import (
     Spread,
     compare_sim_to_real,
 )
-from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns, runs_of_campaign, runs_of_folder
-from swarmwire.metrics.sim_to_real.texts import (
+from swarmwire.metrics.sim_to_real.report import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -33,6 +31,7 @@ from swarmwire.metrics.sim_to_real.texts import (
     radio_cells,
     verdict,
 )
+from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, measured_log, runs_of_campaign, runs_of_folder
 from swarmwire.metrics.statistics.sample import UNKNOWN
 from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.commands import LOSSY

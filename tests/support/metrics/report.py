@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder.events import EventLog
 from tests.support.metrics.recorded import made_up_summary, record
 from tests.support.metrics.truths import watch

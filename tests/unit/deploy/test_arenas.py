@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.metrics.run_folder.static import read_static
+from swarmwire.metrics.run_folder.tables import read_static
 from tests.support.deploy.commands import ROOT
 
 MAZE = ROOT / "scenarios" / "maze.toml"

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from swarmwire.deploy.terminal.tables import print_comparison
 from swarmwire.metrics.campaign.compare import compare
-from swarmwire.metrics.campaign.select import select
+from swarmwire.metrics.campaign.folder import select
 from tests.support.deploy.commands import called
 from tests.support.metrics.campaign.campaigns import write_campaign
 

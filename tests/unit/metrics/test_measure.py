@@ -9,9 +9,8 @@ import pytest
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric, Sampled
+from swarmwire.metrics.metric import Components, Metric, Sampled, TickView, agreement
 from swarmwire.metrics.swarm.order import Order
-from swarmwire.metrics.tick_view import Components, TickView, agreement
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
 
 

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measure import Condition, Metrics, StopConditions
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.stop import Condition, StopConditions
 from tests.support.metrics.truths import static, truth
 
 NONE = math.nan

@@ -35,8 +35,8 @@ def compare_command(
 
     from swarmwire.deploy.terminal.tables import print_comparison
     from swarmwire.metrics.campaign.compare import compare, write_comparison
-    from swarmwire.metrics.campaign.select import at as at_points
-    from swarmwire.metrics.campaign.select import select
+    from swarmwire.metrics.campaign.folder import at as at_points
+    from swarmwire.metrics.campaign.folder import select
 
     first, second = at_points([select(a), select(b)], at or [])
     found = compare(first, second, response or [])

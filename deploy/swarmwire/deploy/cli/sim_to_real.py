@@ -37,10 +37,10 @@ def sim_to_real_command(
     from swarmwire.deploy.sim_to_real import differing_settings, read_emulation
     from swarmwire.deploy.terminal.tables import print_sim_to_real
     from swarmwire.metrics.atomic import check_output_path
-    from swarmwire.metrics.real_log.measured_log import measured_log
     from swarmwire.metrics.real_log.real_logs import read_real_logs
     from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
-    from swarmwire.metrics.sim_to_real.texts import write_sim_to_real
+    from swarmwire.metrics.sim_to_real.report import write_sim_to_real
+    from swarmwire.metrics.sim_to_real.runs import measured_log
 
     for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
         if path is not None:

@@ -8,7 +8,7 @@ from swarmwire.deploy.export.exporter import Exporter, ExportOptions
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
-    from swarmwire.metrics.capture.link_headers import Link
+    from swarmwire.metrics.capture import Link
     from swarmwire.metrics.run_folder.reader import RunFolder
 
 MAX_S = 1e9  # longer than any run; in ns it still fits 64 bits
@@ -21,7 +21,7 @@ def _write(run: Path, to: Path, options: ExportOptions) -> str:
     """
     from swarmwire.comms.clock import to_ns
     from swarmwire.metrics.atomic import check_output_path
-    from swarmwire.metrics.capture.pcapng import frames_on_air, write_capture
+    from swarmwire.metrics.capture import frames_on_air, write_capture
     from swarmwire.metrics.run_folder.reader import RunFolder
 
     check_output_path(to, CAPTURE.suffixes)
@@ -52,7 +52,7 @@ def _check_times(from_s: float | None, until_s: float | None) -> None:
 
 def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     """The radio of a run whose packets were recorded, and its link type in captures."""
-    from swarmwire.metrics.capture.link_headers import link_of
+    from swarmwire.metrics.capture import link_of
     from swarmwire.metrics.run_folder.layout import SCENARIO
     from swarmwire.world.scenario_file import load_scenario
 

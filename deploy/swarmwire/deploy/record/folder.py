@@ -20,8 +20,7 @@ from swarmwire.deploy.record.live_events import LiveEventsLog, LiveEventsRecord
 from swarmwire.deploy.record.provenance import RunFacts
 from swarmwire.deploy.record.scenario_copy import copy_scenario
 from swarmwire.metrics.atomic import write_text
-from swarmwire.metrics.run_folder.layout import LOG, SUMMARY
-from swarmwire.metrics.run_folder.log import RunLog
+from swarmwire.metrics.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario
 

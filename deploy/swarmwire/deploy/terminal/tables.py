@@ -55,7 +55,7 @@ def print_comparison(comparison: "Comparison", console: Console) -> None:
 
 def print_sim_to_real(of: "SimToReal", told: Sequence[str], console: Console) -> None:
     """All of it; `told` is what differs in the settings, and what is amiss with the logs, a line each."""
-    from swarmwire.metrics.sim_to_real.texts import (
+    from swarmwire.metrics.sim_to_real.report import (
         COLUMNS,
         RADIO_COLUMNS,
         left_out,

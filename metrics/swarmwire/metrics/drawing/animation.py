@@ -8,7 +8,17 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, ByteArray, IntArray
 from swarmwire.comms.extras import REPORT
-from swarmwire.metrics.drawing.canvas import add_arena_axes, lay_out, new_figure, pixels, save
+from swarmwire.metrics.drawing.canvas import (
+    INK,
+    LONG_SIDE_IN,
+    STATE_COLORS,
+    TITLE_PT,
+    add_arena_axes,
+    lay_out,
+    new_figure,
+    pixels,
+    save,
+)
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.metrics_strip import MetricStrip, choose
 from swarmwire.metrics.drawing.scene import (
@@ -23,7 +33,6 @@ from swarmwire.metrics.drawing.scene import (
     place_movable,
     state_entries,
 )
-from swarmwire.metrics.drawing.style import INK, LONG_SIDE_IN, STATE_COLORS, TITLE_PT
 from swarmwire.metrics.drawing.swarm import Swarm, in_range
 from swarmwire.metrics.torus import whole_path
 

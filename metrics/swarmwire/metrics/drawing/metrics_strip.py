@@ -8,9 +8,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.drawing.canvas import Layout
+from swarmwire.metrics.drawing.canvas import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Layout, Look
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.drawing.style import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Look
 from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 

@@ -9,9 +9,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.drawing.canvas import new_figure, save
-from swarmwire.metrics.drawing.scene import draw_scenery
-from swarmwire.metrics.drawing.style import (
+from swarmwire.metrics.drawing.canvas import (
     CURVE,
     FAINT,
     FLOOR,
@@ -25,8 +23,11 @@ from swarmwire.metrics.drawing.style import (
     TEXT_PT,
     TITLE_PT,
     Look,
+    new_figure,
     plain_axes,
+    save,
 )
+from swarmwire.metrics.drawing.scene import draw_scenery
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import new_figure, save
-from swarmwire.metrics.drawing.style import (
+from swarmwire.metrics.drawing.canvas import (
     CURVE,
     FAINT,
     INK,
@@ -18,7 +17,9 @@ from swarmwire.metrics.drawing.style import (
     TEXT_PT,
     TITLE_PT,
     Look,
+    new_figure,
     plain_axes,
+    save,
 )
 from swarmwire.metrics.radio_fit.delay import LatencyFit
 from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit, RangeFit, delivery_over_distance

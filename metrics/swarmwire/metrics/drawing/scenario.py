@@ -9,9 +9,23 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Obstacle, Static
-from swarmwire.metrics.drawing.canvas import Layout, add_arena_axes, lay_out, new_figure, save
+from swarmwire.metrics.drawing.canvas import (
+    FAINT,
+    INK,
+    LINK,
+    PAPER,
+    SMALL_PT,
+    SOFT,
+    TITLE_PT,
+    Layout,
+    Look,
+    add_arena_axes,
+    add_facts,
+    lay_out,
+    new_figure,
+    save,
+)
 from swarmwire.metrics.drawing.scene import add_legend, draw_scenery, group_entries, light_entry, movable_entry
-from swarmwire.metrics.drawing.style import FAINT, INK, LINK, PAPER, SMALL_PT, SOFT, TITLE_PT, Look, add_facts
 from swarmwire.metrics.drawing.swarm import Swarm
 
 _AXES_IN = 0.26

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.truth import Group, Obstacle, Static
-from swarmwire.metrics.drawing.style import (
+from swarmwire.metrics.drawing.canvas import (
     DEAD,
     FLOOR,
     INK,
@@ -27,11 +27,12 @@ from swarmwire.metrics.drawing.style import (
     STATE_COLORS,
     TEXT_PT,
     WALL,
+    Color,
     Look,
     rgb,
+    robot_color,
     shade,
 )
-from swarmwire.metrics.palette import Color, robot_color
 
 DARKEST = 0.45  # of the page's white: how a shade of 0 is shown
 _BAR_BELOW_IN = 0.1

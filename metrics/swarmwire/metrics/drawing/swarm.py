@@ -9,8 +9,7 @@ from scipy.spatial import KDTree
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static
-from swarmwire.metrics.drawing.style import DEAD, INK, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, shade
-from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.drawing.canvas import DEAD, INK, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, robot_color, shade
 from swarmwire.metrics.torus import link_lines
 
 _HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre

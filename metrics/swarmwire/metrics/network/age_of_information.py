@@ -11,8 +11,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1

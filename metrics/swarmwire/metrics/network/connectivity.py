@@ -9,9 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.graph import neighbours_of
-from swarmwire.metrics.metric import Measure, Metric, Sampled
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, Sampled, TickView, neighbours_of
 
 MAX_DENSE = 100  # robots of which all eigenvalues are found as quickly as the one wanted of a sparse matrix
 SHIFT = 1e-3  # below all eigenvalues, so that the shifted matrix can be inverted

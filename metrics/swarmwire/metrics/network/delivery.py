@@ -14,8 +14,7 @@ from swarmwire.comms.config import parameter
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 ROUNDING = 1e-9  # of a tick
 BITS_PER_BYTE = 8

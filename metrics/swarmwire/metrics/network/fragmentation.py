@@ -21,8 +21,7 @@ from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 NEVER = -1
 

@@ -19,7 +19,7 @@ from swarmwire.metrics.report.campaign_data import (
 )
 from swarmwire.metrics.report.charts import Jump, MedianLine, heat_map, response_curve
 from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
-from swarmwire.metrics.statistics.change_point import ChangePoint, change_point
+from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 from swarmwire.metrics.text import listed, sentence
 
 MAX_PARAMETERS = 3  # of which pairs are drawn

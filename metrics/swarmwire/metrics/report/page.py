@@ -11,8 +11,7 @@ from typing import Any, cast
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
 from swarmwire.metrics.atomic import check_output_path, output_file
-from swarmwire.metrics.drawing.canvas import new_figure
-from swarmwire.metrics.drawing.style import LONG_SIDE_IN
+from swarmwire.metrics.drawing.canvas import LONG_SIDE_IN, new_figure
 
 COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
 _DPI_SIZE_PX = 1280  # resolution of the parts that are drawn as pixels

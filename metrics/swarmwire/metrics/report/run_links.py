@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.drawing.style import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes
+from swarmwire.metrics.drawing.canvas import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.text import counted, share, short, shortened

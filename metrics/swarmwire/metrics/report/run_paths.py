@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.drawing.canvas import PAD, Layout, add_arena_axes
+from swarmwire.metrics.drawing.canvas import INK, PAD, PAPER, SMALL_PT, SOFT, Layout, add_arena_axes, robot_color, shade
 from swarmwire.metrics.drawing.scene import (
     add_legend,
     columns_in,
@@ -19,9 +19,7 @@ from swarmwire.metrics.drawing.scene import (
     movable_entry,
     place_movable,
 )
-from swarmwire.metrics.drawing.style import INK, PAPER, SMALL_PT, SOFT, shade
 from swarmwire.metrics.drawing.swarm import Swarm
-from swarmwire.metrics.palette import robot_color
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.text import counted, number

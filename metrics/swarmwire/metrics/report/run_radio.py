@@ -9,10 +9,9 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
+from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
-from swarmwire.metrics.drawing.style import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.network.latency import acts_at_ns
-from swarmwire.metrics.network.radio_tally import PERCENTS
+from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
-from swarmwire.metrics.drawing.style import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, thinned

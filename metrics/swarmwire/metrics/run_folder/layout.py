@@ -1,10 +1,12 @@
-"""The files of a run folder, their formats, the columns of `ticks`, and the metrics as run.json lists them."""
+"""The files of a run folder, their formats, the columns of `ticks`, the metrics as run.json lists them, and the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isinf
+from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.clock import WallClock
 from swarmwire.metrics.metric import Metric
 
 SUMMARY = "summary.json"  # written last: where it is, the run is over
@@ -60,3 +62,33 @@ def metric_infos(started: Mapping[str, Any]) -> tuple[MetricInfo, ...]:
 def _info(item: Any) -> MetricInfo:
     least, largest = item["bounds"]
     return MetricInfo(item["name"], item["help"], item["unit"], item["kind"], (least, largest))
+
+
+class RunLog:
+    """Appends messages to `log.txt`, each with its time; every line is in the file as soon as it was said.
+
+    A log that cannot be written never disturbs a run: `lost` counts its lines.
+    """
+
+    def __init__(self, folder: Path, clock: WallClock | None = None) -> None:
+        """Open the log of this run folder, which must be there; OSError if it cannot be written."""
+        self.lost = 0
+        self._clock = clock or WallClock()
+        self._file = (folder / LOG).open("a", encoding="utf-8", buffering=1)
+
+    def say(self, text: str) -> None:
+        """Append a text; of several lines, those after the first are indented."""
+        first, *more = text.rstrip("\n").split("\n")
+        try:
+            self._file.write(
+                "\n".join([f"{self._clock.utc_stamp()} {first}", *(f"    {line}" for line in more)]) + "\n"
+            )
+        except OSError:
+            self.lost += 1
+
+    def close(self) -> None:
+        """Close the file; safe to call more than once."""
+        try:
+            self._file.close()
+        except OSError:
+            self.lost += 1

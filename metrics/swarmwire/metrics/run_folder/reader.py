@@ -21,8 +21,7 @@ from swarmwire.metrics.run_folder.layout import (
     MetricInfo,
     metric_infos,
 )
-from swarmwire.metrics.run_folder.static import read_static
-from swarmwire.metrics.run_folder.tables import TABLES
+from swarmwire.metrics.run_folder.tables import TABLES, read_static
 from swarmwire.metrics.run_folder.ticks import movable_columns, robot_columns
 from swarmwire.metrics.run_folder.writer import parts_of, scan_files, table_file
 from swarmwire.metrics.table_file import corruption_errors

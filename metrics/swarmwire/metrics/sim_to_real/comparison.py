@@ -15,8 +15,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
 from swarmwire.metrics.network.latency import RELATIVE_ERROR
-from swarmwire.metrics.real_log.measured_log import MeasuredLog
-from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRun, EmulatedRuns
+from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, MeasuredLog
 from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval

@@ -11,10 +11,8 @@ from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.graph import components_of, neighbours_of
-from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.metric import Measure, Metric, TickView, components_of, neighbours_of
 from swarmwire.metrics.swarm.pairs import NearPairs, radii_m
-from swarmwire.metrics.tick_view import TickView
 
 NOT_YET = -1
 

@@ -10,9 +10,8 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.pairs import radii_m, sort_by_x
-from swarmwire.metrics.tick_view import TickView
 from swarmwire.metrics.torus import sides_m
 
 S_PER_H = 3600.0

@@ -11,8 +11,7 @@ from swarmwire.comms.config import parameter
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.torus import sides_m
 
 

@@ -10,9 +10,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.metric import Measure, Metric, TickView, agreement
 from swarmwire.metrics.swarm.pairs import NearPairs
-from swarmwire.metrics.tick_view import TickView, agreement
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import TickView
 from swarmwire.metrics.torus import sides_m
 
 SLACK = 1.0 + 1e-9  # two robots at just the height may be rounded apart

@@ -16,9 +16,8 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
+from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.pairs import along_m, fill, first_order, place_at, radii_m, room_for
-from swarmwire.metrics.tick_view import TickView
 from swarmwire.metrics.torus import sides_m
 
 AT_THE_CENTROID_M = 1e-9  # nearer is rounding, and has no direction

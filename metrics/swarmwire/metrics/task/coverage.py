@@ -14,8 +14,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 MAX_CELLS = 2**27  # of all arenas: 128 MB
 ROUNDING = 1e-9  # of a cell

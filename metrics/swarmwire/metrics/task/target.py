@@ -10,8 +10,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.tick_view import TickView
+from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.torus import shortest
 
 

@@ -11,8 +11,8 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.run_views import MetricSeries
 from swarmwire.comms.truth import EventRecord, Static, Truth
+from swarmwire.metrics.drawing.canvas import Color
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.palette import Color
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import FATES, MARK, SERIES

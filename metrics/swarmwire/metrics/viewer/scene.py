@@ -10,7 +10,7 @@ from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.geometry.ground import ground_of, shades_over
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
-from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.drawing.canvas import robot_color
 from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import RerunSelected

@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.palette import Color, robot_color
+from swarmwire.metrics.drawing.canvas import Color, robot_color
 
 DEAD = (118, 118, 124)
 WALL = (150, 155, 170)

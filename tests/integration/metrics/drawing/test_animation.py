@@ -10,11 +10,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays
 from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.animation import FilmFigure
+from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.scenario import _facts
-from swarmwire.metrics.drawing.style import DEAD, OTHER_STATE, STATE_COLORS
 from swarmwire.metrics.drawing.swarm import in_range
-from swarmwire.metrics.palette import robot_color
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
-from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.drawing.canvas import robot_color
 from tests.support.metrics.films import film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")

@@ -14,8 +14,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.metrics.drawing import canvas, radio
 from swarmwire.metrics.drawing.animation import write_mp4
-from swarmwire.metrics.drawing.bodies import draw_body, facts_of
-from swarmwire.metrics.drawing.body_view import draw_from_above
+from swarmwire.metrics.drawing.bodies import draw_body, draw_from_above, facts_of
 from swarmwire.metrics.drawing.radio import draw_coverage, draw_distances
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.metrics.radio import DISK, ticks

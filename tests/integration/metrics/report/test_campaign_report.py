@@ -14,14 +14,14 @@ from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import fits_log
 from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
-from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
-from swarmwire.metrics.report.charts_models import (
+from swarmwire.metrics.report.campaign_models import (
     FittedShape,
     SurvivalCurve,
     resilience_curve,
     scaling_curve,
     survival_curves,
 )
+from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
 from swarmwire.metrics.report.page import as_svg, page, write_report
 from tests.support.metrics.campaign.campaigns import write_campaign
 from tests.support.metrics.report import Page, check_alone

@@ -13,10 +13,9 @@ from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.network.latency import Latencies
 from swarmwire.metrics.report import run_timeline
 from swarmwire.metrics.report.page import Listing, Table, as_svg, blank_figure
-from swarmwire.metrics.report.run import run_report
+from swarmwire.metrics.report.run import of_metrics, run_report
 from swarmwire.metrics.report.run_data import Lane, Span, lanes_of, read_run, thinned
 from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_links
-from swarmwire.metrics.report.run_metrics import of_metrics
 from swarmwire.metrics.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
 from swarmwire.metrics.report.run_radio import delivery_by_distance, latency_histogram, percentiles, receivers_act_at_ns
 from swarmwire.metrics.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline

@@ -10,10 +10,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import ticks, writer
 from swarmwire.metrics.run_folder.events import EventLog
-from swarmwire.metrics.run_folder.log import RunLog
+from swarmwire.metrics.run_folder.layout import RunLog
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.tables import TABLES

@@ -9,8 +9,8 @@ from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.run_folder.recording_check import check_recording
 from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import check_recording
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.metrics.viewer.style import DEAD, FATES, packed
 from tests.support.clocks import StillClock

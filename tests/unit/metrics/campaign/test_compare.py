@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
-from swarmwire.metrics.campaign.select import at, select
+from swarmwire.metrics.campaign.folder import at, select
 from swarmwire.metrics.campaign.spec import same_value, value_from
 from tests.support.metrics.campaign.campaigns import NUMBERS, TIMES, order, write_campaign
 

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.run_folder import links as links_table
-from swarmwire.metrics.run_folder.links import LinkCounts
-from swarmwire.metrics.run_folder.robots import RobotCounts
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder import radio_totals as links_table
+from swarmwire.metrics.run_folder.radio_totals import LinkCounts, RobotCounts
 from tests.support.comms.radio import make_medium, packets
 from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links

@@ -10,7 +10,7 @@ from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
-from swarmwire.metrics.run_folder.static import read_static, write_static
+from swarmwire.metrics.run_folder.tables import read_static, write_static
 from tests.support.metrics.truths import static
 
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)

@@ -9,11 +9,11 @@ import pytest
 
 from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.packets import Fate
-from swarmwire.metrics.network.radio_tally import RadioTally
+from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import distances
 from swarmwire.metrics.run_folder.distances import DistanceRecorder
+from swarmwire.metrics.run_folder.radio_totals import RobotRecorder
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.robots import RobotRecorder
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.metrics.radio import DISK, ticks

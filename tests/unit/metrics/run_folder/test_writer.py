@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import RecordFailed
 from swarmwire.metrics.run_folder import writer
-from swarmwire.metrics.run_folder.log import RunLog
+from swarmwire.metrics.run_folder.layout import RunLog
 from swarmwire.metrics.run_folder.writer import (
     WAITING_CHUNKS,
     Chunk,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.metrics.statistics.change_point import change_point, point_sums, resampled_sums
 from swarmwire.metrics.statistics.sample import by_seed
+from swarmwire.metrics.statistics.trends import change_point, point_sums, resampled_sums
 from tests.support.metrics.statistics.samples import numbers, times
 
 LOSS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])

@@ -9,9 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.metric import TickView
 from swarmwire.metrics.swarm.contacts import smallest_gap_m
 from swarmwire.metrics.swarm.pairs import NearPairs
-from swarmwire.metrics.tick_view import TickView
 from tests.support.metrics.swarms import Swarm, rolled, said, stand, swarms
 from tests.support.metrics.truths import measured, static, truth
 

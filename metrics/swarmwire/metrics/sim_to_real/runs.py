@@ -1,6 +1,7 @@
-"""Emulated runs that a log is held against: each tick's metrics of a run folder's arenas, or of a campaign's point."""
+"""What is compared: logs of real robots and emulated runs, each by the same metrics tick by tick."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -9,8 +10,14 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.campaign.select import Selection
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.campaign.folder import Selection
 from swarmwire.metrics.campaign.spec import SERIES
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.metric import Metric, Need
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.real_log.real_logs import RealLogs
+from swarmwire.metrics.real_log.truths import real_run
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
 
@@ -19,6 +26,14 @@ if TYPE_CHECKING:
 
 Radio = Mapping[str, Any]  # as in a summary: sent, intended, fates, latency_air_s, latency_agent_s
 COUNTS = ("sent", "received", "in_range")  # the radio's, since the tick before, which run folders keep
+WORLD = "world"  # a robot's kind of radio: that of a run
+LACKS: dict[Need, str] = {
+    "contacts": "contacts are not in the log",
+    "graph": "a real network knows no range, so there is no radio graph in the log",
+    "airtime": "times on air are not in the log",
+    "latency": "the robots' radio was that of a run, whose latencies robots know to the agent alone: see latency_agent",
+    "poses": "poses are not in the log: no tracker",
+}
 
 
 @dataclass(frozen=True)
@@ -113,3 +128,53 @@ def _floats(column: "pl.Series") -> FloatArray:
     import polars as pl
 
     return column.cast(pl.Float64).fill_null(float("nan")).to_numpy().astype(np.float64)
+
+
+@dataclass(frozen=True)
+class MeasuredLog:
+    """The metrics of a log, tick by tick."""
+
+    static: Static
+    duration_s: float
+    series: dict[str, FloatArray]  # by metric: (ticks,) as `Metrics.values`; NaN: undefined
+    radio: dict[str, Any]  # as in a summary
+    has_air: bool  # packets went over a run's radio, ticks apart: their latencies are those to the agent
+    left_out: dict[str, str]  # by metric: what the log lacks for it
+    notes: tuple[str, ...]
+
+
+def measured_log(
+    logs: RealLogs, metrics: Sequence[Metric], place: Static | None = None, longest_s: float = math.inf
+) -> MeasuredLog:
+    """Measure the metrics for which the log has the data; BadInput where the robots did not run at the same time.
+
+    `place` describes the arena, for metrics that need it. Ticks and packets after `longest_s` are left out.
+    """
+    run = real_run(logs, place)
+    ticks = math.floor(min(longest_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
+    has_air = any(robot.about.radio_kind == WORLD for robot in logs.robots)
+    lacks = {metric.name: why_not(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
+    kept = Metrics([metric for metric in metrics if lacks[metric.name] is None])
+    tally = RadioTally()
+    for observer in (kept, tally):
+        observer.begin(run.static)
+    values: FloatArray = np.empty((ticks, len(kept.metrics)))
+    for truth in run.truths(ticks):
+        kept.see(truth)
+        tally.see(truth)
+        values[truth.tick] = kept.values[:, 0]
+    return MeasuredLog(
+        static=run.static,
+        duration_s=(ticks - 1) / run.base.rate_hz,
+        series={metric.name: values[:, place] for place, metric in enumerate(kept.metrics)},
+        radio=tally.end(run.under_way(ticks))["radio"][0],
+        has_air=has_air,
+        left_out={name: lack for name, lack in lacks.items() if lack is not None},
+        notes=run.notes,
+    )
+
+
+def why_not(metric: Metric, *, has_poses: bool, has_air: bool = False) -> str | None:
+    """The data that a log lacks for this metric; None: none. `has_air`: packets went over a run's radio."""
+    there: set[Need] = {*(("poses",) if has_poses else ()), *(() if has_air else ("latency",))}
+    return next((LACKS[need] for need in metric.needs if need not in there), None)

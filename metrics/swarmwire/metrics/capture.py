@@ -1,4 +1,4 @@
-"""Link headers: the headers before the payload of a frame in a capture, by kind of radio.
+"""The frames of a run as a capture in pcapng, which Wireshark reads, with the link headers of each kind of radio.
 
 | link type | headers |
 | --- | --- |
@@ -10,15 +10,21 @@ Robots' addresses are their indices. No frame has a checksum at its end.
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
+from swarmwire.metrics.atomic import output_file
+
+if TYPE_CHECKING:
+    import polars as pl
 
 IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 283, 127, 147
 
@@ -39,6 +45,14 @@ DATA_FRAME = 0x0008  # frame control: data between stations of an ad hoc network
 NETWORK = bytes.fromhex("025357000000")  # the BSSID, and the first bytes of stations
 LLC_IPV4 = bytes.fromhex("aaaa030000000800")
 UDP, UDP_PORT = 17, 49_152  # the first port that belongs to nobody
+APPLICATION = "swarmwire"
+SECTION, INTERFACE, PACKET = 0x0A0D0D0A, 1, 6
+BYTE_ORDER = 0x1A2B3C4D
+UNKNOWN_LENGTH = -1  # of the section: a reader goes from block to block
+# Options: SHB_USERAPPL of the section, the others of the block that they stand in.
+COMMENT, USER_APPLICATION, NAME, DESCRIPTION, RESOLUTION = 1, 4, 2, 3, 9
+NANOSECONDS = b"\x09"  # 10^-9 s
+MAX_OPTION = 65_535  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,3 +178,98 @@ def _checksum(header: bytes) -> int:
     while total >> 16:
         total = (total & 0xFFFF) + (total >> 16)
     return ~total & 0xFFFF
+
+
+def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[Frame]) -> int:
+    """Write the frames and return their number; BadInput if the file cannot be written.
+
+    Times are since the run's start, which readers show as 1970. A payload that is not known is not captured, but
+    counts in the frame's length.
+    """
+    count = 0
+    with output_file(to) as part, part.open("wb") as file:
+        file.write(section(APPLICATION) + interface(link.link_type, name, description))
+        for frame in frames:
+            header = link.header(frame)
+            length = len(header) + frame.size_bytes
+            file.write(packet(frame.on_air_at_ns, header + frame.payload, length, frame.comments))
+            count += 1
+    return count
+
+
+def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
+    """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
+
+    A frame without a receiver in range has no row and is left out, as are packets that never went on air.
+    """
+    import polars as pl
+
+    once = ("on_air_at_ns", "to", "size_bytes", "topic", "payload")
+    each = packets.filter(pl.col("receiver").is_not_null()).sort("receiver")
+    frames = each.group_by("sender", "sequence").agg(
+        *(pl.col(name).first() for name in once),
+        pl.col("rssi_dbm").max().alias("strongest_dbm"),
+        "receiver",
+        "fate",
+        "rssi_dbm",
+    )
+    for row in frames.sort("on_air_at_ns", "sender", "sequence").iter_rows(named=True):
+        yield _frame(row, names)
+
+
+def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
+    to, sender = row["to"], names[row["sender"]]
+    title = f"{sender} to {'all' if to is None else names[to]}: {row['topic']}, packet {row['sequence']}"
+    return Frame(
+        on_air_at_ns=row["on_air_at_ns"],
+        sender=row["sender"],
+        to=to,
+        sequence=row["sequence"],
+        size_bytes=row["size_bytes"],
+        payload=row["payload"] or b"",
+        rssi_dbm=row["strongest_dbm"],
+        comments=(title, *_fates(row, names)),
+    )
+
+
+def _fates(row: dict[str, Any], names: Sequence[str]) -> list[str]:
+    """A comment per fate: `received: flock-1 -61.5 dBm, flock-2 -70.1 dBm`."""
+    of_fate: dict[str, list[str]] = {}
+    for receiver, fate, rssi_dbm in zip(row["receiver"], row["fate"], row["rssi_dbm"], strict=True):
+        strength = "" if rssi_dbm is None else f" {rssi_dbm:.1f} dBm"
+        of_fate.setdefault(fate, []).append(f"{names[receiver]}{strength}")
+    return [f"{fate}: {', '.join(of_fate[fate])}" for fate in FATE_NAMES if fate in of_fate]
+
+
+def section(application: str) -> bytes:
+    """The first block of a file, with the writing application."""
+    body = struct.pack("<IHHq", BYTE_ORDER, 1, 0, UNKNOWN_LENGTH)
+    return _block(SECTION, body, [(USER_APPLICATION, _text(application))])
+
+
+def interface(link_type: int, name: str, description: str) -> bytes:
+    """Where packets come from, all with this link type; packets name it by its place in the file, from 0."""
+    options = [(NAME, _text(name)), (DESCRIPTION, _text(description)), (RESOLUTION, NANOSECONDS)]
+    return _block(INTERFACE, struct.pack("<HHI", link_type, 0, 0), options)
+
+
+def packet(at_ns: int, captured: bytes, length: int, comments: Sequence[str] = ()) -> bytes:
+    """A packet of the first interface at this time, with `length` bytes of which the first were captured."""
+    body = struct.pack("<IIIII", 0, at_ns >> 32, at_ns & 0xFFFFFFFF, len(captured), length) + _padded(captured)
+    return _block(PACKET, body, [(COMMENT, _text(comment)) for comment in comments])
+
+
+def _block(kind: int, body: bytes, options: Sequence[tuple[int, bytes]]) -> bytes:
+    listed = b"".join(struct.pack("<HH", code, len(value)) + _padded(value) for code, value in options)
+    end = struct.pack("<HH", 0, 0) if options else b""
+    length = struct.pack("<I", 12 + len(body) + len(listed) + len(end))
+    return struct.pack("<I", kind) + length + body + listed + end + length
+
+
+def _text(text: str) -> bytes:
+    """UTF-8, cut after the last character that an option has room for."""
+    return text.encode()[:MAX_OPTION].decode(errors="ignore").encode()
+
+
+def _padded(data: bytes) -> bytes:
+    return data + bytes(-len(data) % 4)

@@ -1,4 +1,4 @@
-"""The table `radio_robots`: a row per robot, with what became of its packets and of those meant for it."""
+"""The tables `radio_robots` and `radio_links`: what became of the packets of each robot, and on each link."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +11,6 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
-from swarmwire.metrics.run_folder.links import LINK_FATES
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, TotalsRecorder, Verdict, compare_fates, sums
 from swarmwire.metrics.run_folder.writer import scan_files
 
@@ -31,6 +30,21 @@ SENDERS_FATES = {
 RECEIVERS_FATES = tuple(fate for fate in Fate if fate not in SENDERS_FATES)
 FATES = len(FATE_NAMES)
 NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary counts packets too that never left their sender's radio
+# Fates that every receiver has on a link of its own.
+LINK_FATES = tuple(
+    FATE_NAMES[fate]
+    for fate in (
+        Fate.RECEIVED,
+        Fate.BLOCKED,
+        Fate.LOST,
+        Fate.TOO_WEAK,
+        Fate.COLLIDED,
+        Fate.BURST,
+        Fate.PARTITIONED,
+        Fate.JAMMED,
+    )
+)
+WAITING_ROWS = 250_000  # before they are added up
 
 
 class RadioRobots(Table):
@@ -193,3 +207,98 @@ class RobotCounts:
 def _add(to: IntArray, place: IntArray, amount: IntArray | None = None) -> None:
     """Add amounts, 1 each if left out, at places of the flattened table."""
     np.add.at(to.reshape(-1), place, 1 if amount is None else amount)
+
+
+class RadioLinks(Table):
+    """A row per link and fate that occurred on it.
+
+    Columns: arena, sender and receiver (indices), fate, packets. Receivers out of range have no rows, nor has a packet
+    that never went on air.
+    """
+
+    name = "radio_links"
+
+    def schema(self, static: Static | None = None) -> dict[str, Any]:
+        """The type of each column."""
+        import polars as pl
+
+        return {
+            "arena": pl.Int32,
+            "sender": pl.Int32,
+            "receiver": pl.Int32,
+            "fate": pl.Enum(FATE_NAMES),
+            "packets": pl.Int64,
+        }
+
+    def recorder(self, options: RecordOptions) -> Observer | None:
+        """A recorder, if links are to be recorded."""
+        return LinkRecorder(options.folder) if options.links else None
+
+    def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
+        """As many packets of each fate that only links have, over all links."""
+        import polars as pl
+
+        found = scan_files(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
+        return compare_fates(
+            {(arena, fate): packets for arena, fate, packets in found.iter_rows()}, LINK_FATES, summary
+        )
+
+
+class LinkRecorder(TotalsRecorder):
+    """Observer that writes `radio_links.parquet`."""
+
+    name = "radio_links"
+
+    def start(self, static: Static) -> None:
+        """Nothing is counted so far."""
+        self._counts = LinkCounts(static)
+
+    def add(self, truth: Truth) -> None:
+        """Add what a tick brought."""
+        if truth.finished is not None:
+            self._counts.see(truth.finished)
+
+    def frame(self) -> "pl.DataFrame":
+        """A row per arena, sender, receiver and fate."""
+        import polars as pl
+
+        columns: dict[str, Any] = dict(self._counts.columns())
+        columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
+        return pl.DataFrame(columns, schema_overrides=RadioLinks().schema())
+
+
+class LinkCounts:
+    """Packets counted by (arena, sender, receiver, fate); memory grows with the links that occurred, not with time."""
+
+    def __init__(self, static: Static) -> None:
+        self._robots = static.robots
+        self._key: IntArray = np.zeros(0, np.int64)  # rising
+        self._packets: IntArray = np.zeros(0, np.int64)
+        self._waiting: list[IntArray] = []
+        self._rows = 0
+
+    def see(self, finished: ReceptionRecords) -> None:
+        """Add the links that ended in a tick."""
+        rows = np.flatnonzero(finished.receiver != NO_ROBOT)
+        link = (finished.arena[rows] * self._robots + finished.sender[rows]) * self._robots + finished.receiver[rows]
+        self._waiting.append(link * FATES + finished.fate[rows])
+        self._rows += len(rows)
+        if self._rows >= WAITING_ROWS:
+            self._add_up()
+
+    def columns(self) -> dict[str, IntArray]:
+        """arena, sender, receiver, fate and packets, a row per combination that occurred, in that order."""
+        self._add_up()
+        link, fate = np.divmod(self._key, FATES)
+        row, receiver = np.divmod(link, self._robots)
+        arena, sender = np.divmod(row, self._robots)
+        return {"arena": arena, "sender": sender, "receiver": receiver, "fate": fate, "packets": self._packets}
+
+    def _add_up(self) -> None:
+        """Sort what waits and merge it in: so often that sorting costs little, so seldom that merging does."""
+        new, counts = np.unique(np.concatenate([np.zeros(0, np.int64), *self._waiting]), return_counts=True)
+        self._waiting, self._rows = [], 0
+        self._key, place = np.unique(np.concatenate([self._key, new]), return_inverse=True)
+        packets = np.zeros(len(self._key), np.int64)
+        np.add.at(packets, place, np.concatenate([self._packets, counts]))
+        self._packets = packets

@@ -1,1 +1,0 @@
-"""Captures of the frames on air, for Wireshark."""
