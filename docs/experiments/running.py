@@ -11,9 +11,8 @@ from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.campaign.start import check_same
-from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, resume_sweep
-from swarmwire.deploy.terminal.sweep_progress import sweep_progress
+from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
+from swarmwire.deploy.terminal.sweep import sweep_progress
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 

@@ -23,8 +23,7 @@ from swarmwire.deploy.config import (
 from swarmwire.deploy.control.control_server import ControlServer, Status
 from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
-from swarmwire.deploy.gateways.serving import RunGateways, Served
-from swarmwire.deploy.gateways.undriven import Undriven
+from swarmwire.deploy.gateways.serving import RunGateways, Served, Undriven
 from swarmwire.deploy.host import need_open_files, need_threads
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.observers import Guarded, TooLarge

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI
-from swarmwire.deploy.page.beside import PageBeside
+from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY, called

@@ -10,11 +10,10 @@ from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.certs import certs_app
-from swarmwire.deploy.cli.compare import compare_command
+from swarmwire.deploy.cli.compare import compare_command, report_command, sim_to_real_command
 from swarmwire.deploy.cli.ctl import ctl_app
 from swarmwire.deploy.cli.ctl_events import events_app
-from swarmwire.deploy.cli.draw import draw_command
-from swarmwire.deploy.cli.export import export_command
+from swarmwire.deploy.cli.export import draw_command, export_command
 from swarmwire.deploy.cli.inspect import (
     check_command,
     describe_command,
@@ -23,19 +22,14 @@ from swarmwire.deploy.cli.inspect import (
     schema_command,
     verify_command,
 )
-from swarmwire.deploy.cli.join import join_command
 from swarmwire.deploy.cli.process import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.cli.radio import radio_app
-from swarmwire.deploy.cli.repeat import repeat_command
-from swarmwire.deploy.cli.report import report_command
 from swarmwire.deploy.cli.robots import robots_app
 from swarmwire.deploy.cli.router import router_command
-from swarmwire.deploy.cli.run import run_command
-from swarmwire.deploy.cli.sim_to_real import sim_to_real_command
-from swarmwire.deploy.cli.sweep import sweep_command
-from swarmwire.deploy.cli.tune import tune_command
+from swarmwire.deploy.cli.run import repeat_command, run_command
+from swarmwire.deploy.cli.sweep import sweep_command, tune_command
 from swarmwire.deploy.cli.view import ui_command, view_command
-from swarmwire.deploy.cli.world import world_command
+from swarmwire.deploy.cli.world import join_command, world_command
 from swarmwire.deploy.host import refusal, share_heaps
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."

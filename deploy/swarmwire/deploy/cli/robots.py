@@ -15,8 +15,8 @@ from swarmwire.deploy.cli.options import AsJson, FleetFile, OfGroups, OfRobots
 from swarmwire.deploy.cli.process import FAILED
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.fleet.check import Contents
     from swarmwire.deploy.fleet.connecting import NewHost
+    from swarmwire.deploy.fleet.deploy import Contents
     from swarmwire.deploy.fleet.fleet import Fleet, Robot
     from swarmwire.deploy.fleet.result import Result, Watcher
     from swarmwire.deploy.fleet.units import RobotState
@@ -31,7 +31,7 @@ robots_app = typer.Typer(
 def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
     """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
     FLEET.need("robots")
-    from swarmwire.deploy.fleet.fleet_file import read_fleet
+    from swarmwire.deploy.fleet.fleet import read_fleet
 
     fleet = read_fleet(file)
     return fleet, fleet.chosen(_names(robots), _names(groups))
@@ -97,8 +97,8 @@ def check_command(
       swarmwire robots check fleet.toml --trust
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.check import check, contents_of
     from swarmwire.deploy.fleet.connecting import trust_new
+    from swarmwire.deploy.fleet.deploy import check, contents_of
 
     if trust and offline:
         raise BadInput("--trust", "", "expected either --trust or --offline")
@@ -161,8 +161,7 @@ def deploy_command(
       swarmwire robots deploy fleet.toml --group red --restart
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.check import contents_of
-    from swarmwire.deploy.fleet.deploy import deploy
+    from swarmwire.deploy.fleet.deploy import contents_of, deploy
     from swarmwire.deploy.fleet.packages import LockedEnvironments
 
     contents = contents_of(fleet, mine)

@@ -18,10 +18,10 @@ import asyncssh
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.fleet.archive import Archive
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
 from swarmwire.deploy.fleet.fleet import Host, Robot, hosts_of
 from swarmwire.deploy.fleet.host_side.system import NO_SYSTEMD
+from swarmwire.deploy.fleet.release import Archive
 from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
 
 BLOCK = 1 << 18  # bytes handed to the connection at a time

@@ -21,7 +21,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.deploy.fleet.archive import Archive, Entry, name_of, write_archive
+from swarmwire.deploy.fleet.release import Archive, Entry, name_of, write_archive
 from swarmwire.deploy.fleet.result import HostFailed
 from swarmwire.metrics.atomic import write_text
 

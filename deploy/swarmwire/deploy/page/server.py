@@ -1,20 +1,22 @@
-"""The page's web server on loopback: its routes, and the token without which every request is refused."""
+"""The page's web server on loopback: what it may be asked to do, its routes, and the token without which it refuses."""
 
 import hmac
 import secrets
 import socket
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import AsyncIterable, Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import uvicorn
 from fastapi import Body, FastAPI
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse
@@ -24,7 +26,94 @@ from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.control.remote_control import RemoteControl
 from swarmwire.deploy.page.news import NewsThread
-from swarmwire.deploy.page.orders import Order
+
+MAX_STEPS = 100_000
+
+
+class _Order(BaseModel, ABC):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @abstractmethod
+    def give(self, control: RemoteControl) -> int | None:
+        """Ask the run for it; the number of the event that it began, if any."""
+
+
+class Pause(_Order):
+    """No tick begins until `resume` or `step`."""
+
+    do: Literal["pause"]
+
+    def give(self, control: RemoteControl) -> None:
+        """Pause."""
+        control.pause()
+
+
+class Resume(_Order):
+    """The run goes on."""
+
+    do: Literal["resume"]
+
+    def give(self, control: RemoteControl) -> None:
+        """Go on."""
+        control.resume()
+
+
+class Step(_Order):
+    """So many ticks, then the run pauses."""
+
+    do: Literal["step"]
+    n: int = Field(1, ge=1, le=MAX_STEPS)
+
+    def give(self, control: RemoteControl) -> None:
+        """Step."""
+        control.step(self.n)
+
+
+class Speed(_Order):
+    """At most so many simulated seconds per second of wall time; None: as fast as possible."""
+
+    do: Literal["speed"]
+    factor: float | None = Field(gt=0, le=1e6)
+
+    def give(self, control: RemoteControl) -> None:
+        """Set it."""
+        control.speed(self.factor)
+
+
+class Stop(_Order):
+    """The run ends."""
+
+    do: Literal["stop"]
+
+    def give(self, control: RemoteControl) -> None:
+        """End it."""
+        control.stop()
+
+
+class Happen(_Order):
+    """Something happens: a scenario's event without `at_s`, which the run itself checks."""
+
+    do: Literal["event"]
+    event: dict[str, Any]
+
+    def give(self, control: RemoteControl) -> int:
+        """Let it happen."""
+        return control.event(self.event)
+
+
+class End(_Order):
+    """Something that lasts is over."""
+
+    do: Literal["end"]
+    number: int = Field(ge=0)
+
+    def give(self, control: RemoteControl) -> None:
+        """End it."""
+        control.end(self.number)
+
+
+Order = Annotated[Pause | Resume | Step | Speed | Stop | Happen | End, Field(discriminator="do")]
+
 
 START_NS = 20 * NS_PER_S
 PAUSE_NS = NS_PER_S // 100

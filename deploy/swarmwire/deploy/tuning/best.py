@@ -18,8 +18,7 @@ from swarmwire.deploy.campaign.store import storing
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, Observer, Sweep, begin_sweep, resume_sweep
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.scenario_copy import FILES, copy_scenario
-from swarmwire.deploy.tuning.goal import Goal
-from swarmwire.deploy.tuning.spec import Tuning, scenario_file
+from swarmwire.deploy.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.tuning.study import Trial
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT

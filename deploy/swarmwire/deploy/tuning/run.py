@@ -12,21 +12,21 @@ from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaign.spec import Plan
-from swarmwire.deploy.campaign.start import check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaign.store import locked, new_folder, storing
-from swarmwire.deploy.campaign.sweep import Observer
+from swarmwire.deploy.campaign.sweep import Observer, check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder
 from swarmwire.deploy.record.scenario_copy import Copies, copy_scenario
 from swarmwire.deploy.tuning.best import CheckRun, FreshCheck, best_of, write_best
-from swarmwire.deploy.tuning.goal import Goal, sample_of
 from swarmwire.deploy.tuning.spec import (
+    Goal,
     Search,
     Tuning,
     TuningPlan,
     check_trials,
     read_tuning,
+    sample_of,
     scenario_file,
     write_tuning,
 )

@@ -31,8 +31,7 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from swarmwire.comms.draws import LOW32, derive_key
 from swarmwire.deploy.campaign.store import storing
-from swarmwire.deploy.tuning.goal import Goal
-from swarmwire.deploy.tuning.spec import Parameter, Search, Tuning
+from swarmwire.deploy.tuning.spec import Goal, Parameter, Search, Tuning
 
 State = Literal["running", "complete", "failed"]  # running: under way, or it was when the tuning was ended
 

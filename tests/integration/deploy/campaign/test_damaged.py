@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import store
 from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.repeat import CampaignRun
+from swarmwire.deploy.repetition import CampaignRun
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.integration.deploy.campaign.test_resume import VARY, Killed, dying_at

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy.fleet.archive import Archive
 from swarmwire.deploy.fleet.packages import LockedEnvironments, Target, pins
+from swarmwire.deploy.fleet.release import Archive
 from swarmwire.deploy.fleet.result import HostFailed
 
 PI = {

@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, Result, Simulation, repeat, run
-from swarmwire.deploy.gateways import undriven
+from swarmwire.deploy.gateways import serving
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import ROOT, called
 from tests.support.deploy.gateways import driven as driven_run
@@ -276,7 +276,7 @@ def test_particles_gather_at_the_lamp(body) -> None:
 
 @pytest.mark.parametrize("driven", [(), (1,), (0, 1, 2)])
 def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys, monkeypatch, driven) -> None:
-    monkeypatch.setattr(undriven, "GRACE_S", 0.01)  # wall time: the tenth tick
+    monkeypatch.setattr(serving, "GRACE_S", 0.01)  # wall time: the tenth tick
     out = tmp_path / "run"
     with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, out=out, record=BARE) as simulation:
         scripted[-1].drive = dict.fromkeys(driven, (0.0, 0.0))

@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from swarmwire.deploy.terminal import tune_progress
+from swarmwire.deploy.terminal import tune
 from tests.support.deploy.commands import called
 from tests.support.deploy.tuning import AT, trials_in
 
@@ -103,7 +103,7 @@ class Interrupting:
 def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
     folder = tmp_path / "t"
     with monkeypatch.context() as patched:
-        patched.setattr(tune_progress, "tune_progress", lambda _: Interrupting())
+        patched.setattr(tune, "tune_progress", lambda _: Interrupting())
         code, out, errors = typed(
             "tune", scenario, "--search", AT, *GOAL, "--trials", "6", "--seeds", "1", "--out", folder
         )

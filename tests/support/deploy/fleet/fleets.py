@@ -14,8 +14,8 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.fleet import packages as packages_module
-from swarmwire.deploy.fleet.archive import Archive, Entry, write_archive
 from swarmwire.deploy.fleet.packages import Target
+from swarmwire.deploy.fleet.release import Archive, Entry, write_archive
 from tests.support.deploy.commands import called
 from tests.support.deploy.fleet.hosts import STAND_INS, FakeHost, HostServers, host_servers, new_key, write_key
 

@@ -17,8 +17,7 @@ from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, en
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.page.orders import Order
-from swarmwire.deploy.page.server import MAX_BYTES
+from swarmwire.deploy.page.server import MAX_BYTES, Order
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents

@@ -5,8 +5,8 @@ import sys
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.fleet.archive import Entry, name_of, write_archive
 from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.release import Entry, name_of, write_archive
 from swarmwire.deploy.fleet.result import HostFailed
 
 PI = {

@@ -8,8 +8,7 @@ import pytest
 import tomli_w
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
-from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
+from swarmwire.deploy.fleet.fleet import Fleet, FleetTable, Host, RobotTable, hosts_of, read_fleet
 from swarmwire.deploy.fleet.release import operator_network, release_entries, robot_settings
 from tests.support.deploy.commands import ROOT
 
@@ -39,7 +38,7 @@ def test_the_example_is_a_fleet():
 
 
 def test_the_examples_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.fleet.check import contents_of
+    from swarmwire.deploy.fleet.deploy import contents_of
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)

@@ -10,8 +10,7 @@ from rich.console import Console
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.deploy.campaign.sweep import Sweep
 from swarmwire.deploy.campaign.worker import TaskResult
-from swarmwire.deploy.terminal.sweep_progress import SweepBar, SweepLines, sweep_progress
-from swarmwire.deploy.terminal.sweep_report import print_sweep
+from swarmwire.deploy.terminal.sweep import SweepBar, SweepLines, print_sweep, sweep_progress
 from tests.support.clocks import StillClock
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.tuning.goal import goal_of, sample_of
+from swarmwire.deploy.tuning.spec import goal_of, sample_of
 from swarmwire.metrics.campaign.spec import Response
 
 ORDER = Response("order.final", "", "number", "")
