@@ -1,16 +1,19 @@
 """What people ask of a run holds it up or ends it, at once, and never changes what it does."""
 
+import signal
 from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
+import typer
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, run, wiring
-from swarmwire.deploy.controls import LOOK_NS, Controls
+from swarmwire.deploy.cli.process import leaving_when_hung_up
+from swarmwire.deploy.controls import LOOK_NS, Controls, Interrupt
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
@@ -290,3 +293,57 @@ def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
     fixed = Controls(clock, RATE_HZ, speed_fixed=True)
     with pytest.raises(BadInput, match="programs elsewhere"):
         fixed.set_speed(2.0)
+
+
+ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+
+def handlers() -> list[object]:
+    return [signal.getsignal(number) for number in ASKING]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_asks_and_the_second_ends_at_once(number):
+    with Interrupt() as interrupt:
+        assert not interrupt.asked
+        signal.raise_signal(number)
+        assert (interrupt.asked, interrupt.hung_up) == (True, False)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+
+def test_a_terminal_that_is_gone_asks_however_often_it_says_so():
+    with Interrupt() as interrupt:
+        for _ in range(3):
+            signal.raise_signal(signal.SIGHUP)
+        assert (interrupt.asked, interrupt.hung_up) == (True, True)
+
+
+def test_whoever_handled_signals_before_does_so_again():
+    before = handlers()
+    with Interrupt():
+        assert all(one != other for one, other in zip(handlers(), before, strict=True))
+    assert handlers() == before
+
+
+def test_a_hang_up_that_is_ignored_stays_so():
+    """As nohup starts a program."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert not interrupt.asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_hang_up_before_the_first_tick_has_its_own_exit_code():
+    interrupt = Interrupt()
+    with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    interrupt.hung_up = True
+    with pytest.raises(typer.Exit) as left, leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    assert left.value.exit_code == 129

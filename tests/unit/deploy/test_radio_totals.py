@@ -1,10 +1,11 @@
-"""What a run tells of its radio, from the command line: tables, a picture, and the same in every layout."""
+"""What a run says of its radio, under every preset: tables, a picture, and the same in every layout."""
 
 import pytest
 from polars.testing import assert_frame_equal
 from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.run_folder.verify import verify
@@ -65,3 +66,15 @@ def test_links_without_a_place_for_them_are_refused():
     refusal = called("repeat", "nowhere", "--links").exception
     assert isinstance(refusal, BadInput)
     assert "--links: expected --out" in str(refusal)
+
+
+SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_flock_runs_over_every_preset(preset: str):
+    radio = f'radio={{preset="{preset}",measures={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
+    result = run(SCENARIO, overrides=["duration_s=1", "robots.flock.count=5", radio])
+    assert result.radio is not None
+    assert result.radio.sent > 40
+    assert sum(result.radio.fates.values()) == result.radio.intended == 4 * result.radio.sent

@@ -1,4 +1,4 @@
-"""What a run leaves behind: a summary that adds up, a recording, and the same numbers from Python."""
+"""What a run leaves behind: a summary that adds up, the same numbers from Python, and every metric that there is."""
 
 import json
 
@@ -6,6 +6,7 @@ import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
+from swarmwire.metrics.registry import METRICS, standard
 from tests.support.deploy.commands import LOSSY, called
 from tests.support.deploy.runs import run_spread
 
@@ -139,3 +140,21 @@ def test_groups_of_one_body_whose_sheets_the_scenario_changes_do_not_hide_each_o
     (tmp_path / "stones.toml").write_text(LIT[: LIT.index("[robots.moths]")] + placed + heavy)
     result = run(tmp_path / "stones.toml", overrides=["duration_s=0.1"])
     assert result.global_sensors == {"kilobot of placed": ["positioning"]}
+
+
+NAMES = sorted(METRICS.keys() - set(standard()))
+SETTING = [
+    "duration_s=6",
+    f"metrics={json.dumps(NAMES)}",
+    'arena.lights=[{intensity=4.6, count=1, place="random"}]',
+    'events=[{at_s=2.0, do="kill", robots={group="flock", share=0.3}, for_s=2.0}]',
+]
+
+
+def test_it_is_the_same_alone_and_beside_other_arenas():
+    alone = run(LOSSY, seeds=[2], overrides=SETTING).arenas[0].metrics
+    assert alone.keys() == METRICS.keys()
+    beside = run(LOSSY, seeds=[5, 2, 3], overrides=SETTING).arenas[1].metrics
+    assert beside == alone
+    # What has no value is the same everywhere: nobody tells a number here, and some things do not happen.
+    assert sum(found.mean is not None for found in alone.values()) > 0.7 * len(METRICS)

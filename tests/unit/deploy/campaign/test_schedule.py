@@ -1,4 +1,4 @@
-"""Executors by name; the tasks of a campaign; and what becomes of tasks of which workers die."""
+"""Executors by name, tasks of a campaign, workers of this machine and of Dask clusters, and workers that die."""
 
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -8,13 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.deploy.campaign import schedule
-from swarmwire.deploy.campaign.local import LocalExecutor, usable_cores
+from swarmwire.deploy.campaign.dask import address_of, environment, fault_of
+from swarmwire.deploy.campaign.local import LocalExecutor, Silence, receive, send, usable_cores
 from swarmwire.deploy.campaign.schedule import Finished, default_batch, execute, open_executor, tasks_of
 from swarmwire.deploy.campaign.store import CampaignFolder
-from swarmwire.deploy.campaign.worker import Task, TaskResult
+from swarmwire.deploy.campaign.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
+from swarmwire.deploy.controls import Interrupt
 from swarmwire.metrics.campaign.spec import Campaign
+from tests.support.clocks import FakeClock
 
 
 def opened(name, workers, scenario):
@@ -26,7 +30,9 @@ def test_an_executor_of_a_package_goes_by_the_name_before_its_address(monkeypatc
     monkeypatch.setattr(EntryPoint, "load", lambda _: opened)
     monkeypatch.setattr(schedule, "entry_points_of", lambda group: [point] if group == schedule.GROUP else [])
     assert open_executor("made-up://there:1", 3, tmp_path) == ("made-up://there:1", 3, tmp_path)
-    with pytest.raises(BadInput, match=r"^--executor: expected .*local.*made-up.*; got 'mad-up://there'"):
+    with pytest.raises(
+        BadInput, match=r"^--executor: expected .*made-up .did you mean this.*local.*; got 'mad-up://there'"
+    ):
         open_executor("mad-up://there", None, tmp_path)
 
 
@@ -130,3 +136,77 @@ def test_a_stop_leaves_the_rest_undone():
     tasks = [Task("x", (), 0, (run,), (run + 1,)) for run in range(5)]
     assert not execute(tasks, losing, lambda _, result: rows.extend(result.rows), lambda: len(rows) >= 2)
     assert len(rows) == 2
+
+
+def test_the_time_without_a_message_adds_up_but_not_while_the_campaign_itself_was_frozen():
+    clock = FakeClock()
+    silence = Silence(clock)
+    clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z, and fg
+    assert not silence.too_long()
+    for _ in range(int(MAX_SILENCE_S) - 1):
+        clock.time_ns += NS_PER_S
+        assert not silence.too_long()
+    clock.time_ns += NS_PER_S
+    assert silence.too_long()
+    silence.broken()
+    assert not silence.too_long()
+
+
+def test_a_message_arrives_complete_or_not_at_all(tmp_path):
+    path = tmp_path / "messages"
+    with path.open("wb") as file:
+        send(file, {"a": [1, None, "x"], "b": b"\0"})
+        send(file, {})
+    whole = path.read_bytes()
+    with path.open("rb") as file:
+        assert [receive(file), receive(file), receive(file)] == [{"a": [1, None, "x"], "b": b"\0"}, {}, None]
+    for length in range(1, whole.index(b"x")):
+        path.write_bytes(whole[:length])
+        with path.open("rb") as file:
+            assert receive(file) is None
+
+
+def test_a_run_calls_alive_while_ticks_go_on_but_not_every_tick():
+    clock, calls = FakeClock(), []
+    alive = Alive(lambda: calls.append(clock.time_ns) or True, interrupt := Interrupt(), clock)
+    for _ in range(20):
+        alive.see(None)
+        clock.time_ns += NS_PER_S // 10
+    assert len(calls) == 2
+    assert calls[1] - calls[0] == ALIVE_S * NS_PER_S
+    assert not interrupt.asked
+
+
+def test_a_task_that_nobody_waits_for_ends_without_a_row(stumbling):
+    with pytest.raises(Interrupted):
+        run_task(Task(str(stumbling), ("duration_s=100000",), 0, (0, 1), (1, 2)), alive=lambda: False)
+
+
+def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r"^--executor: .*swarmwire\[cluster\]"):
+        open_executor("dask://there:8786", None, Path())
+
+
+@pytest.mark.parametrize(
+    ("name", "address"),
+    [("dask://there", "there:8786"), ("dask://10.0.0.1:1", "10.0.0.1:1"), ("dask://[::1]:7/", "[::1]:7")],
+)
+def test_an_address_may_leave_out_the_port(name, address):
+    assert address_of(name) == address
+
+
+@pytest.mark.parametrize(
+    "name", ["dask", "dask://", "dask://:8786", "dask://a:b", "dask://a:70000", "dask://tcp://a:1"]
+)
+def test_an_address_of_another_form_is_refused(name):
+    with pytest.raises(BadInput, match="^--executor: .*dask://HOST:PORT"):
+        open_executor(name, None, Path())
+
+
+def test_workers_fit_with_the_same_versions_and_code_whatever_their_cpu():
+    here = environment()
+    assert fault_of(here, {**here, "cpu": "other"}) == ""
+    assert fault_of(here, {**here, "versions": {**here["versions"], "python": "3.9.0"}}).startswith("python is 3.9.0")
+    assert fault_of(here, {**here, "versions": {}}).startswith("python is not there")
+    assert "swarmwire.comms" in fault_of(here, {**here, "modules": {}})

@@ -141,7 +141,7 @@ def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
         ("plain", "far", [], "", "points"),
         ("plain", "strange", [], "", "responses"),
         ("plain", "nothing", [], "", "none"),
-        ("plain@radio.los=0", "plain", [], "radio.los", "radio.loss?"),
+        ("plain@radio.los=0", "plain", [], "radio.los", "radio.loss (did you mean this?)"),
         ("plain@radio.loss=0.3", "plain", [], "radio.loss", "0, 0.2, 0.4"),
         ("plain@radio.loss", "plain", [], "radio.loss", "="),
         ("plain", "plain", ["radio.los=0"], "radio.los", "--at: "),

@@ -111,7 +111,7 @@ def test_a_time_has_every_statistic(tmp_path, stat):
 
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("ordre.final", "order.final?"), ("order.q51", ""), ("order.censored", "time"), ("", ""), (".q50", "")],
+    [("ordre.final", "order.final (did you"), ("order.q51", ""), ("order.censored", "time"), ("", ""), (".q50", "")],
 )
 def test_a_statistic_that_there_is_not_is_refused(tmp_path, name, hint):
     campaign = CampaignFolder(write_campaign(tmp_path / "a"))

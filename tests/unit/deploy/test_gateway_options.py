@@ -98,15 +98,15 @@ def test_python_takes_one_text_a_table_or_all_of_it() -> None:
     assert as_gateways(None) is None
 
 
-def test_the_senses_that_a_gateway_tells_are_computed_whatever_the_agent_needs(scenario, scripted) -> None:
-    simulation = Simulation(scenario, gateways={"own": "scripted"})
+def test_the_senses_that_a_gateway_tells_are_computed_whatever_the_agent_needs(two_groups, scripted) -> None:
+    simulation = Simulation(two_groups, gateways={"own": "scripted"})
     assert set(simulation.world.sensors["own"]) == {"proximity", "odometry", "imu"}
     assert set(simulation.world.sensors["other"]) == {"proximity", "compass"}
 
 
-def test_options_reach_the_gateways_that_have_them_and_a_groups_own_count_more(scenario, scripted) -> None:
+def test_options_reach_the_gateways_that_have_them_and_a_groups_own_count_more(two_groups, scripted) -> None:
     gateways = Gateways({"": "scripted"}, {"other.first": 7, "first": 3})
-    with Simulation(scenario, gateways=gateways, realtime=100) as simulation:
+    with Simulation(two_groups, gateways=gateways, realtime=100) as simulation:
         assert simulation.served is not None
         assert [robot.address for robot in simulation.served.robots] == [f"scripted:{at}" for at in (3, 4, 7, 8, 9)]
         assert all(gateway.is_open for gateway in scripted)
@@ -116,38 +116,38 @@ def test_options_reach_the_gateways_that_have_them_and_a_groups_own_count_more(s
 @pytest.mark.parametrize(
     ("gateways", "words"),
     [
-        ({"othr": "scripted"}, "other?"),
-        ("scriptd", "scripted?"),
-        (Gateways({"": "scripted"}, {"fist": 1}), "first?"),
+        ({"othr": "scripted"}, "other (did you mean this?)"),
+        ("scriptd", "scripted (did you mean this?)"),
+        (Gateways({"": "scripted"}, {"fist": 1}), "first (did you mean this?)"),
         (Gateways({"": "scripted"}, {"first": 0}), "at least 1"),
         (Gateways({"own": "scripted"}, {"other.first": 1}), "group that has a gateway"),
         (Gateways({"": "scripted"}, swarm=""), "--swarm: "),
         (Gateways({"": "scripted"}, swarm="lab/*"), "--swarm: "),
     ],
 )
-def test_groups_kinds_and_options_that_are_not_there_are_refused(scenario, scripted, gateways, words) -> None:
-    assert words in str(refused(lambda: Simulation(scenario, gateways=gateways)))
+def test_groups_kinds_and_options_that_are_not_there_are_refused(two_groups, scripted, gateways, words) -> None:
+    assert words in str(refused(lambda: Simulation(two_groups, gateways=gateways)))
 
 
-def test_several_arenas_and_runners_are_refused(scenario, scripted) -> None:
-    assert refused(lambda: Simulation(scenario, gateways="scripted", seeds=[1, 2])).where == "--seeds"
-    assert refused(lambda: Simulation(scenario, gateways="scripted", runners=2)).where == "--runners"
+def test_several_arenas_and_runners_are_refused(two_groups, scripted) -> None:
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", seeds=[1, 2])).where == "--seeds"
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", runners=2)).where == "--runners"
 
 
-def test_the_agent_of_a_group_behind_a_gateway_must_be_one_that_could_run_here(scenario, scripted) -> None:
+def test_the_agent_of_a_group_behind_a_gateway_must_be_one_that_could_run_here(two_groups, scripted) -> None:
     broken = ["robots.own.agent='swarmwire.agent.behaviours:Nothing'"]
-    assert refused(lambda: Simulation(scenario, gateways="scripted", overrides=broken)).key == "robots.own.agent"
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", overrides=broken)).key == "robots.own.agent"
 
 
-def test_a_folder_is_left_by_none_that_is_refused(scenario, scripted, tmp_path) -> None:
-    refused(lambda: Simulation(scenario, gateways="scriptd", out=tmp_path / "run"))
+def test_a_folder_is_left_by_none_that_is_refused(two_groups, scripted, tmp_path) -> None:
+    refused(lambda: Simulation(two_groups, gateways="scriptd", out=tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_is_left_by_none_whose_address_is_taken(scenario, scripted, tmp_path) -> None:
+def test_a_folder_is_left_by_none_whose_address_is_taken(two_groups, scripted, tmp_path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         network = Network(listen=(f"tcp/127.0.0.1:{taken.getsockname()[1]}",))
-        simulation = Simulation(scenario, gateways=Gateways({"": "scripted"}, network=network), out=tmp_path / "run")
+        simulation = Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network), out=tmp_path / "run")
         assert "free" in refused(simulation.__enter__).expected
     assert not (tmp_path / "run").exists()
     assert not any(gateway.is_open for gateway in scripted)
@@ -157,24 +157,24 @@ def made(gateways: list[ScriptedGateway]) -> list[tuple[str, ...]]:
     return [gateway.names for gateway in gateways]
 
 
-def test_a_gateway_knows_its_robots_by_the_names_of_the_run(scenario, scripted) -> None:
-    with Simulation(scenario, gateways={"other": "scripted"}, realtime=100):
+def test_a_gateway_knows_its_robots_by_the_names_of_the_run(two_groups, scripted) -> None:
+    with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100):
         assert made(scripted) == [("other-0", "other-1", "other-2")]
 
 
-def test_a_network_without_certificates_is_warned_of_each_time(scenario, scripted, capsys) -> None:
+def test_a_network_without_certificates_is_warned_of_each_time(two_groups, scripted, capsys) -> None:
     network = Network(listen=("tcp/0.0.0.0:0",))
-    assert refused(lambda: Simulation(scenario, gateways=Gateways({"": "scripted"}, network=network)))
+    assert refused(lambda: Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network)))
     gateways = Gateways({"": "scripted"}, network=replace(network, insecure=True))
-    with Simulation(scenario, gateways=gateways, realtime=100):
+    with Simulation(two_groups, gateways=gateways, realtime=100):
         assert "insecure" in capsys.readouterr().err
 
 
-def test_a_sheet_within_the_scenario_is_refused_where_robots_read_theirs(scenario: Path, scripted: Any) -> None:
+def test_a_sheet_within_the_scenario_is_refused_where_robots_read_theirs(two_groups: Path, scripted: Any) -> None:
     changed = ["robots.other.body_overrides.sensors.proximity.drop_out=0.5"]
 
     def begun() -> None:
-        with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=changed):
+        with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100, overrides=changed):
             pass
 
     assert refused(begun).key == "robots.other.body_overrides"

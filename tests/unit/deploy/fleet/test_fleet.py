@@ -1,15 +1,28 @@
-"""What `fleet.toml` may say, and what each robot's settings become of it."""
+"""The fleet file, packages of robots, and how work on robots is shown."""
 
+import io
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tomli_w
+from rich.console import Console
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.deploy.cli.robots import act
 from swarmwire.deploy.fleet.fleet import Fleet, FleetTable, Host, RobotTable, hosts_of, read_fleet
-from swarmwire.deploy.fleet.release import operator_network, release_entries, robot_settings
+from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.release import (
+    Entry,
+    name_of,
+    operator_network,
+    release_entries,
+    robot_settings,
+    write_archive,
+)
+from swarmwire.deploy.fleet.result import HostFailed, Nothing, Result, result_lines, shown_on
 from tests.support.deploy.commands import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
@@ -164,3 +177,85 @@ def test_the_example_shows_every_key():
         "insecure",
         "seed",
     } - in_example
+
+
+PI = {
+    "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
+    "python": [3, 11, 2],
+}  # fmt: skip
+
+
+def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
+    assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "msgspec", "numpy"]
+    assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
+    assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
+    with pytest.raises(BadInput, match="^packages: not-there: "):
+        pins(["epuck2"], ["not-there"], (3, 11))
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="what older versions need is not installed here")
+def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
+    names = {python: {pin.name for pin in pins(["ros2"], [], python)} for python in ((3, 11), (3, 13), (3, 14))}
+    assert names[3, 11] - names[3, 13] == {"typing-extensions"}  # rosbags needs it below 3.12
+    assert names[3, 13] - names[3, 14] == {"backports-zstd"}  # and this below 3.14
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"machine": "armv7l", "bits": 32}, "got armv7l with 32 bits"),
+        ({"bits": 32}, "got aarch64 with 32 bits"),
+        ({"libc": ["", ""]}, "another C library"),
+        ({"implementation": "pypy"}, "got pypy"),
+    ],
+)
+def test_a_platform_without_wheels_is_refused(changed, expected):
+    with pytest.raises(HostFailed, match=expected):
+        Target.of({**PI, **changed})
+
+
+def test_an_archive_is_the_same_for_the_same_files(tmp_path):
+    entries = [Entry("b", b"2"), Entry("a", b"1", 0o600), Entry("c", link="../a")]
+    one, two = write_archive(entries, tmp_path / "1"), write_archive(entries[::-1], tmp_path / "2")
+    assert (one.name, one.sha256, one.size) == (two.name, two.sha256, two.size)
+    others = [[Entry("b", b"2")], [Entry("b", b"2", 0o755)], [Entry("b", b"3")], [Entry("c", b"2")]]
+    assert len({name_of(entries), *map(name_of, others)}) == 5
+
+
+def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatch):
+    fleet.add("flock-0")
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda name: None if name == "asyncssh" else name)
+    code, (line,) = robots("status")
+    assert (code, "swarmwire[fleet]" in line) == (2, True)
+
+
+def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
+    failed = Result.failed("b", HostFailed("two\n lines", "mend it"))
+    assert result_lines([Result("long-name", True, "done"), failed]) == [
+        "long-name  done",
+        "b          failed: two lines; mend it",
+    ]
+
+
+def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
+    screen = io.StringIO()
+    with shown_on(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
+        watcher.step("flock-0", "packages", 5_000_000, 10_000_000)
+        watcher.step("flock-1", "trial run")
+        watcher.end(Result("flock-0", True, "done"))
+        watcher.end(Result("flock-2", True, "never began"))
+    shown = screen.getvalue()
+    assert "flock-1" in shown
+    assert "trial run" in shown
+
+
+def test_elsewhere_nothing_is_drawn():
+    assert isinstance(shown_on(Console(file=io.StringIO())), Nothing)
+
+
+def test_ctrl_c_ends_it_in_one_line():
+    async def interrupted(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted):
+        act(interrupted)
