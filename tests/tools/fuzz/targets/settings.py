@@ -27,7 +27,7 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.target import File, FolderTarget, Target, check_refusal, mutated_file
 from tests.unit.agent.on_robot.test_settings import WHOLE
-from tests.unit.deploy.fleet.test_fleet_file import EXAMPLE
+from tests.unit.deploy.fleet.test_fleet import EXAMPLE
 
 MAX_ROBOTS, MAX_OBSTACLES = 60, 200  # of scenarios that are run for a tick
 
