@@ -6,7 +6,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.cli.app import let_help_flow
-from swarmwire.deploy.cli.process import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 
 
 def run_app(app: typer.Typer) -> None:

@@ -11,10 +11,9 @@ from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.campaign.sweep import code_changes
 from swarmwire.deploy.config import Recording, Replay, Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.record.live_events import read_live_events
 from swarmwire.deploy.record.provenance import RunFacts, read_facts
+from swarmwire.deploy.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
 from swarmwire.deploy.record.scenario_copy import changed_files
-from swarmwire.deploy.record.trajectory_log import TrajectoryCheck, ticks_logged
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, read_campaign

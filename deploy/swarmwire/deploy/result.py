@@ -8,8 +8,8 @@ from typing import Any
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
-from swarmwire.deploy.record.live_events import LiveEventsRecord
 from swarmwire.deploy.record.provenance import RunFacts
+from swarmwire.deploy.record.replay_logs import LiveEventsRecord
 from swarmwire.deploy.wiring import RunParts
 from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.run_folder.tables import record_summary

@@ -20,20 +20,26 @@ from swarmwire.deploy.config import (
     subtick_of,
     tick_count,
 )
-from swarmwire.deploy.control.control_server import ControlServer, Status
 from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
 from swarmwire.deploy.gateways.serving import RunGateways, Served, Undriven
 from swarmwire.deploy.host import need_open_files, need_threads
+from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.observers import Guarded, TooLarge
-from swarmwire.deploy.radio.link_trace_file import scenario_traces
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
-from swarmwire.deploy.record.trajectory_log import TrajectoryLog
+from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.runners import check_socket, new_run_id
-from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, new_medium
+from swarmwire.deploy.scenario_parts import (
+    agent_specs,
+    check_agents,
+    conditions,
+    measuring,
+    new_medium,
+    scenario_traces,
+)
 from swarmwire.deploy.warm_up import warm_up
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.measure import StopConditions as MetricStopConditions

@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.deploy.new_swarm import new_swarm
+from swarmwire.deploy.cli.inspect import new_swarm
 from swarmwire.metrics.drawing.film import film_of
 from tests.docs.pages import files_of
 from tests.support.deploy.commands import called

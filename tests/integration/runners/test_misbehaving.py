@@ -17,9 +17,8 @@ from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLos
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.deploy.config import Listening, Recording
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
-from swarmwire.deploy.control.run_finder import Announced, found_runs
 from swarmwire.deploy.live.following import read_live
+from swarmwire.deploy.live.remote_control import Announced, RemoteControl, controlling, found_runs
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until

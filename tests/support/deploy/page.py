@@ -13,8 +13,8 @@ from typing import Any
 import psutil
 import pytest
 
-from swarmwire.deploy.control.remote_control import Refused
 from swarmwire.deploy.live.following import RunGone
+from swarmwire.deploy.live.remote_control import Refused
 
 QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync")  # fmt: skip

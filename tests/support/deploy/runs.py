@@ -14,8 +14,8 @@ import pytest
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, Result, backends, run
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import Live, read_live
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder import writer
 from swarmwire.metrics.run_folder.writer import join_parts

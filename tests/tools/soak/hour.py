@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.control.remote_control import controlling
+from swarmwire.deploy.live.remote_control import controlling
 from tests.tools.soak.place import Kind, Place
 from tests.tools.soak.processes import Agenda, environment
 from tests.tools.soak.samples import Samples

@@ -8,8 +8,8 @@ import psutil
 
 from swarmwire.deploy import repeat
 from swarmwire.deploy.config import Replay
-from swarmwire.deploy.record.live_events import read_live_events
 from swarmwire.deploy.record.provenance import read_facts
+from swarmwire.deploy.record.replay_logs import read_live_events
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from tests.tools.soak.place import Place
 from tests.tools.soak.processes import PYTHON, Steps, Supervised
 

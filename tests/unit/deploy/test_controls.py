@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, run, wiring
-from swarmwire.deploy.cli.process import leaving_when_hung_up
+from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.controls import LOOK_NS, Controls, Interrupt
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.panel import BINDINGS, press

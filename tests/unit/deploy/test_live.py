@@ -11,7 +11,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
-from swarmwire.deploy.live.sampling import Evened, Sampling, Since
+from swarmwire.deploy.live.published import Sampling, Since
+from swarmwire.deploy.live.viewer import Evened
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 
 

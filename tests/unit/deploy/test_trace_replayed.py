@@ -13,7 +13,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.deploy.radio.link_trace_file import read_link_traces
+from swarmwire.deploy.scenario_parts import read_link_traces
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.commands import LOSSY, ROOT
 

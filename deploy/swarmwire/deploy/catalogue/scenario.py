@@ -29,7 +29,7 @@ from swarmwire.deploy.catalogue.schema import (
     parameters_of_dataclass,
     parameters_of_schema,
 )
-from swarmwire.deploy.radio.probe import radio_of
+from swarmwire.deploy.scenario_parts import radio_of
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.registry import GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES

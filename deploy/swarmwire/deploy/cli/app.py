@@ -22,7 +22,7 @@ from swarmwire.deploy.cli.inspect import (
     schema_command,
     verify_command,
 )
-from swarmwire.deploy.cli.process import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.cli.radio import radio_app
 from swarmwire.deploy.cli.robots import robots_app
 from swarmwire.deploy.cli.router import router_command

@@ -15,8 +15,7 @@ from swarmwire.deploy.cli.options import AsJson, Ca, Certificate, Certs, Endpoin
 
 if TYPE_CHECKING:
     from swarmwire.comms.wire.network import Network
-    from swarmwire.deploy.control.remote_control import RemoteControl
-    from swarmwire.deploy.control.run_finder import FoundRun
+    from swarmwire.deploy.live.remote_control import FoundRun, RemoteControl
 
 
 HELP = flowing("""Watch and control running simulations: pause, step, speed, and events for their robots and radios.
@@ -92,8 +91,7 @@ class Chosen:
 @contextmanager
 def control_of(chosen: Chosen) -> "Generator[RemoteControl]":
     """Control over the run that is meant; BadInput if it is not clear which, RunGone if it does not answer."""
-    from swarmwire.deploy.control.remote_control import controlling, only_run_at
-    from swarmwire.deploy.control.run_finder import find_run
+    from swarmwire.deploy.live.remote_control import controlling, find_run, only_run_at
 
     network = chosen.network()
     if chosen.endpoint is not None:
@@ -108,7 +106,7 @@ def control_of(chosen: Chosen) -> "Generator[RemoteControl]":
 
 def runs_of_this_machine(chosen: Chosen) -> "list[FoundRun]":
     """The runs that are meant, if they are this machine's: all, unless one is named."""
-    from swarmwire.deploy.control.run_finder import find_run, found_runs
+    from swarmwire.deploy.live.remote_control import find_run, found_runs
 
     return found_runs() if chosen.run is None else [find_run(chosen.run)]
 
@@ -149,8 +147,8 @@ def _told(chosen: Chosen) -> list[tuple[dict[str, Any], str | None]]:
     if chosen.endpoint is not None:
         with control_of(chosen) as control:
             return [(control.status(), None)]
-    from swarmwire.deploy.control.remote_control import controlling
     from swarmwire.deploy.live.following import RunGone
+    from swarmwire.deploy.live.remote_control import controlling
 
     told: list[tuple[dict[str, Any], str | None]] = []
     for run in runs_of_this_machine(chosen):

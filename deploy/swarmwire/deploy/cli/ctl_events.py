@@ -10,7 +10,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.ctl import Chosen, control_of, tell
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.control.remote_control import RemoteControl
+    from swarmwire.deploy.live.remote_control import RemoteControl
 
 
 Which = Annotated[

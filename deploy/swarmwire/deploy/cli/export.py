@@ -71,8 +71,7 @@ def export_command(
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4
     """
-    from swarmwire.deploy.export import export
-    from swarmwire.deploy.export.exporter import ExportOptions
+    from swarmwire.deploy.export import ExportOptions, export
 
     console = Console(highlight=False)
     target = to or run / DEFAULT_NAME

@@ -266,7 +266,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
 
     from swarmwire.comms.radio.analysis.contention import contention as contend
     from swarmwire.deploy.host import compiling_told
-    from swarmwire.deploy.radio.probe import radio_of
+    from swarmwire.deploy.scenario_parts import radio_of
 
     radio = radio_of(preset, settings)
     nodes, payload_bytes, interval_s = _parts(contention or "")

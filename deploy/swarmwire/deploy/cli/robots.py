@@ -11,8 +11,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.extras import FLEET
-from swarmwire.deploy.cli.options import AsJson, FleetFile, OfGroups, OfRobots
-from swarmwire.deploy.cli.process import FAILED
+from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, OfRobots
 
 if TYPE_CHECKING:
     from swarmwire.deploy.fleet.connecting import NewHost

@@ -9,6 +9,8 @@ from rich.console import Console
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
+    DIFFERENT,
+    INTERRUPTED,
     Ca,
     Certificate,
     Gateway,
@@ -34,8 +36,9 @@ from swarmwire.deploy.cli.options import (
     Swarm,
     Ui,
     View,
+    leaving_when_hung_up,
+    program,
 )
-from swarmwire.deploy.cli.process import DIFFERENT, INTERRUPTED, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,9 +116,9 @@ def run_shown(
     config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
 ) -> None:
     """Run a scenario into its folder, shown while it goes on and afterwards."""
-    from swarmwire.deploy.control.run_finder import Announced
     from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
+    from swarmwire.deploy.live.remote_control import Announced
     from swarmwire.deploy.simulation import Simulation, finished
     from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result

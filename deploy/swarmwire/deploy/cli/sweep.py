@@ -12,8 +12,7 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
-from swarmwire.deploy.cli.options import Overrides, Quiet
-from swarmwire.deploy.cli.process import INTERRUPTED, leaving_when_hung_up, program
+from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up, program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.spec import Plan

@@ -10,8 +10,18 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI, VIEW
 from swarmwire.deploy.cli.ctl import Chosen
-from swarmwire.deploy.cli.options import Ca, Certificate, Certs, Endpoint, Insecure, Key, Name, Port, WithParent
-from swarmwire.deploy.cli.process import standard_input_closed
+from swarmwire.deploy.cli.options import (
+    Ca,
+    Certificate,
+    Certs,
+    Endpoint,
+    Insecure,
+    Key,
+    Name,
+    Port,
+    WithParent,
+    standard_input_closed,
+)
 
 if TYPE_CHECKING:
     from swarmwire.deploy.live.viewer import ViewOptions
@@ -92,10 +102,9 @@ def ui_command(
     UI.need("ui")
     VIEW.need("ui")
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
-    from swarmwire.deploy.control.remote_control import only_run_at
-    from swarmwire.deploy.control.run_finder import find_run
     from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.live.following import Live
+    from swarmwire.deploy.live.remote_control import find_run, only_run_at
     from swarmwire.deploy.live.viewer import ViewOptions
     from swarmwire.deploy.page.showing_page import show_page
 

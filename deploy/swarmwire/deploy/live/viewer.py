@@ -12,11 +12,14 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
 from urllib.parse import quote
 
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.run_views import ObservedTick
+from swarmwire.comms.truth import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following
-from swarmwire.deploy.live.sampling import Evened
 from swarmwire.metrics.viewer.recording import RerunLive
 from swarmwire.metrics.viewer.screenshot import end, ending_with_this, free_port, is_open, program
 
@@ -203,6 +206,21 @@ class Drawer(threading.Thread):
         tally = None if truth.tally is None else self._evened.per_tick(truth.tally, glimpse.ticks)
         self._drawing.see(replace(truth, tally=tally))
         return True
+
+
+class Evened:
+    """Mean tallies per tick in whole numbers: what rounding leaves over comes with a later one."""
+
+    def __init__(self) -> None:
+        self._owed: FloatArray | None = None
+
+    def per_tick(self, tally: PacketCounts, ticks: int) -> PacketCounts:
+        """The tally of one of these ticks."""
+        counts: IntArray = np.vstack([tally.sent, tally.intended, tally.in_range, tally.fates.T])
+        owed = counts / ticks + (0.0 if self._owed is None else self._owed)
+        whole = np.floor(owed + 1e-9).astype(np.int64)  # thirds add up to a little less than one
+        self._owed = owed - whole
+        return PacketCounts(whole[0], whole[1], whole[2], whole[3:].T)
 
 
 def _say_where(shown: Viewer, options: ViewOptions) -> None:

@@ -14,7 +14,7 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord, Static
-from swarmwire.deploy.control.remote_control import RemoteControl
+from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.run_folder.events import names
 
 EVERY_S = 0.2  # between two looks

@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.deploy.control.remote_control import RemoteControl
+from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.deploy.page.news import NewsThread
 
 MAX_STEPS = 100_000

@@ -8,8 +8,8 @@ from typing import Any
 
 from swarmwire.comms.run_views import ObservedRun
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.following import Live, following
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.viewer import Drawer, ViewOptions, has_screen
 from swarmwire.deploy.page.news import NewsThread, Seen
 from swarmwire.deploy.page.server import Shown, page_app, serving

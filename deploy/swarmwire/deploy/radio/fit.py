@@ -152,7 +152,7 @@ def network_fit_toml(fit: "NetworkFit", file: Path) -> str:
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:
-    from swarmwire.deploy.radio.probe import checked_radio
+    from swarmwire.deploy.scenario_parts import checked_radio
 
     whole = table["radio"] if "model" in table["radio"] else {**DISK, **table["radio"]}
     try:

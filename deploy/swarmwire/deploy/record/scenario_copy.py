@@ -18,7 +18,7 @@ import tomli_w
 
 from swarmwire.comms.config import from_toml
 from swarmwire.comms.plugins import resolve
-from swarmwire.deploy.radio.link_trace_file import trace_path
+from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.campaign.spec import CopiedFile
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.world.placement.maps import beside

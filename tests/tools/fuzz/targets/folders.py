@@ -6,8 +6,8 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, Simulation
-from swarmwire.deploy.radio.link_trace_file import read_link_traces
 from swarmwire.deploy.repetition import RepeatedRun
+from swarmwire.deploy.scenario_parts import read_link_traces
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.radio_fit.logs import is_network_table, network_log_of_robots, network_log_of_table, read_log
 from swarmwire.metrics.real_log.real_logs import in_step, read_real_logs

@@ -19,8 +19,7 @@ from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet import read_fleet
 from swarmwire.deploy.fleet.release import robot_settings
-from swarmwire.deploy.radio.link_trace_file import scenario_traces
-from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring
+from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario

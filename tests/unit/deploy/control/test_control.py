@@ -11,10 +11,9 @@ from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.ctl_events import selection_of
-from swarmwire.deploy.control import run_finder
-from swarmwire.deploy.control.remote_control import Refused
-from swarmwire.deploy.control.run_finder import Announced, FoundRun, find_run, found_runs, runs_folder
+from swarmwire.deploy.live import remote_control
 from swarmwire.deploy.live.following import Live, read_live
+from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
 from tests.support.deploy.commands import LOSSY
@@ -100,7 +99,7 @@ def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, 
 def test_a_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
-    assert run_finder._is_own(tmp_path) is False
+    assert remote_control._is_own(tmp_path) is False
     with pytest.raises(BadInput, match=f"swarmwire-{os.getuid()}"):  # which is of another user here, too
         runs_folder()
 

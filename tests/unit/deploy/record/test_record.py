@@ -16,7 +16,7 @@ from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.config import Recording
 from swarmwire.deploy.record.folder import RunFolder
-from swarmwire.deploy.record.live_events import LiveEventsLog, read_live_events
+from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.integration.metrics.viewer.test_recording import class_names, column, series
