@@ -10,7 +10,7 @@ from scipy import stats
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 from tests.support.world.scenes import assert_same_on_average
 
 SPEED_MPS, DURATION_S = 0.08, 60.0

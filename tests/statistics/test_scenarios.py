@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.deploy import ArenaResult, Result, Simulation, run
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 
 SEEDS = range(1, 21)
 # 5th percentile of the final orders of five-percent.toml without deaths, seeds 1 to 20: the slow test measures it anew.

@@ -27,9 +27,16 @@ from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import check_recording, verify
 from swarmwire.metrics.run_folder.writer import part_file, parts_of
-from tests.support.deploy.commands import LOSSY, called, family, runners_of, started, swarmwire
-from tests.support.deploy.runs import record_run
-from tests.support.deploy.runs import started as started_run
+from tests.support.deploy.runs import (
+    LOSSY,
+    called,
+    family,
+    record_run,
+    runners_of,
+    started,
+    started_in_haste,
+    swarmwire,
+)
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
 GONE_S = 20.0  # of a machine that is busy: they are gone in a fraction of a second
@@ -153,7 +160,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
-    process = started_run(tmp_path, DURATION, KILL)
+    process = started_in_haste(tmp_path, DURATION, KILL)
     with process:
         assert process.stdout is not None
         assert any(line.strip() == str(moment) for line in process.stdout)
@@ -179,7 +186,7 @@ def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
 def killed(tmp_path_factory):
     """A long run's folder, killed amid its ticks; a tick that was over some periods before, and the last that was."""
     folder, clock = tmp_path_factory.mktemp("killed"), WallClock()
-    process = started_run(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
+    process = started_in_haste(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
     before, due_ns, seen = None, 0, list[int]()
     with process:
         assert process.stdout is not None

@@ -20,9 +20,8 @@ from swarmwire.deploy.config import Recording
 from swarmwire.metrics.drawing.film import film_of
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.deploy.commands import ROOT
-from tests.support.metrics.capture.reading import Capture, read
-from tests.support.metrics.films import Folder, film, ticks_frame
+from tests.support.deploy.runs import ROOT
+from tests.support.metrics.films import Capture, Folder, film, read, ticks_frame
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 SMALL = ("--size", "200")

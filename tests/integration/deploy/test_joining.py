@@ -11,8 +11,8 @@ import pytest
 
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import repeat, run
-from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import Joiners, Watcher, interrupt, moving
+from tests.support.deploy.runs import LOSSY
 
 When = Callable[[Joiners, Truth], bool]
 LEFT, OVER = (130, "left the run"), (0, "the run is over")

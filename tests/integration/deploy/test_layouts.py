@@ -20,8 +20,7 @@ from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.loop import Loop
-from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.deploy.runs import PER_ROBOT, run_spread
+from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
 
 SHORT = ["duration_s=3"]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))

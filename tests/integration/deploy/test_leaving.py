@@ -18,7 +18,7 @@ from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.registry import METRICS
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.world.locksteps import EncodedBackend
 
 TICKS = 24
 SEEDS = (1, 2, 3, 4, 5)

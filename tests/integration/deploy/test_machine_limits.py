@@ -23,7 +23,7 @@ from swarmwire.deploy.result import Result
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from tests.integration.examples.test_examples import EXAMPLES
-from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called
 
 SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")
 NO_ROOM = "No space left on device"

@@ -13,8 +13,7 @@ from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.cli.inspect import new_swarm
 from swarmwire.metrics.drawing.film import film_of
 from tests.docs.pages import files_of
-from tests.support.deploy.commands import called
-from tests.support.deploy.runs import run_spread
+from tests.support.deploy.runs import called, run_spread
 from tests.support.metrics.packages import CODE, install
 
 HEAVY = ("numba", "pydantic", "pymunk", "scipy", "polars", "zenoh", "matplotlib", "rerun")

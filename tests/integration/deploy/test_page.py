@@ -16,8 +16,8 @@ from swarmwire.comms.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY, called
 from tests.support.deploy.page import chromium, family, paged
+from tests.support.deploy.runs import LOSSY, called
 
 TICKS = """(count) => new Promise((done) => {
   const news = new EventSource("news"), ticks = [];

@@ -22,8 +22,7 @@ from swarmwire.deploy.live.following import Live, RunGone, following, read_live
 from swarmwire.deploy.live.published import Published
 from swarmwire.metrics.measure import Metrics
 from tests.support.clocks import StillClock, until
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.runs import At, watcher
+from tests.support.deploy.runs import LOSSY, At, watcher
 from tests.support.metrics.truths import edges, static, tally, truth
 
 MANY = ["robots.flock.count=300", 'robots.flock.place={how="arena"}', "arena.size_m=[20,20]", "duration_s=6"]

@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
 from swarmwire.metrics.run_folder.layout import INPUTS
-from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called
 
 RELAY = """
 from swarmwire.agent import Agent, Message, Robot, u2

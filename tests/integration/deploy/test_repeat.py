@@ -27,9 +27,9 @@ from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario
 from tests.integration.deploy.test_realtime import frames_of, runners_here
-from tests.support.deploy.commands import LOSSY, ROOT
 from tests.support.deploy.joiners import Watcher, interrupt
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.deploy.runs import LOSSY, ROOT
+from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=2"]
 FILE_AGENT = """

@@ -11,7 +11,7 @@ import tomli_w
 
 from swarmwire.deploy import run
 from swarmwire.deploy.campaign.sweep import sweep
-from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called
 from tests.support.metrics.real_logs import METRICS, SMALL, as_logs, flock, watched
 
 

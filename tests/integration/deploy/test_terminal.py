@@ -3,8 +3,8 @@
 import json
 import re
 
-from tests.support.deploy.commands import LOSSY, swarmwire
 from tests.support.deploy.pseudo_terminal import terminal
+from tests.support.deploy.runs import LOSSY, swarmwire
 
 LONG = ["--set", "duration_s=3600"]
 FAULTY = """

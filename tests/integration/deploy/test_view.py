@@ -21,8 +21,7 @@ from swarmwire.deploy.live.viewer import Drawer, ViewOptions, whole
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.screenshot import end, free_port, is_open, program
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.runs import At
+from tests.support.deploy.runs import LOSSY, At
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 

@@ -16,8 +16,8 @@ from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
-from tests.support.deploy.commands import LOSSY, called, swarmwire
 from tests.support.deploy.pseudo_terminal import terminal
+from tests.support.deploy.runs import LOSSY, called, swarmwire
 
 SHORT = ("--set", "duration_s=2")
 

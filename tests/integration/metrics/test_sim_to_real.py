@@ -34,7 +34,7 @@ from swarmwire.metrics.sim_to_real.report import (
 from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, measured_log, runs_of_campaign, runs_of_folder
 from swarmwire.metrics.statistics.sample import UNKNOWN
 from tests.support.deploy.campaign import InThisProcess
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, watched
 
 NAMES = (

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Command
-from tests.support.robots.made_up_readings import readings
-from tests.support.robots.rig import Rig
+from tests.support.robots.rig import Rig, made_up_readings
 from tests.support.robots.rigs import ON_ONE_RIG, RIGS
 
 
@@ -27,7 +26,7 @@ def test_a_driver_measures_what_its_robot_and_gateway_have(connected: Rig) -> No
 @ON_ONE_RIG
 @given(data=st.data())
 def test_a_reading_comes_back_as_exactly_as_the_wire_can_tell_it(connected: Rig, data: st.DataObject) -> None:
-    connected.come_back(data.draw(readings(connected.body, connected.driver.measures)))
+    connected.come_back(data.draw(made_up_readings(connected.body, connected.driver.measures)))
 
 
 def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:

@@ -22,8 +22,8 @@ from swarmwire.deploy.live.remote_control import Announced, RemoteControl, contr
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import HERE, Joiners
+from tests.support.deploy.runs import LOSSY
 from tests.support.runners import BESIDE, EARLY, INSTEAD, Played, Prank, Says, Turn
 
 PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"

@@ -27,7 +27,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss, RunnerEvent
 from tests.support.agent.runners import EncodedRunner
-from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.runs import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)
 WANDERER = ROOT / "tests/tools/soak/wanderer.py"  # a step that is lost or made twice shows in its run

@@ -29,7 +29,7 @@ from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.simulation import finished
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 SHORT = ["duration_s=2"]
 HONEST = ("r0", "r1")

@@ -1,4 +1,4 @@
-"""Runs: recorded, watched, going on in a thread, in several layouts."""
+"""The command line in a process of its own, and runs: recorded, watched, in a thread, in several layouts."""
 
 import subprocess
 import sys
@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import psutil
 import pytest
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Recording, Result, backends, run
+from swarmwire.deploy.cli.app import main
 from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.simulation import Simulation, finished
@@ -21,9 +23,10 @@ from swarmwire.metrics.run_folder import writer
 from swarmwire.metrics.run_folder.writer import join_parts
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.world.locksteps import EncodedBackend
 
+ROOT = Path(__file__).parents[3]
+LOSSY = ROOT / "scenarios" / "flocking-lossy.toml"
 WATCHER = """
 import sys
 from pathlib import Path
@@ -42,6 +45,43 @@ with following(read_live(Path(sys.argv[1]))) as run:
 print(seen, run.lost, run.bad)
 """
 PER_ROBOT = 1000  # more runners than robots
+
+
+def swarmwire(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """A finished call."""
+    command = [sys.executable, "-m", "swarmwire.deploy", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=100, cwd=cwd, check=False)
+
+
+def called(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str | Path
+) -> tuple[object, str, str]:
+    """Exit code, output and errors of a call in this process: many times as quick as a process of its own."""
+    monkeypatch.setattr(sys, "argv", ["swarmwire", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, errors = capsys.readouterr()
+    return ended.value.code, out, errors
+
+
+def started(*arguments: str | Path) -> subprocess.Popen[str]:
+    """A run that has begun to tick."""
+    command = [sys.executable, "-m", "swarmwire.deploy", "run", *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    first = process.stdout.readline()
+    assert "robots" in first, (first, process.stderr.read() if process.stderr and not first else "")
+    return process
+
+
+def family(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """All processes of a run but the first."""
+    return psutil.Process(process.pid).children(recursive=True)
+
+
+def runners_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """The runners' processes of a run."""
+    return [runner for agent_host in psutil.Process(process.pid).children() for runner in agent_host.children()]
 
 
 @contextmanager
@@ -78,7 +118,7 @@ def record_run(folder: Path, scenario=LOSSY, packets=1.0, *, rrd=False, **option
     return run(scenario, out=folder, record=Recording(packets=packets, rrd=rrd), **options)
 
 
-def started(folder: Path, *overrides: str, rrd: bool = False) -> "subprocess.Popen[str]":
+def started_in_haste(folder: Path, *overrides: str, rrd: bool = False) -> "subprocess.Popen[str]":
     """Such a run in a process of its own, in haste; it prints a line per tick."""
     program = (
         "import sys; from pathlib import Path; from tests.support.deploy.runs import Saying, hastily, record_run\n"

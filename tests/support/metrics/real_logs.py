@@ -13,7 +13,7 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import run
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 BEGAN_S = 1_767_225_600.0
 TICKS = "tick,t_s,late,x_m,y_m,heading_rad,drive,linear_mps,angular_radps,state,value,charge"

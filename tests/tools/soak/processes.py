@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 
 from swarmwire.comms.clock import to_ns
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 
 SCENARIO = Path(__file__).parent / "soak.toml"
 PYTHON = (sys.executable, "-m")

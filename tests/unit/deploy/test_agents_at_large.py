@@ -5,8 +5,8 @@ import pytest
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import backends, run
-from tests.support.deploy.commands import LOSSY
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.deploy.runs import LOSSY
+from tests.support.world.locksteps import EncodedBackend
 
 AGENTS = """
 import sys

@@ -11,7 +11,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.metrics.run_folder.tables import read_static
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 
 MAZE = ROOT / "scenarios" / "maze.toml"
 ROUND = """

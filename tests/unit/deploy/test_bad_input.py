@@ -10,7 +10,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.certificates.folder import begin_authority
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.certificates import DatedFakeClock
-from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called
 
 AGENTS = """
 import no_such_module_anywhere

@@ -28,7 +28,7 @@ from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form
 from swarmwire.world.scenario_file import scenario_schema
-from tests.support.deploy.commands import LOSSY, ROOT, called
+from tests.support.deploy.runs import LOSSY, ROOT, called
 from tests.support.metrics.packages import install
 
 EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}

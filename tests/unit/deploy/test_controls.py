@@ -18,7 +18,7 @@ from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 RATE_HZ = 10
 TICK_NS = NS_PER_S // RATE_HZ

@@ -6,8 +6,7 @@ import pytest
 
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
-from tests.support.deploy.commands import ROOT
-from tests.support.deploy.runs import PER_ROBOT, run_spread
+from tests.support.deploy.runs import PER_ROBOT, ROOT, run_spread
 
 DISRUPTED = ROOT / "scenarios" / "flocking-disrupted.toml"
 # All that the scenario has happen in a minute, within four seconds.

@@ -20,7 +20,7 @@ from swarmwire.deploy import host
 from swarmwire.deploy.cli import app as cli
 from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, compiling_told, keep_kernels, refusal
 from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 
 @pytest.fixture

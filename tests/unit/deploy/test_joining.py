@@ -8,8 +8,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Result, backends, run
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation
-from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import HERE, WANDERER, EncodedJoiners, Watcher, moves
+from tests.support.deploy.runs import LOSSY
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, Simulation, backends, run
 from tests.support.agent.hosts import PLAYERS
-from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.deploy.runs import PER_ROBOT, run_spread
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
+from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=1.5"]
 SCENARIOS = sorted(

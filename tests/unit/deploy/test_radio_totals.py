@@ -9,8 +9,7 @@ from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.deploy.runs import run_spread
+from tests.support.deploy.runs import LOSSY, ROOT, run_spread
 
 SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
 JAMMED = ROOT / "scenarios" / "jammed.toml"

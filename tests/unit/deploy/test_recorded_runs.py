@@ -14,8 +14,7 @@ from swarmwire.metrics.run_folder.ticks import TickRecorder
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.metrics.run_folder.writer import write_file
 from tests.support.clocks import GoingClock
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.runs import hastily, record_run, run_spread
+from tests.support.deploy.runs import LOSSY, hastily, record_run, run_spread
 
 EVENTS = [
     "duration_s=6",

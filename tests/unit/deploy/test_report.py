@@ -9,8 +9,8 @@ from rich.text import Text
 from swarmwire.deploy.terminal.tables import print_comparison
 from swarmwire.metrics.campaign.compare import compare
 from swarmwire.metrics.campaign.folder import select
-from tests.support.deploy.commands import called
-from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.deploy.runs import called
+from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.recorded import wandering
 from tests.support.metrics.report import run_folder
 from tests.support.metrics.truths import static

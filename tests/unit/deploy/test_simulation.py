@@ -13,8 +13,7 @@ from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, 
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import scenario_from
 from tests.support.clocks import MS, FakeClock, GoingClock
-from tests.support.deploy.commands import LOSSY, called
-from tests.support.deploy.runs import run_spread
+from tests.support.deploy.runs import LOSSY, called, run_spread
 from tests.support.world.scenes import changed
 
 SHORT = ["duration_s=2"]

@@ -7,8 +7,7 @@ from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
 from swarmwire.metrics.registry import METRICS, standard
-from tests.support.deploy.commands import LOSSY, called
-from tests.support.deploy.runs import run_spread
+from tests.support.deploy.runs import LOSSY, called, run_spread
 
 MEASURED = {"wall_time_s", "start_time_s", "realtime_factor"}
 REQUIRED = MEASURED | {

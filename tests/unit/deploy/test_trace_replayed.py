@@ -15,7 +15,7 @@ from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.scenario_parts import read_link_traces
 from swarmwire.world.scenario_file import load_scenario
-from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.runs import LOSSY, ROOT
 
 WALLED = ROOT / "scenarios" / "flocking-802154.toml"
 REPLAYED = ROOT / "scenarios" / "replayed-links.toml"

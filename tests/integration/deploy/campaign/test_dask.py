@@ -19,7 +19,7 @@ from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.terminal import sweep as terminal_sweep
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
 LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]

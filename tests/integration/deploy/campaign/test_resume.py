@@ -13,7 +13,7 @@ from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 2, "vary": VARY, "batch": 2}

@@ -11,7 +11,7 @@ from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaign.spec import campaign_file, spec_in
 from swarmwire.deploy.terminal import sweep
 from tests.support.deploy.campaign import rows_in
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 CAMPAIGN = """
 format = 1

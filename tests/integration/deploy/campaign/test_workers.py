@@ -16,7 +16,7 @@ from swarmwire.deploy.campaign.schedule import execute
 from swarmwire.deploy.campaign.worker import Task
 from tests.support.clocks import FakeClock, until
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 
 VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble

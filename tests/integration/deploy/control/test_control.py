@@ -27,8 +27,7 @@ from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY, started
-from tests.support.deploy.runs import at_tick, going
+from tests.support.deploy.runs import LOSSY, at_tick, going, started
 from tests.support.metrics.truths import static
 
 SHORT = "duration_s=5"

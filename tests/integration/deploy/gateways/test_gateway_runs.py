@@ -14,8 +14,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, Result, Simulation, repeat, run
 from swarmwire.deploy.gateways import serving
 from swarmwire.world.scenario_file import load_scenario
-from tests.support.deploy.commands import ROOT, called
 from tests.support.deploy.gateways import driven as driven_run
+from tests.support.deploy.runs import ROOT, called
 from tests.support.world.gateways import ScriptedGateway
 
 FAST = 100.0  # times real time

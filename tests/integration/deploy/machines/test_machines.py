@@ -20,9 +20,9 @@ from swarmwire.deploy import run
 from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.deploy.certificates import at_once, wait_for_listeners
-from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.machines import AT_TICK, GuardedWorld, authority, machines, on
 from tests.support.deploy.machines import SHORT as SHORT_RUN
+from tests.support.deploy.runs import LOSSY
 
 SHORT = "duration_s=3"
 SETTINGS = ("duration_s=5000", "run.on_runner_loss=stand", "run.runner_timeout_s=3")

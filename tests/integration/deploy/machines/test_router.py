@@ -18,10 +18,10 @@ from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.registry import RunnerEvent
 from tests.integration.deploy.machines.test_machines import lab
-from tests.support.deploy.commands import LOSSY, called
 from tests.support.deploy.joiners import HERE as LOCALHOST
 from tests.support.deploy.joiners import Joiners, Watcher
 from tests.support.deploy.machines import Started, on
+from tests.support.deploy.runs import LOSSY, called
 
 HERE = ("127.0.0.1",)
 TCP = ("--listen", "tcp/127.0.0.1:0", "--connect", "tcp/127.0.0.1:1")

@@ -14,7 +14,7 @@ from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.deploy.cli.app import app
 from tests.integration.deploy.radio.test_radio_fit import here, rows
-from tests.support.deploy.commands import LOSSY, ROOT, called
+from tests.support.deploy.runs import LOSSY, ROOT, called
 from tests.support.metrics.radio import csv_of, made
 
 WALLED = ROOT / "scenarios" / "flocking-802154.toml"

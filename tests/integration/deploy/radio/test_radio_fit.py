@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from swarmwire.world.scenario_file import scenario_from
-from tests.support.deploy.commands import ROOT, called
+from tests.support.deploy.runs import ROOT, called
 
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"
 SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))

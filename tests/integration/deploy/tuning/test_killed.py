@@ -7,7 +7,7 @@ import sys
 import psutil
 import pytest
 
-from tests.support.deploy.commands import ROOT, called
+from tests.support.deploy.runs import ROOT, called
 from tests.support.deploy.tuning import scenario_in, trials_in, tuned
 
 KILLED = """

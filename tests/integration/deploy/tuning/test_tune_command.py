@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from swarmwire.deploy.terminal import tune
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 from tests.support.deploy.tuning import AT, trials_in
 
 GOAL = ("--goal", "min bowl")

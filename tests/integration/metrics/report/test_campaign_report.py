@@ -23,7 +23,7 @@ from swarmwire.metrics.report.campaign_models import (
 )
 from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
 from swarmwire.metrics.report.page import as_svg, page, write_report
-from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.report import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")

@@ -16,8 +16,8 @@ from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.fleet import packages as packages_module
 from swarmwire.deploy.fleet.packages import Target
 from swarmwire.deploy.fleet.release import Archive, Entry, write_archive
-from tests.support.deploy.commands import called
 from tests.support.deploy.fleet.hosts import STAND_INS, FakeHost, HostServers, host_servers, new_key, write_key
+from tests.support.deploy.runs import called
 
 AGENT = """from swarmwire.agent import Agent, Robot
 

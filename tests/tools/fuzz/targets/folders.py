@@ -16,8 +16,8 @@ from swarmwire.metrics.report.run_data import read_run
 from swarmwire.metrics.run_folder.layout import RECORDING, SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
-from tests.support.deploy.commands import LOSSY
-from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.deploy.runs import LOSSY
+from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.real_logs import as_logs, watched
 from tests.tools.fuzz.target import FolderTarget, check_refusal
 

@@ -23,7 +23,7 @@ from swarmwire.comms.robots.epuck2.commands import (
 from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Odometer
 from swarmwire.comms.sensors.scan import ScanSpec
-from tests.support.robots.epuck2 import fact_sheet
+from tests.support.robots import epuck2
 
 WHEEL_BASE_M = 0.053
 STEPS = st.integers(-32768, 32767)
@@ -47,7 +47,7 @@ def test_a_command_is_read_as_it_was_written(command: RobotCommand) -> None:
 
 @given(command=COMMANDS)
 def test_a_command_stands_where_the_fact_sheet_says(command: RobotCommand) -> None:
-    told = fact_sheet.read(fact_sheet.COMMAND, command.encoded())
+    told = epuck2.read(epuck2.COMMAND, command.encoded())
     assert (told["id"], told["request"], told["settings"]) == (0x80, command.request, command.settings)
     assert (told["left"], told["right"], told["sound"]) == (command.left, command.right, command.sound)
     assert told["leds"] == command.lights.switched
@@ -60,7 +60,7 @@ def test_the_layout_of_the_sensors_is_the_fact_sheets_offset_by_offset() -> None
     kinds = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "f": "f4"}
     theirs = [
         (offset, int(form[1:-1] or 1) * int(kinds[form[-1]][1]), kinds[form[-1]])
-        for offset, form in fact_sheet.SENSORS.values()
+        for offset, form in epuck2.SENSORS.values()
     ]
     assert ours == theirs
     assert SENSORS.itemsize == 104

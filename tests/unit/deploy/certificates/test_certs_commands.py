@@ -12,7 +12,7 @@ from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.deploy.certificates import DatedFakeClock
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 FLEET = """
 format = 1

@@ -16,8 +16,7 @@ from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.runs import at_tick, going
+from tests.support.deploy.runs import LOSSY, at_tick, going
 from tests.support.metrics.truths import static
 
 NOBODY = 2**22 + 1  # more than Linux gives out

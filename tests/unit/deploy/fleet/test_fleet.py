@@ -23,7 +23,7 @@ from swarmwire.deploy.fleet.release import (
     write_archive,
 )
 from swarmwire.deploy.fleet.result import HostFailed, Nothing, Result, result_lines, shown_on
-from tests.support.deploy.commands import ROOT
+from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
 LEAST: dict[str, Any] = {

@@ -20,7 +20,7 @@ from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.integration.metrics.viewer.test_recording import class_names, column, series
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
 

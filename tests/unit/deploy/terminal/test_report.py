@@ -20,7 +20,7 @@ from swarmwire.deploy.terminal.sweep import SweepBar, SweepLines, print_sweep, s
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from tests.support.clocks import StillClock
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 
 @pytest.fixture(scope="module")

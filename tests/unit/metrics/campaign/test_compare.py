@@ -9,7 +9,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
 from swarmwire.metrics.campaign.folder import at, select
 from swarmwire.metrics.campaign.spec import same_value, value_from
-from tests.support.metrics.campaign.campaigns import NUMBERS, TIMES, order, write_campaign
+from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
 
 TWO = {"radio.loss": [0.0, 0.1], "physics.engine": ["discs", "pymunk"]}
 

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import Stat
-from tests.support.metrics.campaign.campaigns import write_campaign
+from tests.support.metrics.campaigns import write_campaign
 
 
 def rewritten(folder, **changes):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import Frame, frames_on_air, interface, link_of, packet, section
 from swarmwire.metrics.run_folder.packets import Packets
-from tests.support.metrics.capture.reading import Captured, read
+from tests.support.metrics.films import Captured, read
 from tests.unit.world.scenario.test_bodies import radio_of
 
 NAMES = ("a-0", "a-1", "a-2")

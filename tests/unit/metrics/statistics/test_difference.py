@@ -17,7 +17,7 @@ from swarmwire.metrics.statistics.difference import (
 )
 from swarmwire.metrics.statistics.sample import time_sample
 from swarmwire.metrics.statistics.survival import log_rank
-from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, time_samples, times, treated
+from tests.support.metrics.samples import number_samples, numbers, placebo, time_samples, times, treated
 
 
 def censored(value, limit):

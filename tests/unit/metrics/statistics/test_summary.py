@@ -20,7 +20,7 @@ from swarmwire.metrics.statistics.bootstrap import (
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
 from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary
 from swarmwire.metrics.text import number_text
-from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, times, treated
+from tests.support.metrics.samples import number_samples, numbers, placebo, times, treated
 
 
 def test_quartiles_and_mean_of_numbers_are_numpys():

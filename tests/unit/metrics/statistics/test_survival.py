@@ -18,7 +18,7 @@ from swarmwire.metrics.statistics.survival import (
     surely_greater,
     surely_less,
 )
-from tests.support.metrics.statistics.samples import placebo, time_samples, times, treated
+from tests.support.metrics.samples import placebo, time_samples, times, treated
 
 shares = st.floats(0.01, 0.99)
 

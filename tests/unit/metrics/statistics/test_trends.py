@@ -18,7 +18,7 @@ from swarmwire.metrics.statistics.trends import (
     resampled_sums,
     scaling,
 )
-from tests.support.metrics.statistics.samples import numbers, times
+from tests.support.metrics.samples import numbers, times
 
 SHARE = np.linspace(0.0, 0.9, 10)
 

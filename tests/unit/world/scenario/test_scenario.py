@@ -16,7 +16,7 @@ from swarmwire.world.scenario.scenario import Scenario, mapping_of, same_content
 from swarmwire.world.scenario.schema import Node, plain, words
 from swarmwire.world.scenario.tables import MetricTable
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
-from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.runs import LOSSY, ROOT
 from tests.support.world.scenes import SAMPLE, changed, without
 
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}

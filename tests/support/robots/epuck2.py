@@ -1,6 +1,9 @@
-"""The e-puck2's packets as its maker's sources have them, written down once more and apart from what is tested."""
+"""The e-puck2's protocol: its fact sheet, written out by hand, and a robot that follows a script."""
 
+import socket
 import struct
+from collections.abc import Callable
+from threading import Thread
 from typing import Any
 
 # name: offset, format. epuck2_driver_cpp.cpp reads the sensors at these bytes, and Asercom2.c writes them.
@@ -40,6 +43,7 @@ COMMAND: dict[str, tuple[int, str]] = {
     "sound": (20, "<B"),
 }
 REST: dict[str, Any] = {"acc": (0, 0, 800), "ambient": (4000,) * 8, "tof": 8190, "battery": 3440, "selector": 15}
+COMMAND_BYTES = 21
 
 
 def sensors(**values: Any) -> bytes:
@@ -64,3 +68,47 @@ def command(**values: Any) -> bytes:
         offset, layout = COMMAND[name]
         struct.pack_into(layout, packet, offset, *(value if isinstance(value, tuple) else (value,)))
     return bytes(packet)
+
+
+class ScriptedRobot:
+    """Takes one connection after another while it is entered, and answers each command as `answer` says.
+
+    Attributes:
+        commands: the packets that came.
+    """
+
+    def __init__(self, answer: Callable[[bytes], bytes]) -> None:
+        self._answer = answer
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self._thread = Thread(target=self._serve, daemon=True)
+        self._driver: socket.socket | None = None
+        self._ended = False
+        self.commands: list[bytes] = []
+
+    @property
+    def address(self) -> str:
+        """Where it answers."""
+        host, port = self._listening.getsockname()
+        return f"{host}:{port}"
+
+    def __enter__(self) -> "ScriptedRobot":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended = True
+        self._listening.shutdown(socket.SHUT_RDWR)
+        self._thread.join()
+        self._listening.close()
+
+    def _serve(self) -> None:
+        while not self._ended:
+            try:
+                driver, _ = self._listening.accept()
+            except OSError:
+                return
+            with driver:
+                driver.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                while len(packet := driver.recv(COMMAND_BYTES, socket.MSG_WAITALL)) == COMMAND_BYTES:
+                    self.commands.append(packet)
+                    driver.sendall(self._answer(packet))
