@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import polars as pl
 
 from docs.experiments.experiment import Experiment
 from docs.experiments.places import Places
@@ -10,9 +11,6 @@ from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.atomic import output_file
 from swarmwire.metrics.campaign.folder import CampaignFolder
-
-if TYPE_CHECKING:
-    import polars as pl
 
 BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
@@ -40,7 +38,7 @@ def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ())
     return written
 
 
-def digest_of(experiment: Experiment, folder: Path) -> "pl.DataFrame":
+def digest_of(experiment: Experiment, folder: Path) -> pl.DataFrame:
     """The digest of one campaign; BadInput unless it is over and has the columns that the experiment wants."""
     campaign = CampaignFolder(folder)
     if not campaign.finished:
@@ -62,10 +60,8 @@ def digest_of(experiment: Experiment, folder: Path) -> "pl.DataFrame":
     return campaign.runs.select(*chosen)
 
 
-def digests(experiment: Experiment, places: Places) -> "Mapping[str, pl.DataFrame]":
+def digests(experiment: Experiment, places: Places) -> Mapping[str, pl.DataFrame]:
     """The digests of an experiment by campaign; BadInput if one is missing."""
-    import polars as pl
-
     for file in _files(experiment, places):
         if not file.exists():
             raise BadInput(str(file), "", f"is missing: expected a digest; run or digest {experiment.name} first")

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import getdoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
 
 from docs.experiments.places import Places
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
-
-if TYPE_CHECKING:
-    import polars as pl
 
 NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "told")
 
@@ -34,15 +33,15 @@ class Experiment:
     columns: tuple[str, ...]
     module: Any
 
-    def draw(self, runs: "Mapping[str, pl.DataFrame]") -> Any:
+    def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
         """The matplotlib figure."""
         return self.module.draw(runs)
 
-    def told(self, runs: "Mapping[str, pl.DataFrame]") -> str:
+    def told(self, runs: Mapping[str, pl.DataFrame]) -> str:
         """The numbers, as Markdown."""
         return str(self.module.told(runs)).strip()
 
-    def digested(self, folder: Path, runs: "pl.DataFrame") -> "pl.DataFrame | None":
+    def digested(self, folder: Path, runs: pl.DataFrame) -> pl.DataFrame | None:
         """Its own digest of a campaign; None: it is content with a choice of columns."""
         return self.module.digested(folder, runs) if hasattr(self.module, "digested") else None
 

@@ -14,17 +14,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
 from swarmwire.metrics.atomic import output_file
-
-if TYPE_CHECKING:
-    import polars as pl
 
 IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 283, 127, 147
 
@@ -197,13 +195,11 @@ def write_capture(to: Path, link: Link, name: str, description: str, frames: Ite
     return count
 
 
-def frames_on_air(packets: "pl.DataFrame", names: Sequence[str]) -> Iterator[Frame]:
+def frames_on_air(packets: pl.DataFrame, names: Sequence[str]) -> Iterator[Frame]:
     """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
 
     A frame without a receiver in range has no row and is left out, as are packets that never went on air.
     """
-    import polars as pl
-
     once = ("on_air_at_ns", "to", "size_bytes", "topic", "payload")
     each = packets.filter(pl.col("receiver").is_not_null()).sort("receiver")
     frames = each.group_by("sender", "sequence").agg(

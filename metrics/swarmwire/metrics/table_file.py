@@ -2,15 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
-
-if TYPE_CHECKING:
-    import polars as pl
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -20,15 +17,11 @@ def corruption_errors() -> tuple[type[BaseException], ...]:
 
     A panic is no Exception; polars also prints it on stderr.
     """
-    import polars as pl
-
     return (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 
 
-def read_parquet(file: Path, columns: list[str] | None = None, cure: str = "") -> "pl.DataFrame":
+def read_parquet(file: Path, columns: list[str] | None = None, cure: str = "") -> pl.DataFrame:
     """What a Parquet file holds; BadInput names it if it is damaged or cannot be read, with what can be done."""
-    import polars as pl
-
     try:
         return pl.read_parquet(file, columns=columns)
     except (OSError, *corruption_errors()) as error:
@@ -73,8 +66,6 @@ class MeasuredTable:
 
     def numbers(self, column: str) -> FloatArray:
         """A column (rows,), NaN where it is empty; BadInput for what is no finite number."""
-        import polars as pl
-
         taken = self._frame[column]
         cast = taken.cast(pl.Float64, strict=False)
         known = taken.is_not_null().to_numpy()
@@ -84,8 +75,6 @@ class MeasuredTable:
 
     def texts(self, column: str) -> list[str]:
         """A column of names (rows,); BadInput where one is empty."""
-        import polars as pl
-
         taken = self._frame[column].cast(pl.String)
         self.refuse_where(taken.is_null().to_numpy(), column, "expected a name")
         return taken.to_list()
@@ -100,9 +89,7 @@ class MeasuredTable:
         return BadInput(self.where, key, expected)
 
 
-def _read(path: Path) -> "pl.DataFrame":
-    import polars as pl
-
+def _read(path: Path) -> pl.DataFrame:
     if path.suffix.lower() not in SUFFIXES:
         raise BadInput(str(path), "", f"expected a file name that ends in {' or '.join(SUFFIXES)}")
     try:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.config import did_you_mean
@@ -33,9 +34,6 @@ from swarmwire.metrics.campaign.spec import (
 )
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
-
-if TYPE_CHECKING:
-    import polars as pl
 
 SIM_TIME = "sim_time_s"
 MAX_RETRIES = 3  # times that the parts of a running campaign may be joined while they are read
@@ -73,14 +71,12 @@ class CampaignFolder:
         return self.about.responses
 
     @cached_property
-    def runs(self) -> "pl.DataFrame":
+    def runs(self) -> pl.DataFrame:
         """A row per run that has ended, sorted by run: `summary.parquet`, or what parts there are so far.
 
         Columns: run, point, seed, one of each parameter, ended, error, ticks, sim_time_s, responses, timing_wall_s, …
         Before the first run has ended there may be no columns but the first of these.
         """
-        import polars as pl
-
         for _ in range(MAX_RETRIES):
             files = self._files()
             try:
@@ -146,8 +142,6 @@ class CampaignFolder:
     @cached_property
     def _ended_well(self) -> BoolArray:
         """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
-        import polars as pl
-
         return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
 
     def _column(self, name: str) -> AnyArray:
@@ -155,8 +149,6 @@ class CampaignFolder:
 
     def _numbers(self, name: str) -> FloatArray:
         """A column of numbers (runs,), NaN where it is null; all NaN before any run has this column."""
-        import polars as pl
-
         if name not in self.runs.columns:
             return np.full(len(self.runs), np.nan)
         return self.runs[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
@@ -169,9 +161,7 @@ class CampaignFolder:
         return [whole, *found] if whole.exists() else found
 
 
-def _check_columns(file: Path, frame: "pl.DataFrame", responses: Iterable[Response]) -> None:
-    import polars as pl
-
+def _check_columns(file: Path, frame: pl.DataFrame, responses: Iterable[Response]) -> None:
     lacking = [name for name in NEEDED if name not in frame.columns]
     if lacking:
         raise BadInput(str(file), lacking[0], "expected this column of a campaign's table")

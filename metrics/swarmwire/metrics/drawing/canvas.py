@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
@@ -130,8 +132,6 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
 
 def pixels(figure: Any) -> ByteArray:
     """The pixels of the canvas, (height, width, 3); a view that the next drawing overwrites."""
-    import numpy as np
-
     return np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
 
 

@@ -2,19 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
-
-if TYPE_CHECKING:
-    import polars as pl
-
 
 NO_STATE = -1
 MAX_BY_DEFAULT = 300  # frames
@@ -35,7 +32,7 @@ class Recorded(Protocol):
         """Unit, kind and bounds of each metric, by name."""
         ...
 
-    def ticks(self, arena: int | None = None) -> "pl.DataFrame":
+    def ticks(self, arena: int | None = None) -> pl.DataFrame:
         """A row per tick of an arena, as far as it was written."""
         ...
 
@@ -89,19 +86,17 @@ def film_of(recorded: Recorded, arena: int, where: str) -> Film:
     )
 
 
-def _stacked(frame: "pl.DataFrame", names: tuple[str, ...]) -> AnyArray:
+def _stacked(frame: pl.DataFrame, names: tuple[str, ...]) -> AnyArray:
     """Columns of lists as one array, (T, items, columns)."""
     return np.stack([frame[name].to_numpy() for name in names], axis=-1)
 
 
-def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
+def states(frame: pl.DataFrame) -> tuple[tuple[str, ...], IntArray | None]:
     """The names of the states that robots noted, in order of their first tick, and each robot's state.
 
     Null and the empty text are no state. Second: (T, n) places in the names or NO_STATE, or None if no robot ever noted
     a state.
     """
-    import polars as pl
-
     texts = frame["state"].explode()
     names = [name for name in texts.unique(maintain_order=True).to_list() if name]
     if not names:
@@ -110,10 +105,8 @@ def states(frame: "pl.DataFrame") -> tuple[tuple[str, ...], IntArray | None]:
     return tuple(names), place.to_numpy().reshape(frame.height, -1)
 
 
-def _metrics(frame: "pl.DataFrame", rate_hz: int) -> dict[str, FloatArray]:
+def _metrics(frame: pl.DataFrame, rate_hz: int) -> dict[str, FloatArray]:
     """The columns that hold one number a tick, and `link_pdr`: received / in range, over the last second."""
-    import polars as pl
-
     names = [name for name, kind in frame.schema.items() if kind == pl.Float64 and name != "time_s"]
     found: dict[str, FloatArray] = {name: frame[name].fill_null(np.nan).to_numpy() for name in names}
     if LINK_PDR not in found and {"received", "in_range"} <= set(frame.columns):

@@ -1,9 +1,10 @@
 """Pictures of a radio: the delivery ratio of a run over distance, and the coverage of a scenario's radio."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
@@ -31,10 +32,6 @@ from swarmwire.metrics.drawing.scene import draw_scenery
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 
-if TYPE_CHECKING:
-    import polars as pl
-
-
 _BEYOND = 1.5  # of the distance at which the last packet was received: how far the picture goes
 _DELIVERY_HEIGHT_IN = 3.9
 _COVERAGE_HEIGHT_IN, _EDGE_IN = 3.75, 0.3
@@ -47,15 +44,13 @@ _TITLE: Look = {"loc": "left", "fontsize": TEXT_PT, "color": SOFT, "pad": 4}
 _LEGEND: Look = {"fontsize": SMALL_PT, "frameon": False, "labelcolor": SOFT, "loc": "best"}
 
 
-def received_bins(table: "pl.DataFrame") -> "pl.DataFrame":
+def received_bins(table: pl.DataFrame) -> pl.DataFrame:
     """The bins of `radio_distances` up to 1.5 times the distance of the last reception."""
-    import polars as pl
-
     received = table.filter(pl.col("received") > 0)["to_m"]
     return table.filter(pl.col("from_m") < _BEYOND * float(received[-1])) if len(received) else table
 
 
-def draw_ratio(axes: Any, table: "pl.DataFrame", range_m: float | None) -> None:
+def draw_ratio(axes: Any, table: pl.DataFrame, range_m: float | None) -> None:
     """The ratio of each bin with its binomial 95 % interval, and the nominal range if it has one."""
     pdr = table["pdr"].cast(float).fill_null(np.nan).to_numpy()
     edges_m = _edges_m(table)
@@ -75,7 +70,7 @@ def draw_ratio(axes: Any, table: "pl.DataFrame", range_m: float | None) -> None:
         axes.annotate("range", (range_m, 1.0), (3, -7), fontsize=SMALL_PT, color=SOFT, **at)
 
 
-def draw_intended(axes: Any, table: "pl.DataFrame") -> None:
+def draw_intended(axes: Any, table: pl.DataFrame) -> None:
     """How many receivers packets on air were meant for in each bin."""
     edges_m = _edges_m(table)
     axes.stairs(table["intended"].to_numpy(), edges_m, fill=True, color=LINK, alpha=0.6)
@@ -84,7 +79,7 @@ def draw_intended(axes: Any, table: "pl.DataFrame") -> None:
     axes.set_xlabel("distance between sender and receiver in m", fontsize=SMALL_PT, color=SOFT, labelpad=2)
 
 
-def _edges_m(table: "pl.DataFrame") -> FloatArray:
+def _edges_m(table: pl.DataFrame) -> FloatArray:
     return np.append(table["from_m"].to_numpy(), table["to_m"][-1])
 
 

@@ -6,18 +6,16 @@ from functools import cached_property
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
-
-if TYPE_CHECKING:
-    import polars as pl
 
 LOG_FORMAT = 1
 ROBOT = "robot.json"
@@ -153,8 +151,6 @@ class LogTable(MeasuredTable):
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         """Read the file, all columns as texts; BadInput unless it has these columns, or if a line has others."""
-        import polars as pl
-
         self.where = str(path)
         whole, half = _whole_lines(path)
         self.half_line = half
@@ -251,9 +247,7 @@ def _whole_lines(path: Path) -> tuple[bytes, bool]:
     return whole + end, bool(half)
 
 
-def _empty(columns: Sequence[str]) -> "pl.DataFrame":
-    import polars as pl
-
+def _empty(columns: Sequence[str]) -> pl.DataFrame:
     return pl.DataFrame(schema=dict.fromkeys(columns, pl.String))
 
 

@@ -4,6 +4,8 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
+import polars as pl
+
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title, short_value
@@ -100,8 +102,6 @@ def _machines(folder: CampaignFolder) -> list[str]:
 
 def _failures(folder: CampaignFolder) -> list[str | Table]:
     """Errors with the runs that they ended, the most frequent first."""
-    import polars as pl
-
     failed = folder.runs.filter(pl.col("ended") == FAILED)
     if not len(failed):
         return []

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
@@ -17,9 +18,6 @@ from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors
 from swarmwire.metrics.text import counted
-
-if TYPE_CHECKING:
-    import polars as pl
 
 MAX_POINTS = 800  # of a curve: about the width of a figure in dots
 ARENA = 0  # whose pictures are drawn
@@ -48,7 +46,7 @@ class Lane:
         return f"{self.words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{self.words}{times}"
 
 
-def lanes_of(events: "pl.DataFrame") -> list[Lane]:
+def lanes_of(events: pl.DataFrame) -> list[Lane]:
     """The lanes of one arena's rows of `events`, by first occurrence.
 
     Rows of ends do not name their beginning: an end belongs to the first open one with the same robots, else to the
@@ -108,7 +106,7 @@ class RunData:
     scenario: str  # its text; empty: not there
     film: Film | str  # of the first arena, or why there is none
     lanes: list[Lane]  # its events
-    events: "pl.DataFrame | None"
+    events: pl.DataFrame | None
 
     @property
     def shown_name(self) -> str:
@@ -129,7 +127,7 @@ class RunData:
         found: Any = None if self.summary is None else self.summary[part]
         return cast("list[Any]", found)[arena] if isinstance(found, list) else found
 
-    def table(self, name: str, arena: int | None = ARENA) -> "pl.DataFrame | str":
+    def table(self, name: str, arena: int | None = ARENA) -> pl.DataFrame | str:
         """`events`, `radio_distances` or `radio_links`, or why it cannot be had: not recorded, or damaged."""
         if not self.folder.files(name) and not (self.folder.path / name).is_dir():
             return f"`{name}` was not recorded."
@@ -138,10 +136,8 @@ class RunData:
         except BadInput as error:
             return f"{error}."
 
-    def packets(self, columns: Sequence[str]) -> "pl.DataFrame | str":
+    def packets(self, columns: Sequence[str]) -> pl.DataFrame | str:
         """These columns of the packets of the first arena that reached or missed a receiver, or why there are none."""
-        import polars as pl
-
         files = self.folder.files("packets")
         if not files:
             return "`packets` was not recorded."

@@ -1,8 +1,9 @@
 """The delivery ratio of each link: a matrix, or a histogram where there are many."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
@@ -11,10 +12,6 @@ from swarmwire.metrics.drawing.canvas import CURVE, FLOOR, INK, PAPER, SMALL_PT,
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.text import counted, share, short, shortened
-
-if TYPE_CHECKING:
-    import polars as pl
-
 
 _BINS = 25
 MAX_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
@@ -116,10 +113,8 @@ def links(run: RunData) -> Figure | str:
     return Figure(NAME, as_svg(link_histogram(busy), NAME), caption)
 
 
-def _counted(run: RunData) -> "pl.DataFrame | str":
+def _counted(run: RunData) -> pl.DataFrame | str:
     """Packets by sender, receiver and fate, or the reason for their absence."""
-    import polars as pl
-
     table = run.table("radio_links")
     if not isinstance(table, str):
         return table
@@ -130,7 +125,7 @@ def _counted(run: RunData) -> "pl.DataFrame | str":
     return packets.group_by("sender", "receiver", "fate").agg(pl.len().alias("packets"))
 
 
-def of_links(table: "pl.DataFrame", robots: int) -> tuple[IntArray, IntArray]:
+def of_links(table: pl.DataFrame, robots: int) -> tuple[IntArray, IntArray]:
     """Of packets by sender, receiver and fate: those received, and those with the receiver in range, (n, n) each.
 
     In range counts as in the summary: packets of any fate but `blocked`.

@@ -1,9 +1,10 @@
 """The section on the radio: fates of packets, delivery over distance, and latencies."""
 
 import shlex
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
@@ -16,10 +17,6 @@ from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, T
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links
 from swarmwire.metrics.text import number, share, short
-
-if TYPE_CHECKING:
-    import polars as pl
-
 
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}
 _HEIGHT_IN = 2.75
@@ -89,7 +86,7 @@ def distances(run: RunData) -> Figure | str:
     return Figure("delivery-by-distance", as_svg(figure, "delivery-by-distance"), caption)
 
 
-def delivery_by_distance(table: "pl.DataFrame", range_m: float | None) -> Any:
+def delivery_by_distance(table: pl.DataFrame, range_m: float | None) -> Any:
     """The figure of at least one row of an arena's `radio_distances`."""
     figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
     upper = plain_axes(figure, (0.11, 0.5, 0.86, 0.41), "share of the receivers that received")

@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.interfaces import Observer
@@ -15,9 +16,6 @@ from swarmwire.comms.truth import ReceptionRecords, Static, TransmissionRecords,
 from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
 from swarmwire.metrics.run_folder.table import RecordOptions, Table, TotalsRecorder, Verdict, compare_fates, sums
 from swarmwire.metrics.run_folder.writer import scan_files
-
-if TYPE_CHECKING:
-    import polars as pl
 
 TOLERANCE = 1e-9  # of a ratio
 BINS_WITHIN_RANGE = 20  # at least
@@ -43,8 +41,6 @@ class RadioDistances(Table):
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The type of each column."""
-        import polars as pl
-
         return {
             "arena": pl.Int32,
             "from_m": pl.Float64,
@@ -67,10 +63,8 @@ class RadioDistances(Table):
         totals = {(row["arena"], received): row["received"] for row in sums(scan_files(files), ["received"])}
         return compare_fates(totals, (received,), summary)
 
-    def fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """Also a pdr that is not received / intended."""
-        import polars as pl
-
         fault = super().fault(table, static)
         if fault is not None:
             return fault
@@ -97,10 +91,8 @@ class DistanceRecorder(TotalsRecorder):
         """Add what a tick brought."""
         self._counts.see(truth)
 
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """A row per arena and bin, up to the last that any receiver was in."""
-        import polars as pl
-
         counts = self._counts
         bins = int(np.flatnonzero(counts.intended.any(axis=0)).max(initial=-1)) + 1
         arenas = len(counts.intended)

@@ -3,18 +3,16 @@
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks
 from swarmwire.metrics.run_folder.writer import Chunk, TableWriter, scan_files
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 class EventLog(Observer):
@@ -65,8 +63,6 @@ class Events(Table):
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The type of each column."""
-        import polars as pl
-
         return {
             "at_s": pl.Float64,
             "tick": pl.Int64,
@@ -84,8 +80,6 @@ class Events(Table):
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """A row for each event of the summary in each arena that it concerns."""
-        import polars as pl
-
         if summary is None:
             return None
         rows, events = scan_files(files).select(pl.len()).collect().item(), summary["events"]
@@ -149,7 +143,5 @@ def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
     return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
 
 
-def _frame(rows: list[dict[str, Any]]) -> "pl.DataFrame":
-    import polars as pl
-
+def _frame(rows: list[dict[str, Any]]) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=Events().schema())

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.clock import NS_PER_S, Clock
@@ -17,9 +18,6 @@ from swarmwire.comms.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Stat
 from swarmwire.metrics.run_folder.table import RecordOptions, Table, Verdict, compare_fates
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 from swarmwire.metrics.torus import shortest
-
-if TYPE_CHECKING:
-    import polars as pl
 
 OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row
@@ -41,8 +39,6 @@ class Packets(Table):
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The type of each column."""
-        import polars as pl
-
         return {
             "arena": pl.Int32,
             "sender": pl.Int32,
@@ -69,8 +65,6 @@ class Packets(Table):
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """If all packets of a run that ended by itself were recorded: as many receivers of each fate."""
-        import polars as pl
-
         recorded: dict[str, Any] = {} if summary is None else summary["record"].get(self.name, {})
         if summary is None or recorded.get("share") != 1.0 or recorded["dropped"]:
             return None
@@ -172,10 +166,8 @@ class PacketColumns:
     poses: list[FloatArray]  # of each tick since, (rows, 3)
     parts: list[ReceptionRecords] = field(default_factory=list[ReceptionRecords])
 
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """The rows of the packets in the sample, as they ended."""
-        import polars as pl
-
         keep = [self.sample(part) for part in self.parts]
         taken = {name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
@@ -195,17 +187,13 @@ class PacketColumns:
     def _joined(self, name: str, keep: list[BoolArray]) -> IntArray:
         return np.concatenate([getattr(part, name)[rows] for part, rows in zip(self.parts, keep, strict=True)])
 
-    def _rssi_dbm(self, keep: list[BoolArray]) -> "pl.Series":
-        import polars as pl
-
+    def _rssi_dbm(self, keep: list[BoolArray]) -> pl.Series:
         none: AnyArray = np.full(1, np.nan)
         strengths = [none if part.rssi_dbm is None else part.rssi_dbm for part in self.parts]
         strengths = [np.broadcast_to(rssi, rows.shape)[rows] for rssi, rows in zip(strengths, keep, strict=True)]
         return pl.Series(np.concatenate(strengths)).fill_nan(None)
 
-    def _topic(self, tag: IntArray) -> "pl.Series":
-        import polars as pl
-
+    def _topic(self, tag: IntArray) -> pl.Series:
         known, place = np.unique(tag, return_inverse=True)
         return pl.Series([self.topics.get(one, f"0x{one:04x}") for one in known.tolist()], dtype=pl.String).gather(
             place
@@ -225,10 +213,8 @@ class PacketColumns:
         return distance_m
 
 
-def _payload(part: ReceptionRecords, keep: BoolArray) -> "pl.Series":
+def _payload(part: ReceptionRecords, keep: BoolArray) -> pl.Series:
     """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
-    import polars as pl
-
     if part.payload is None or part.payloads is None:
         return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
     packet, place = np.unique(part.payload[keep], return_inverse=True)

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import NS_PER_S
@@ -13,9 +14,6 @@ from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, TotalsRecorder, Verdict, compare_fates, sums
 from swarmwire.metrics.run_folder.writer import scan_files
-
-if TYPE_CHECKING:
-    import polars as pl
 
 BITS_PER_BYTE = 8
 # Decided before any receiver is: by the sender alone, or of receivers that are not listed.
@@ -63,8 +61,6 @@ class RadioRobots(Table):
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The type of each column."""
-        import polars as pl
-
         return {
             "arena": pl.Int32,
             "robot": pl.String,
@@ -98,12 +94,12 @@ class RadioRobots(Table):
             {(row["arena"], fate): row[f"as_sender_{fate}"] for row in rows for fate in fates}, fates, summary
         )
 
-    def fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """Also robots that do not stand in the order of static.json, arena after arena."""
         return super().fault(table, static) or (None if static is None else _names_fault(table, static))
 
 
-def _names_fault(table: "pl.LazyFrame", static: Static) -> str | None:
+def _names_fault(table: pl.LazyFrame, static: Static) -> str | None:
     found = table.select("arena", "robot").collect().rows()
     expected = [(arena, robot) for arena in range(static.arenas) for robot in static.robot_names]
     if len(found) != len(expected):
@@ -130,10 +126,8 @@ class RobotRecorder(TotalsRecorder):
         if truth.departed is not None and truth.finished is not None:
             self._counts.see(truth.departed, truth.finished)
 
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """A row per arena and robot."""
-        import polars as pl
-
         static, counts = self._static, self._counts
         time_s = np.repeat(self._ticks, static.robots) / static.rate_hz
         as_sender = counts.as_sender.copy()
@@ -220,8 +214,6 @@ class RadioLinks(Table):
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The type of each column."""
-        import polars as pl
-
         return {
             "arena": pl.Int32,
             "sender": pl.Int32,
@@ -236,8 +228,6 @@ class RadioLinks(Table):
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """As many packets of each fate that only links have, over all links."""
-        import polars as pl
-
         found = scan_files(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
         return compare_fates(
             {(arena, fate): packets for arena, fate, packets in found.iter_rows()}, LINK_FATES, summary
@@ -258,10 +248,8 @@ class LinkRecorder(TotalsRecorder):
         if truth.finished is not None:
             self._counts.see(truth.finished)
 
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """A row per arena, sender, receiver and fate."""
-        import polars as pl
-
         columns: dict[str, Any] = dict(self._counts.columns())
         columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
         return pl.DataFrame(columns, schema_overrides=RadioLinks().schema())

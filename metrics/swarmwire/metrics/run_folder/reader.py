@@ -5,7 +5,10 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeGuard, cast
+from typing import Any, TypeGuard, cast
+
+import numpy as np
+import polars as pl
 
 from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
@@ -25,9 +28,6 @@ from swarmwire.metrics.run_folder.tables import TABLES, read_static
 from swarmwire.metrics.run_folder.ticks import movable_columns, robot_columns
 from swarmwire.metrics.run_folder.writer import parts_of, scan_files, table_file
 from swarmwire.metrics.table_file import corruption_errors
-
-if TYPE_CHECKING:
-    import polars as pl
 
 NUMBER, MAYBE_NUMBER = (int, float), (int, float, NoneType)
 # What is read from a summary, and from each item of its `by_arena`.
@@ -125,10 +125,8 @@ class RunFolder:
         except (KeyError, TypeError, ValueError):
             return {}
 
-    def table(self, name: str, arena: int | None = None, left_out: Sequence[str] = ()) -> "pl.DataFrame":
+    def table(self, name: str, arena: int | None = None, left_out: Sequence[str] = ()) -> pl.DataFrame:
         """A recorded table by name, of one arena or of all, without the columns left out; BadInput if there is none."""
-        import polars as pl
-
         self._refuse_other_format()
         for _ in range(CHANGES_UNDERFOOT):
             files = self.files(name)
@@ -150,7 +148,7 @@ class RunFolder:
             return pl.DataFrame(schema=schema)
         raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
 
-    def validated(self, name: str, arena: int | None = None) -> "pl.DataFrame":
+    def validated(self, name: str, arena: int | None = None) -> pl.DataFrame:
         """A table, checked; BadInput names file and fault if it holds anything that no run writes."""
         table = self.table(name, arena)
         fault = TABLES[name].fault(table.lazy(), self.static)
@@ -159,14 +157,12 @@ class RunFolder:
         expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
         raise BadInput(self.where(name), "", expected)
 
-    def ticks(self, arena: int | None = None) -> "pl.DataFrame":
+    def ticks(self, arena: int | None = None) -> pl.DataFrame:
         """A row per tick and arena, of one arena or of all; columns: see `Ticks`."""
         return self.table("ticks", arena)
 
-    def robots(self, arena: int = 0) -> "pl.DataFrame":
+    def robots(self, arena: int = 0) -> pl.DataFrame:
         """A row per tick and robot of one arena: tick, time_s, robot (name), group, the lists of `ticks`."""
-        import polars as pl
-
         static, ticks = self.static, self.ticks(self._checked(arena))
         names = pl.Series(static.robot_names, dtype=pl.Enum(static.robot_names))
         in_order = [group.name for group in static.groups for _ in range(group.start, group.stop)]
@@ -181,28 +177,28 @@ class RunFolder:
             ]
         )
 
-    def metrics(self, arena: int = 0) -> "pl.DataFrame":
+    def metrics(self, arena: int = 0) -> pl.DataFrame:
         """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
         wide = (*robot_columns(self.static), VALUE, *movable_columns(self.static))
         return self.table("ticks", self._checked(arena), [*wide, "arena", "seed"])
 
-    def packets(self, arena: int | None = None) -> "pl.DataFrame":
+    def packets(self, arena: int | None = None) -> pl.DataFrame:
         """A row per (packet, receiver within reach), of one arena or of all; columns: see `Packets`."""
         return self.table("packets", arena)
 
-    def events(self, arena: int | None = None) -> "pl.DataFrame":
+    def events(self, arena: int | None = None) -> pl.DataFrame:
         """A row per event and arena, of one arena or of all; columns: see `Events`."""
         return self.table("events", arena)
 
-    def radio_robots(self, arena: int | None = None) -> "pl.DataFrame":
+    def radio_robots(self, arena: int | None = None) -> pl.DataFrame:
         """A row per robot, of one arena or of all, over the whole run; columns: see `RadioRobots`."""
         return self.table("radio_robots", arena)
 
-    def radio_distances(self, arena: int | None = None) -> "pl.DataFrame":
+    def radio_distances(self, arena: int | None = None) -> pl.DataFrame:
         """A row per bin of the distance between sender and receiver, of one arena or of all: see `RadioDistances`."""
         return self.table("radio_distances", arena)
 
-    def radio_links(self, arena: int | None = None) -> "pl.DataFrame":
+    def radio_links(self, arena: int | None = None) -> pl.DataFrame:
         """A row per link and fate that occurred on it, of one arena or of all; columns: see `RadioLinks`."""
         return self.table("radio_links", arena)
 
@@ -228,11 +224,8 @@ class RunFolder:
         return arena
 
 
-def _repeated(rows: int, times: int) -> "pl.Series":
+def _repeated(rows: int, times: int) -> pl.Series:
     """0 `times` times, then 1, and so on up to rows - 1."""
-    import numpy as np
-    import polars as pl
-
     return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
 
 

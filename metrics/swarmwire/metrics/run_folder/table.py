@@ -5,7 +5,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
+
+import polars as pl
 
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import RecordFailed
@@ -13,9 +15,6 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.writer import table_file, write_file
-
-if TYPE_CHECKING:
-    import polars as pl
 
 BROKEN_OFF = ("interrupted", "left", "failed")  # ends of runs that may come amid a tick, which no observer sees
 ROBOTS = ("sender", "receiver", "to")  # columns with indices of robots
@@ -87,15 +86,15 @@ class Table(ABC):
         """The columns that every such table has."""
         return self.schema().keys()
 
-    def reach(self, table: "pl.LazyFrame") -> str:
+    def reach(self, table: pl.LazyFrame) -> str:
         """How far the rows reach, in words; there is one at least."""
         return ""
 
-    def fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """The first fault in words, None if there is none; without `static` robots and arenas are not checked."""
         return self.type_fault(table, static) or self.value_fault(table, static)
 
-    def type_fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def type_fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """A column that is missing, or of another type."""
         found = table.collect_schema()
         for column, kind in self.schema(static).items():
@@ -106,10 +105,8 @@ class Table(ABC):
                 return f"{column} is of type {found[column]}, expected {kind}"
         return None
 
-    def value_fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def value_fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """A value that is missing, no number, below 0, or an index of nothing."""
-        import polars as pl
-
         wrong: dict[str, pl.Expr] = {}
         below = {} if static is None else {"arena": static.arenas, **dict.fromkeys(ROBOTS, static.robots)}
         for column, kind in table.collect_schema().items():
@@ -172,7 +169,7 @@ class TotalsRecorder(Observer, ABC):
         """Count a tick."""
 
     @abstractmethod
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """The table."""
 
     def about(self) -> dict[str, Any]:
@@ -190,10 +187,8 @@ def arena_ticks(summary: Mapping[str, Any]) -> list[int]:
     return [end["ticks"] for end in summary["by_arena"]]
 
 
-def sums(table: "pl.LazyFrame", columns: list[str]) -> list[dict[str, Any]]:
+def sums(table: pl.LazyFrame, columns: list[str]) -> list[dict[str, Any]]:
     """The sums of these columns, a row per arena."""
-    import polars as pl
-
     return table.group_by("arena").agg(pl.col(columns).sum()).sort("arena").collect().to_dicts()
 
 

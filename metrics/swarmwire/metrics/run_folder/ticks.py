@@ -2,9 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.drives import Holonomic
@@ -28,9 +29,6 @@ from swarmwire.metrics.run_folder.layout import (
 )
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks, per_arena
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
-
-if TYPE_CHECKING:
-    import polars as pl
 
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 CHUNK_BYTES = 32_000_000  # joining parts costs three times as much as writing them
@@ -64,21 +62,17 @@ class Ticks(Table):
         """A recorder."""
         return TickRecorder(options.folder, options.metrics, options.clock, options.may_drop)
 
-    def fault(self, table: "pl.LazyFrame", static: Static | None) -> str | None:
+    def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """The types alone: values of metrics may be missing or not finite."""
         return self.type_fault(table, static)
 
-    def reach(self, table: "pl.LazyFrame") -> str:
+    def reach(self, table: pl.LazyFrame) -> str:
         """The last tick."""
-        import polars as pl
-
         tick, time_s = table.select(pl.col("tick").max(), pl.col("time_s").max()).collect().row(0)
         return f"up to tick {tick} ({time_s:g} s)"
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """Every tick once in every arena, from 0 to the last; the last row's metrics are the final ones."""
-        import polars as pl
-
         table = scan_files(files)
         tick = pl.col("tick")
         counts = pl.len().alias("rows"), tick.n_unique().alias("ticks"), tick.max().alias("last")
@@ -198,10 +192,8 @@ class TickColumns:
         """How many are filled: one for each tick and arena that has not left."""
         return int(self._running[: self.ticks].sum())
 
-    def frame(self) -> "pl.DataFrame":
+    def frame(self) -> pl.DataFrame:
         """The rows filled so far, by tick and arena."""
-        import polars as pl
-
         ticks, arenas, robots = self.ticks, self._static.arenas, self._static.robots
         per_robot = (ticks * arenas, robots)
         columns: dict[str, Any] = {
@@ -241,7 +233,7 @@ def movable_columns(static: Static) -> tuple[str, ...]:
     return MOVABLE if static.movable else ()
 
 
-def _compare_finals(last: "pl.DataFrame", summary: Mapping[str, Any]) -> Verdict:
+def _compare_finals(last: pl.DataFrame, summary: Mapping[str, Any]) -> Verdict:
     measured: list[dict[str, Any]] = per_arena(summary, "metrics")
     for arena, metrics in enumerate(measured):
         for name, statistics in metrics.items():
@@ -253,8 +245,6 @@ def _compare_finals(last: "pl.DataFrame", summary: Mapping[str, Any]) -> Verdict
 
 def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> "dict[str, Any]":
     """The type of each column, for a run of these robots and movable obstacles with these metrics."""
-    import polars as pl
-
     robots = static.robots
     motion = [name for name in robot_columns(static) if name in MOTION]
     return {

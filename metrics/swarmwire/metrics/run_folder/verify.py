@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import polars as pl
+
 from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
@@ -136,8 +138,6 @@ def _fault(folder: RunFolder, table: Table, files: list[Path]) -> str | None:
 
 def _reach(table: Table, files: list[Path]) -> str:
     """How much a table holds, in words."""
-    import polars as pl
-
     lazy, megabytes = scan_files(files), sum(file.stat().st_size for file in files) / 1e6
     rows = lazy.select(pl.len()).collect().item()
     reach = table.reach(lazy) if rows else ""
@@ -265,8 +265,6 @@ def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck
 
 
 def _file_fault(file: Path, columns: Collection[str]) -> str | None:
-    import polars as pl
-
     try:
         there = pl.read_parquet_schema(file)
         missing = [column for column in columns if column not in there]

@@ -10,14 +10,13 @@ from io import BytesIO
 from pathlib import Path
 from queue import Full, Queue
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
 
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import RecordFailed
 from swarmwire.metrics.atomic import atomic_write
-
-if TYPE_CHECKING:
-    import polars as pl
 
 # Level 3 saves nothing on poses. Statistics of lists take seven times as long as all the rest.
 PARQUET: dict[str, Any] = {"compression": "zstd", "compression_level": 1, "statistics": False}
@@ -30,7 +29,7 @@ class Chunk:
     """Rows of a table: how many, and how the thread makes a frame of them, or of those worth keeping."""
 
     rows: int
-    frame: "Callable[[], pl.DataFrame]"
+    frame: Callable[[], pl.DataFrame]
 
 
 class TableWriter:
@@ -84,7 +83,7 @@ class TableWriter:
                 self._fault = error
                 self.dropped += chunk.rows
 
-    def _write(self, frame: "pl.DataFrame") -> None:
+    def _write(self, frame: pl.DataFrame) -> None:
         if not len(frame):
             return
         write_file(frame, part_file(self._folder, self._name, self._parts))
@@ -92,8 +91,6 @@ class TableWriter:
         self.rows += len(frame)
 
     def _write_empty(self) -> None:
-        import polars as pl
-
         write_file(pl.DataFrame(schema=self._schema), part_file(self._folder, self._name, 0))
 
     def _refuse(self) -> None:
@@ -141,14 +138,12 @@ def parts_of(folder: Path, name: str) -> list[Path]:
     return sorted((folder / name).glob("part-*.parquet"))
 
 
-def scan_files(files: list[Path]) -> "pl.LazyFrame":
+def scan_files(files: list[Path]) -> pl.LazyFrame:
     """The rows of a table's files, one or more, in order.
 
     A column that only later files have is null in the rows before; in a column of fixed-length lists each item is null.
     Raises polars' errors for files that are damaged or have other types.
     """
-    import polars as pl
-
     first, schema = pl.read_parquet_schema(files[0]), pl.read_parquet_schema(files[-1])
     later = {name: kind for name, kind in schema.items() if name not in first}
     if not later:
@@ -160,7 +155,7 @@ def scan_files(files: list[Path]) -> "pl.LazyFrame":
     )
 
 
-def write_file(frame: "pl.DataFrame", path: Path) -> None:
+def write_file(frame: pl.DataFrame, path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
     data = BytesIO()  # in memory first: what a full disk then says is an OSError
     frame.write_parquet(data, **PARQUET)

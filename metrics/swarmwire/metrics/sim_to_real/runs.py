@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
@@ -20,9 +21,6 @@ from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.truths import real_run
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Radio = Mapping[str, Any]  # as in a summary: sent, intended, fates, latency_air_s, latency_agent_s
 COUNTS = ("sent", "received", "in_range")  # the radio's, since the tick before, which run folders keep
@@ -76,8 +74,6 @@ def runs_of_campaign(of: Selection, metrics: tuple[str, ...], rate_hz: int, robo
 
     BadInput where several points are meant, the campaign kept no series, or no run ended well.
     """
-    import polars as pl
-
     if len(of.points) != 1:
         paths = "".join(f"@{path}=VALUE" for path in of.campaign.parameters)
         raise BadInput(of.text, "", f"expected one design point of {len(of.points)}: {of.campaign.path}{paths}")
@@ -124,9 +120,7 @@ def _arena(radio: Any, arena: int) -> Radio:
     return cast("list[Radio]", radio)[arena] if isinstance(radio, list) else radio
 
 
-def _floats(column: "pl.Series") -> FloatArray:
-    import polars as pl
-
+def _floats(column: pl.Series) -> FloatArray:
     return column.cast(pl.Float64).fill_null(float("nan")).to_numpy().astype(np.float64)
 
 
