@@ -3,9 +3,9 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -14,12 +14,28 @@ from swarmwire.comms.clock import to_ns, to_s
 from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.kernels import njit
+from swarmwire.comms.run_views import MetricSeries
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.registry import chosen
 from swarmwire.metrics.text import json_number
 
+Plotted = Metric | MetricSeries  # a name, a unit and bounds
 Comparison = Literal["at_least", "at_most", "above", "below"]
+
+
+class Measured(Protocol):
+    """Metrics with their values in the tick last seen."""
+
+    @property
+    def metrics(self) -> Sequence[Plotted]:
+        """Which, in order."""
+        ...
+
+    @property
+    def latest(self) -> Mapping[str, FloatArray]:
+        """By name, per arena, (arenas,)."""
+        ...
 
 
 class Metrics(Observer):

@@ -19,7 +19,7 @@ from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.controls import Controls
-from swarmwire.metrics.viewer.plots import Measured
+from swarmwire.metrics.measure import Measured
 from swarmwire.world.backends.registry import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups

@@ -2,6 +2,8 @@
 
 from typing import Any, Literal
 
+import rerun.blueprint as rrb
+
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.viewer.selection import EYE, close_up_m
@@ -23,8 +25,6 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 
     `play_state` is "following" for a live run. Without a radio there is no plot of packets.
     """
-    import rerun.blueprint as rrb
-
     wide = static.arena_size_m[0] / static.arena_size_m[1]
     arena_share = _ARENA_SHARE * min(max(wide, _MIN_ARENA_SHARE / _ARENA_SHARE), 1.0)
     side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
@@ -39,16 +39,12 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 
 def page_layout(static: Static, selected: str) -> Any:
     """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible."""
-    import rerun.blueprint as rrb
-
     plots = _plots(static)[:2]
     beside = rrb.Vertical(_close_up(static, selected), *plots, row_shares=[1.15, *[1.0 for _ in plots]])
     return _whole(rrb.Horizontal(_arena(static), beside, column_shares=[_PAGE_ARENA_SHARE, 1.0 - _PAGE_ARENA_SHARE]))
 
 
 def _whole(views: Any, play_state: Literal["playing", "following", "paused"] = "following") -> Any:
-    import rerun.blueprint as rrb
-
     return rrb.Blueprint(
         views,
         rrb.TopPanel(state="collapsed"),
@@ -61,8 +57,6 @@ def _whole(views: Any, play_state: Literal["playing", "following", "paused"] = "
 
 
 def _arena(static: Static) -> Any:
-    import rerun.blueprint as rrb
-
     half_x, half_y = (_MARGIN * size / 2 for size in static.arena_size_m)
     return rrb.Spatial2DView(
         origin="/",
@@ -75,8 +69,6 @@ def _arena(static: Static) -> Any:
 
 
 def _close_up(static: Static, selected: str) -> Any:
-    import rerun.blueprint as rrb
-
     half_m = close_up_m(static, selected)
     return rrb.Spatial2DView(
         origin=f"/{EYE}",
@@ -88,8 +80,6 @@ def _close_up(static: Static, selected: str) -> Any:
 
 
 def _legend() -> Any:
-    import rerun.blueprint as rrb
-
     half = LEGEND_LINES / 2
     return rrb.Spatial2DView(
         origin="/legend",
@@ -100,21 +90,15 @@ def _legend() -> Any:
 
 
 def _about() -> Any:
-    import rerun.blueprint as rrb
-
     return rrb.TextDocumentView(origin="/about", name="About")
 
 
 def _events() -> Any:
-    import rerun.blueprint as rrb
-
     columns = rrb.TextLogColumns(timeline_columns=[_TIME], text_log_columns=["Body"])
     return rrb.TextLogView(origin="/events", name="Events", columns=columns)
 
 
 def _plots(static: Static) -> list[Any]:
-    import rerun.blueprint as rrb
-
     shares = _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08))
     distances, numbers = _plot("distances", "Distances in m"), _plot("numbers", "Counts")
     if static.range_m is None:
@@ -127,8 +111,6 @@ def _plots(static: Static) -> list[Any]:
 
 def _last(duration_s: float, rate_hz: int) -> Any:
     """The rows of the last seconds before the cursor, on either timeline."""
-    import rerun.blueprint as rrb
-
     since, now = -round(duration_s * NS_PER_S), rrb.TimeRangeBoundary.cursor_relative
     return rrb.VisibleTimeRanges(
         [
@@ -139,8 +121,6 @@ def _last(duration_s: float, rate_hz: int) -> Any:
 
 
 def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
-    import rerun.blueprint as rrb
-
     always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
     return rrb.TimeSeriesView(
         origin=f"/plots/{entity}",

@@ -3,40 +3,25 @@
 from collections import deque
 from collections.abc import Mapping, Sequence
 from math import isnan
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
+import rerun as rr
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
-from swarmwire.comms.run_views import MetricSeries
 from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.drawing.canvas import Color
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import FATES, MARK, SERIES
 
-Plotted = Metric | MetricSeries  # a name, a unit and bounds
 _WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
 _OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
 _FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
 _PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
-
-
-class Measured(Protocol):
-    """Metrics with their values in the tick last seen."""
-
-    @property
-    def metrics(self) -> Sequence[Plotted]:
-        """Which, in order."""
-        ...
-
-    @property
-    def latest(self) -> Mapping[str, FloatArray]:
-        """By name, per arena, (arenas,)."""
-        ...
 
 
 class RerunSeries:
@@ -54,8 +39,6 @@ class RerunSeries:
 
     def add(self, rows: RerunRows, value: Mapping[str, float]) -> None:
         """Add a tick's numbers by name, NaN for none; the same names in each tick."""
-        import rerun as rr
-
         new = [name for name, number in value.items() if name not in self._there and not isnan(number)]
         if new:
             self._appear(rows.rec, new)
@@ -63,8 +46,6 @@ class RerunSeries:
             rows.add(entity, rr.Scalars.columns, scalars=[value[name] for name in names])
 
     def _appear(self, rec: Any, names: list[str]) -> None:
-        import rerun as rr
-
         before = len(self._there)
         entity = f"{self._plot}/since_{before}"
         places = range(before, before + len(names))
@@ -97,15 +78,11 @@ class RerunPlots:
 
     def begin(self, rec: Any) -> None:
         """Log the look of the marks of events; that of a series comes with its first value."""
-        import rerun as rr
-
         look = rr.SeriesPoints(names="event", colors=MARK, markers="Diamond", marker_sizes=4.0)
         rec.log("plots/shares/event", look, static=True)
 
     def add(self, rows: RerunRows, latest: Mapping[str, FloatArray], truth: Truth) -> None:
         """Add the numbers of a tick."""
-        import rerun as rr
-
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)

@@ -8,12 +8,10 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.metrics.measure import Measured
 from swarmwire.metrics.run_folder.events import names
 from swarmwire.metrics.run_folder.writer import ChunkLimit
-from swarmwire.metrics.viewer.layout import about, layout, page_layout
-from swarmwire.metrics.viewer.plots import Measured, RerunPlots
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.scene import RerunArena
 from swarmwire.metrics.viewer.selection import selected_robot
 
 ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
@@ -51,6 +49,10 @@ class RerunRecording(Observer):
     def begin(self, static: Static) -> None:
         """Open the file and log the constants; BadInput if there is no such arena or selected robot."""
         import rerun as rr
+
+        from swarmwire.metrics.viewer.layout import about
+        from swarmwire.metrics.viewer.plots import RerunPlots
+        from swarmwire.metrics.viewer.scene import RerunArena
 
         if not 0 <= self._arena < static.arenas:
             raise BadInput(self._what, "arena", f"expected 0 to {static.arenas - 1}")
@@ -99,6 +101,8 @@ class RerunRecording(Observer):
 
     def _layout(self, static: Static, selected: str) -> Any:
         """The blueprint of the recording."""
+        from swarmwire.metrics.viewer.layout import layout
+
         return layout(static, selected)
 
     def _connect(self, layout: Any) -> None:
@@ -149,6 +153,8 @@ class RerunLive(RerunRecording):
         self._url, self._page = url, page
 
     def _layout(self, static: Static, selected: str) -> Any:
+        from swarmwire.metrics.viewer.layout import layout, page_layout
+
         return page_layout(static, selected) if self._page else layout(static, selected, "following")
 
     def _connect(self, layout: Any) -> None:

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
@@ -41,8 +42,6 @@ for _fate, _color in FATES.items():
 
 def begin_lost(rec: Any) -> None:
     """Log the style of the lines of packets that were not received."""
-    import rerun as rr
-
     look = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), draw_order=_LOST_ORDER)
     rec.log("world/lost_packets", look, static=True)
 
@@ -53,8 +52,6 @@ def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m
     position_m (robots, 2) are the current positions, slightly later than those when the packet went on air. A packet
     that never went on air has no receiver, and so no line.
     """
-    import rerun as rr
-
     own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
     ends = np.column_stack([finished.sender[own], finished.receiver[own]])
     strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
@@ -63,8 +60,6 @@ def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m
 
 def log_floor(rec: Any, static: Static) -> None:
     """Log it, if the run has one."""
-    import rerun as rr
-
     if static.floor is None:
         return
     grey, (width, height) = _raster(static), static.arena_size_m
@@ -97,8 +92,6 @@ class RerunLeds:
 
     def begin(self, rec: Any) -> None:
         """Log the constants."""
-        import rerun as rr
-
         look = rr.Points2D.from_fields(radii=rr.Radius.ui_points(2.5), draw_order=_LEDS)
         rec.log("world/leds", look, static=True)
 
@@ -109,8 +102,6 @@ class RerunLeds:
             self._leds, self._any_lit = truth.leds, bool(truth.leds[own].any())
         if not (self._any_lit or were_lit):
             return
-        import rerun as rr
-
         rgb, pose = truth.leds[own], truth.pose[own]
         robot, which = np.nonzero(rgb)
         ahead_m, left_m = self._place_m[robot, which].T
@@ -136,8 +127,6 @@ class RerunRobots:
 
     def begin(self, rec: Any) -> None:
         """Log the constants."""
-        import rerun as rr
-
         names = [shown(name) for name in self._static.robot_names]
         robots = rr.Points2D.from_fields(radii=self.radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
         rec.log("world/robots", robots, static=True)
@@ -152,8 +141,6 @@ class RerunRobots:
 
     def add(self, rows: RerunRows, truth: Truth, own: slice, *, trails: bool) -> None:
         """Add a tick of the robots in these rows of the world; without `trails` their places are not kept for those."""
-        import rerun as rr
-
         pose, alive, state = truth.pose[own].astype(np.float32), truth.alive[own], truth.state[own]
         rows.add("world/robots", _points, pose=pose)
         if trails:
@@ -168,16 +155,12 @@ class RerunRobots:
 
     def _arrows(self, pose: NDArray[np.float32]) -> Any:
         """The headings at the poses of one tick or many, (ticks x robots, 3)."""
-        import rerun as rr
-
         ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1).reshape(-1, self._static.robots, 2)
         ahead *= self._arrow_m
         return rr.Arrows2D.columns(origins=np.ascontiguousarray(pose[:, :2]), vectors=ahead.reshape(-1, 2))
 
 
 def _points(pose: NDArray[np.float32]) -> Any:
-    import rerun as rr
-
     return rr.Points2D.columns(positions=np.ascontiguousarray(pose[:, :2]))
 
 
@@ -198,8 +181,6 @@ class RerunArena:
 
     def begin(self, rec: Any) -> None:
         """Log the constants."""
-        import rerun as rr
-
         rec.log("world", rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
         log_floor(rec, self._static)
         self._log_fixed(rec)
@@ -222,14 +203,10 @@ class RerunArena:
             self._add_radio(rows, truth, truth.pose[self._own, :2])
 
     def _add_movable(self, rows: RerunRows, pose: FloatArray) -> None:
-        import rerun as rr
-
         strips = [_outline(obstacle) for obstacle in self._static.movable_at(self._arena, pose)]
         rows.add("world/movable", rr.LineStrips2D.columns, strips=strips)
 
     def _add_radio(self, rows: RerunRows, truth: Truth, position_m: FloatArray) -> None:
-        import rerun as rr
-
         if truth.edges is not None:
             ends = self._edges(truth.edges)
             lines = link_lines(position_m, ends, self._static)
@@ -244,8 +221,6 @@ class RerunArena:
         return edges[own] - start
 
     def _log_fixed(self, rec: Any) -> None:
-        import rerun as rr
-
         static = self._static
         half_x, half_y = (size / 2 for size in static.arena_size_m)
         boundary = _closed(np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]))

@@ -243,7 +243,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
 
 def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
     recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
-    monkeypatch.setattr("swarmwire.metrics.viewer.recording.about", refuse)
+    monkeypatch.setattr("swarmwire.metrics.viewer.layout.about", refuse)
     with pytest.raises(ValueError, match="refused"):
         recording.begin(static(3))
     recording.end(None)
