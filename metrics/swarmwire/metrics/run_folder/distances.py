@@ -14,7 +14,15 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import BROADCAST, FATE_NAMES, Fate
 from swarmwire.comms.truth import ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
-from swarmwire.metrics.run_folder.table import RecordOptions, Table, TotalsRecorder, Verdict, compare_fates, sums
+from swarmwire.metrics.run_folder.table import (
+    RecordOptions,
+    Table,
+    Totals,
+    TotalsRecorder,
+    Verdict,
+    compare_fates,
+    sums,
+)
 from swarmwire.metrics.run_folder.writer import scan_files
 
 TOLERANCE = 1e-9  # of a ratio
@@ -52,7 +60,7 @@ class RadioDistances(Table):
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, which writes nothing without a radio."""
-        return DistanceRecorder(options.folder)
+        return TotalsRecorder(options.folder, self.name, DistanceCounts)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """If every packet was counted: as many that were received, over all distances."""
@@ -74,48 +82,7 @@ class RadioDistances(Table):
         return f"pdr is not received / intended in {rows} row{'s' if rows != 1 else ''}" if rows else None
 
 
-class DistanceRecorder(TotalsRecorder):
-    """Observer that writes `radio_distances.parquet`.
-
-    The summary says besides: `every` (one of so many packets was counted) and `unknown` (receivers that
-    received, at a distance that was not known any more).
-    """
-
-    name = "radio_distances"
-
-    def start(self, static: Static) -> None:
-        """Nothing is counted so far."""
-        self._counts = DistanceCounts(static)
-
-    def add(self, truth: Truth) -> None:
-        """Add what a tick brought."""
-        self._counts.see(truth)
-
-    def frame(self) -> pl.DataFrame:
-        """A row per arena and bin, up to the last that any receiver was in."""
-        counts = self._counts
-        bins = int(np.flatnonzero(counts.intended.any(axis=0)).max(initial=-1)) + 1
-        arenas = len(counts.intended)
-        intended, received = counts.intended[:, :bins].ravel(), counts.received[:, :bins].ravel()
-        edges_m = counts.width_m * np.arange(bins + 1)
-        known = (intended > 0) & (counts.unknown == 0)
-        pdr = np.divide(received, intended, out=np.full(len(received), np.nan), where=known)
-        columns: dict[str, Any] = {
-            "arena": np.repeat(np.arange(arenas), bins),
-            "from_m": np.tile(edges_m[:-1], arenas),
-            "to_m": np.tile(edges_m[1:], arenas),
-            "intended": intended,
-            "received": received,
-            "pdr": pl.Series(pdr).fill_nan(None),
-        }
-        return pl.DataFrame(columns, schema_overrides=RadioDistances().schema())
-
-    def about(self) -> dict[str, Any]:
-        """How many packets were left out."""
-        return {"every": self._counts.every, "unknown": self._counts.unknown}
-
-
-class DistanceCounts:
+class DistanceCounts(Totals):
     """PDR(d) = receivers that received / receivers intended, of packets that went on air, by their distance.
 
     Intended are all robots alive in the arena when a broadcast goes on air, however far, and the one receiver of an
@@ -158,6 +125,28 @@ class DistanceCounts:
         if truth.departed is not None and truth.finished is not None:
             self._add_intended(truth.departed)
             self._add_received(truth.finished)
+
+    def frame(self) -> pl.DataFrame:
+        """A row per arena and bin, up to the last that any receiver was in."""
+        bins = int(np.flatnonzero(self.intended.any(axis=0)).max(initial=-1)) + 1
+        arenas = len(self.intended)
+        intended, received = self.intended[:, :bins].ravel(), self.received[:, :bins].ravel()
+        edges_m = self.width_m * np.arange(bins + 1)
+        known = (intended > 0) & (self.unknown == 0)
+        pdr = np.divide(received, intended, out=np.full(len(received), np.nan), where=known)
+        columns: dict[str, Any] = {
+            "arena": np.repeat(np.arange(arenas), bins),
+            "from_m": np.tile(edges_m[:-1], arenas),
+            "to_m": np.tile(edges_m[1:], arenas),
+            "intended": intended,
+            "received": received,
+            "pdr": pl.Series(pdr).fill_nan(None),
+        }
+        return pl.DataFrame(columns, schema_overrides=RadioDistances().schema())
+
+    def about(self) -> dict[str, Any]:
+        """One of so many packets was counted; receivers that received at a distance that was not known any more."""
+        return {"every": self.every, "unknown": self.unknown}
 
     def _add_intended(self, departed: TransmissionRecords) -> None:
         rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == Fate.RECEIVED))

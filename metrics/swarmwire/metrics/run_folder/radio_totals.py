@@ -12,7 +12,16 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
-from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, TotalsRecorder, Verdict, compare_fates, sums
+from swarmwire.metrics.run_folder.table import (
+    RecordOptions,
+    State,
+    Table,
+    Totals,
+    TotalsRecorder,
+    Verdict,
+    compare_fates,
+    sums,
+)
 from swarmwire.metrics.run_folder.writer import scan_files
 
 BITS_PER_BYTE = 8
@@ -77,7 +86,7 @@ class RadioRobots(Table):
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, which writes nothing without a radio."""
-        return RobotRecorder(options.folder)
+        return TotalsRecorder(options.folder, self.name, RobotCounts)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """As many receivers of each fate over all senders, and of fates that links have over all receivers too."""
@@ -110,45 +119,7 @@ def _names_fault(table: pl.LazyFrame, static: Static) -> str | None:
     return None
 
 
-class RobotRecorder(TotalsRecorder):
-    """Observer that writes `radio_robots.parquet`."""
-
-    name = "radio_robots"
-
-    def start(self, static: Static) -> None:
-        """Nothing is counted so far."""
-        self._static, self._counts = static, RobotCounts(static)
-        self._ticks = np.zeros(static.arenas, np.int64)  # of each arena
-
-    def add(self, truth: Truth) -> None:
-        """Add what a tick brought."""
-        self._ticks += truth.running
-        if truth.departed is not None and truth.finished is not None:
-            self._counts.see(truth.departed, truth.finished)
-
-    def frame(self) -> pl.DataFrame:
-        """A row per arena and robot."""
-        static, counts = self._static, self._counts
-        time_s = np.repeat(self._ticks, static.robots) / static.rate_hz
-        as_sender = counts.as_sender.copy()
-        as_sender[:, Fate.IN_FLIGHT] = counts.in_flight
-        columns: dict[str, Any] = {
-            "arena": np.repeat(np.arange(static.arenas), static.robots),
-            "robot": list(static.robot_names) * static.arenas,
-            "packets": counts.packets,
-            "packets_on_air": counts.packets_on_air,
-            "airtime_s": counts.on_air_ns / NS_PER_S,
-            "airtime": counts.on_air_ns / NS_PER_S / time_s,
-            "received_bytes": counts.received_bytes,
-            "throughput_bps": BITS_PER_BYTE * counts.received_bytes / time_s,
-            "intended": counts.intended,
-            **{f"as_sender_{FATE_NAMES[fate]}": as_sender[:, fate] for fate in Fate},
-            **{f"as_receiver_{FATE_NAMES[fate]}": counts.as_receiver[:, fate] for fate in RECEIVERS_FATES},
-        }
-        return pl.DataFrame(columns, schema=RadioRobots().schema())
-
-
-class RobotCounts:
+class RobotCounts(Totals):
     """Packets counted for each robot row, as sender and as receiver; O(robots) memory.
 
     Attributes:
@@ -162,14 +133,41 @@ class RobotCounts:
     """
 
     def __init__(self, static: Static) -> None:
-        self._robots, self._rows = static.robots, static.arenas * static.robots
+        self._static, self._robots, self._rows = static, static.robots, static.arenas * static.robots
+        self._ticks = np.zeros(static.arenas, np.int64)  # of each arena
         self.packets, self.packets_on_air, self.on_air_ns = self._zeros(), self._zeros(), self._zeros()
         self.intended, self.received_bytes = self._zeros(), self._zeros()
         self.as_sender: IntArray = np.zeros((self._rows, FATES), np.int64)
         self.as_receiver: IntArray = np.zeros((self._rows, FATES), np.int64)
 
-    def see(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+    def see(self, truth: Truth) -> None:
         """Add what a tick brought."""
+        self._ticks += truth.running
+        if truth.departed is not None and truth.finished is not None:
+            self.add(truth.departed, truth.finished)
+
+    def frame(self) -> pl.DataFrame:
+        """A row per arena and robot."""
+        static, time_s = self._static, np.repeat(self._ticks, self._robots) / self._static.rate_hz
+        as_sender = self.as_sender.copy()
+        as_sender[:, Fate.IN_FLIGHT] = self.in_flight
+        columns: dict[str, Any] = {
+            "arena": np.repeat(np.arange(static.arenas), static.robots),
+            "robot": list(static.robot_names) * static.arenas,
+            "packets": self.packets,
+            "packets_on_air": self.packets_on_air,
+            "airtime_s": self.on_air_ns / NS_PER_S,
+            "airtime": self.on_air_ns / NS_PER_S / time_s,
+            "received_bytes": self.received_bytes,
+            "throughput_bps": BITS_PER_BYTE * self.received_bytes / time_s,
+            "intended": self.intended,
+            **{f"as_sender_{FATE_NAMES[fate]}": as_sender[:, fate] for fate in Fate},
+            **{f"as_receiver_{FATE_NAMES[fate]}": self.as_receiver[:, fate] for fate in RECEIVERS_FATES},
+        }
+        return pl.DataFrame(columns, schema=RadioRobots().schema())
+
+    def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Add packets that left their radios, and what became of packets."""
         self._add_departed(departed)
         sender = finished.arena * self._robots + finished.sender
         _add(self.as_sender, sender * FATES + finished.fate, finished.receivers)
@@ -224,7 +222,7 @@ class RadioLinks(Table):
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, if links are to be recorded."""
-        return LinkRecorder(options.folder) if options.links else None
+        return TotalsRecorder(options.folder, self.name, LinkCounts) if options.links else None
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """As many packets of each fate that only links have, over all links."""
@@ -234,28 +232,7 @@ class RadioLinks(Table):
         )
 
 
-class LinkRecorder(TotalsRecorder):
-    """Observer that writes `radio_links.parquet`."""
-
-    name = "radio_links"
-
-    def start(self, static: Static) -> None:
-        """Nothing is counted so far."""
-        self._counts = LinkCounts(static)
-
-    def add(self, truth: Truth) -> None:
-        """Add what a tick brought."""
-        if truth.finished is not None:
-            self._counts.see(truth.finished)
-
-    def frame(self) -> pl.DataFrame:
-        """A row per arena, sender, receiver and fate."""
-        columns: dict[str, Any] = dict(self._counts.columns())
-        columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
-        return pl.DataFrame(columns, schema_overrides=RadioLinks().schema())
-
-
-class LinkCounts:
+class LinkCounts(Totals):
     """Packets counted by (arena, sender, receiver, fate); memory grows with the links that occurred, not with time."""
 
     def __init__(self, static: Static) -> None:
@@ -265,8 +242,19 @@ class LinkCounts:
         self._waiting: list[IntArray] = []
         self._rows = 0
 
-    def see(self, finished: ReceptionRecords) -> None:
-        """Add the links that ended in a tick."""
+    def see(self, truth: Truth) -> None:
+        """Add what a tick brought."""
+        if truth.finished is not None:
+            self.add(truth.finished)
+
+    def frame(self) -> pl.DataFrame:
+        """A row per arena, sender, receiver and fate."""
+        columns: dict[str, Any] = dict(self.columns())
+        columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
+        return pl.DataFrame(columns, schema_overrides=RadioLinks().schema())
+
+    def add(self, finished: ReceptionRecords) -> None:
+        """Add packets whose fate is final."""
         rows = np.flatnonzero(finished.receiver != NO_ROBOT)
         link = (finished.arena[rows] * self._robots + finished.sender[rows]) * self._robots + finished.receiver[rows]
         self._waiting.append(link * FATES + finished.fate[rows])

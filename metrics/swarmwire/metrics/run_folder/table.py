@@ -1,7 +1,7 @@
 """A recorded table: its schema, recorder and checks. Each table is one file, and one line in `tables.py`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -126,47 +126,12 @@ class Table(ABC):
         return None
 
 
-class TotalsRecorder(Observer, ABC):
-    """Writes a table about the radio as the run ends; without a radio nothing. A killed run leaves none.
+class Totals(ABC):
+    """What a table about the radio adds up over a run."""
 
-    Summary part: `record_NAME`: rows written, rows dropped (0: no disk is in the way of adding up). `end` raises
-    RecordFailed if the disk refuses the table.
-    """
-
-    name: ClassVar[str]
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def begin(self, static: Static) -> None:
-        """Start afresh."""
-        self._has_radio = False
-        self.start(static)
-
+    @abstractmethod
     def see(self, truth: Truth) -> None:
         """Add a tick."""
-        if truth.departed is not None and truth.finished is not None:
-            self._has_radio = True
-        self.add(truth)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Write the table."""
-        if not self._has_radio:
-            return {}
-        frame = self.frame()
-        try:
-            write_file(frame, table_file(self._folder, self.name))
-        except OSError as error:
-            raise RecordFailed(f"{self._folder / self.name}: {error}") from error
-        return {f"record_{self.name}": {"rows": len(frame), "dropped": 0, **self.about()}}
-
-    @abstractmethod
-    def start(self, static: Static) -> None:
-        """Start counting."""
-
-    @abstractmethod
-    def add(self, truth: Truth) -> None:
-        """Count a tick."""
 
     @abstractmethod
     def frame(self) -> pl.DataFrame:
@@ -175,6 +140,38 @@ class TotalsRecorder(Observer, ABC):
     def about(self) -> dict[str, Any]:
         """More about the table for the summary."""
         return {}
+
+
+class TotalsRecorder(Observer):
+    """Writes a table about the radio as the run ends; without a radio nothing. A killed run leaves none.
+
+    Summary part: `record_NAME`: rows written, rows dropped (0: no disk is in the way of adding up), and what the totals
+    say besides. `end` raises RecordFailed if the disk refuses the table.
+    """
+
+    def __init__(self, folder: Path, name: str, kind: Callable[[Static], Totals]) -> None:
+        self._folder, self._name, self._kind = folder, name, kind
+
+    def begin(self, static: Static) -> None:
+        """Start afresh."""
+        self._has_radio, self._totals = False, self._kind(static)
+
+    def see(self, truth: Truth) -> None:
+        """Add a tick."""
+        if truth.departed is not None and truth.finished is not None:
+            self._has_radio = True
+        self._totals.see(truth)
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Write the table."""
+        if not self._has_radio:
+            return {}
+        frame = self._totals.frame()
+        try:
+            write_file(frame, table_file(self._folder, self._name))
+        except OSError as error:
+            raise RecordFailed(f"{self._folder / self._name}: {error}") from error
+        return {f"record_{self._name}": {"rows": len(frame), "dropped": 0, **self._totals.about()}}
 
 
 def per_arena(summary: Mapping[str, Any], key: str) -> list[Any]:

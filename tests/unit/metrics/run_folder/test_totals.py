@@ -15,10 +15,10 @@ from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import distances
-from swarmwire.metrics.run_folder.distances import DistanceCounts, DistanceRecorder, bin_width_m
-from swarmwire.metrics.run_folder.radio_totals import RobotRecorder
+from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
+from swarmwire.metrics.run_folder.radio_totals import RobotCounts
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import State, TotalsRecorder
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.metrics.radio import DISK, radio_runs, rows_of, ticks
 from tests.support.metrics.recorded import links, made_up_summary, record
@@ -138,9 +138,9 @@ def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tm
     assert len(RunFolder(tmp_path / "radio").radio_distances()) == 0
 
 
-@pytest.mark.parametrize("kind", [RobotRecorder, DistanceRecorder])
+@pytest.mark.parametrize("kind", [RobotCounts, DistanceCounts])
 def test_a_disk_that_refuses_is_told_of(tmp_path, kind):
-    of, recorder = static(2), kind(tmp_path / "gone")
+    of, recorder = static(2), TotalsRecorder(tmp_path / "gone", "radio_robots", kind)
     recorder.begin(of)
     recorder.see(truth(of, departed=departed([0]), finished=links([], [], 0, 0)))
     with pytest.raises(RecordFailed, match="radio_"):
