@@ -116,7 +116,7 @@ def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RobotLog])
 
 def _bodies(static: Static, logs: RealLogs) -> Iterator[str]:
     emulated = {group.body.name: group.body for group in static.groups}
-    real = {robot.about.body.name: robot.about.body for robot in logs.robots}
+    real = {robot.body.name: robot.body for robot in logs.robots}
     if emulated.keys() != real.keys():
         yield f"body: {', '.join(sorted(emulated))} emulated, {', '.join(sorted(real))} in the log"
     for name in emulated.keys() & real.keys():

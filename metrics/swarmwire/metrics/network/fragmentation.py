@@ -34,6 +34,20 @@ class OfFragmentation(Metric):
 
     hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
 
+    @abstractmethod
+    def value(self, events: "Fragmentation", counted: IntArray) -> FloatArray:
+        """The metric (arenas,) by the events so far, and those that are `counted` in this tick, (arenas,)."""
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which is NaN without a radio."""
+        events = Fragmentation(static, self.hold_s)
+
+        def measure(view: TickView) -> FloatArray | float:
+            counted = events.see(view)
+            return np.nan if counted is None else self.value(events, counted)
+
+        return measure
+
 
 class Fragmentation:
     """The events of each arena so far. `see` must be called once per tick.
@@ -43,6 +57,7 @@ class Fragmentation:
         rejoined: (arenas,) of these, that are over.
         rejoined_s: by arena, how long each event lasted that is over, in order.
         rejoined_now: the arenas of which an event was over in the last tick.
+        statistic_s: (arenas,) what a metric last made of `rejoined_s`; NaN before.
     """
 
     def __init__(self, static: Static, hold_s: float) -> None:
@@ -52,6 +67,7 @@ class Fragmentation:
         self.rejoined: IntArray = np.zeros(arenas, np.int64)
         self.rejoined_s: list[list[float]] = [[] for _ in range(arenas)]
         self.rejoined_now: list[int] = []
+        self.statistic_s: FloatArray = np.full(arenas, np.nan)
         self._was_whole: BoolArray = np.zeros(arenas, np.bool_)
         self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
         self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
@@ -103,15 +119,9 @@ class Fragmentations(OfFragmentation):
     standard = True
     bounds = (0.0, None)
 
-    def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
-        events = Fragmentation(static, self.hold_s)
-
-        def measure(view: TickView) -> FloatArray | float:
-            counted = events.see(view)
-            return np.nan if counted is None else counted.astype(np.float64)
-
-        return measure
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Those of this tick."""
+        return counted.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -127,16 +137,9 @@ class Fragmented(OfFragmentation):
     help = "1 while the radio graph has fallen apart for at least hold_s, 0 else"
     bounds = (0.0, 1.0)
 
-    def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
-        events = Fragmentation(static, self.hold_s)
-
-        def measure(view: TickView) -> FloatArray | float:
-            if events.see(view) is None:
-                return np.nan
-            return (events.started - events.rejoined).astype(np.float64)
-
-        return measure
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Whether one is open."""
+        return (events.started - events.rejoined).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -151,16 +154,9 @@ class Unrejoined(OfFragmentation):
     standard = True
     bounds = (0.0, 1.0)
 
-    def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
-        events = Fragmentation(static, self.hold_s)
-
-        def measure(view: TickView) -> FloatArray | float:
-            if events.see(view) is None:
-                return np.nan
-            return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
-
-        return measure
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Those that are open over all."""
+        return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
 
 
 class _Rejoin(OfFragmentation):
@@ -177,18 +173,11 @@ class _Rejoin(OfFragmentation):
     def statistic(self, lengths_s: list[float]) -> float:
         """The statistic of the lengths of the events that are over: at least one."""
 
-    def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
-        events = Fragmentation(static, self.hold_s)
-        found_s: FloatArray = np.full(static.arenas, np.nan)
-
-        def measure(view: TickView) -> FloatArray:
-            events.see(view)
-            for arena in events.rejoined_now:
-                found_s[arena] = self.statistic(events.rejoined_s[arena])
-            return found_s
-
-        return measure
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Worked out anew where an event was over in this tick."""
+        for arena in events.rejoined_now:
+            events.statistic_s[arena] = self.statistic(events.rejoined_s[arena])
+        return events.statistic_s
 
 
 @dataclass(frozen=True)

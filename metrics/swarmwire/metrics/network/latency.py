@@ -3,9 +3,8 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -74,10 +73,7 @@ class _Latency(OfWindow):
 
     unit = "s"
     bounds = (0.0, None)
-
-    @abstractmethod
-    def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:
-        """The latency that is meant."""
+    to_agent: ClassVar[bool]  # else on air
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure, which keeps the sums of the window's ticks."""
@@ -88,7 +84,7 @@ class _Latency(OfWindow):
             if finished is None:
                 return np.nan
             arena, air_ns, agent_ns = latencies.of(finished, view.truth.tick)
-            total_ns, received = window.add(_sums(arena, self.pick(air_ns, agent_ns), static.arenas))
+            total_ns, received = window.add(_sums(arena, agent_ns if self.to_agent else air_ns, static.arenas))
             return total_ns / np.where(received > 0, received * NS_PER_S, np.nan)
 
         return measure
@@ -109,12 +105,9 @@ class LatencyOnAir(_Latency):
     """Mean latency on air: received_at - sent_at."""
 
     name = "latency_air"
+    to_agent = False
     needs = ("latency",)
     help = "time from sending to hearing, mean over packets received in the last window_s, in s"
-
-    def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:
-        """Until it was received."""
-        return air_ns
 
 
 @dataclass(frozen=True)
@@ -122,11 +115,8 @@ class LatencyToAgent(_Latency):
     """Mean latency to the agent: start of the first tick at which the receiver acts and has it - sent_at."""
 
     name = "latency_agent"
+    to_agent = True
     help = "time from sending to the receiver's next tick to act, mean over packets received in the last window_s, in s"
-
-    def pick(self, air_ns: IntArray, agent_ns: IntArray) -> IntArray:
-        """Until its receiver acts."""
-        return agent_ns
 
 
 class LogHistogram:

@@ -1,19 +1,19 @@
 """The log of one robot: the robot, its steps, and the packets that its radio sent and received."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body, body_from_mapping
-from swarmwire.comms.config import check_format, from_json
+from swarmwire.comms.config import from_json, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
@@ -30,6 +30,13 @@ TOO_LARGE = "too_large"
 
 
 @dataclass(frozen=True)
+class RobotRadio:
+    """The radio in robot.json."""
+
+    kind: str  # "world": the packets went over a run's radio
+
+
+@dataclass(frozen=True)
 class AboutRobot:
     """robot.json, as far as it is read."""
 
@@ -38,11 +45,11 @@ class AboutRobot:
     robots: tuple[str, ...]  # all of the swarm, in the order of their index
     agent: str  # as the robot's settings have it
     agent_sha256: str
-    params: Mapping[str, Any]
-    body: Body
+    params: dict[str, Any]
+    body: dict[str, Any]  # its data sheet
     rate_hz: float
     started_utc_ns: int
-    radio_kind: str  # "world": the packets went over a run's radio
+    radio: RobotRadio
 
 
 @dataclass(frozen=True)
@@ -103,6 +110,7 @@ class RobotLog:
     """A robot's folder, read."""
 
     about: AboutRobot
+    body: Body
     where: str
     steps: Steps
     received: ReceivedPackets
@@ -124,22 +132,22 @@ def read_robot_log(folder: Path) -> RobotLog:
         for name, columns in ((TICKS, TICK_COLUMNS), (RECEIVED, RECEIVED_COLUMNS), (SENT, SENT_COLUMNS))
     )
     halves = tuple(name for name, of in ((TICKS, ticks), (RECEIVED, received), (SENT, sent)) if of.half_line)
-    return RobotLog(about, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves)
+    body = body_from_mapping(about.body, str(folder / ROBOT))
+    return RobotLog(
+        about, body, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves
+    )
 
 
 def read_about_robot(path: Path) -> AboutRobot:
-    """What the file says; BadInput if it is none, is damaged, or is of another format."""
-    try:
-        found: object = from_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(str(path.parent), path.name, "expected a robot's log: the file is missing") from None
-    except (OSError, ValueError) as error:
-        raise BadInput(str(path), "", f"expected what a robot says of itself: {error}") from None
-    if not isinstance(found, dict):
-        raise BadInput(str(path), "", "expected an object")
-    told = cast("dict[str, Any]", found)
-    check_format(told, LOG_FORMAT, str(path))
-    return _about_robot(told, str(path))
+    """The robot of a log; BadInput if the file is missing, damaged, or of another format."""
+    about = read_json(AboutRobot, path, LOG_FORMAT)
+    if len(set(about.robots)) < len(about.robots):
+        raise BadInput(str(path), "robots", "expected a list of names, each once")
+    if about.name not in about.robots:
+        raise BadInput(str(path), "name", f"expected one of robots, got {about.name!r}")
+    if not (isfinite(about.rate_hz) and about.rate_hz > 0.0):
+        raise BadInput(str(path), "rate_hz", f"expected more than 0 Hz, got {about.rate_hz:g}")
+    return about
 
 
 class LogTable(MeasuredTable):
@@ -202,39 +210,6 @@ def received_packets(table: LogTable) -> ReceivedPackets:
         np.array(table.words("tag") if "tag" in table.columns else [""] * len(table), np.str_),
         latency_s,
         distance_m,
-    )
-
-
-def _about_robot(told: dict[str, Any], where: str) -> AboutRobot:
-    def get(name: str, kind: type | tuple[type, ...], expected: str) -> Any:
-        value = told.get(name)
-        if not isinstance(value, kind) or isinstance(value, bool):
-            raise BadInput(where, name, f"expected {expected}")
-        return value
-
-    names: list[Any] = get("robots", list, "a list of names")
-    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-        raise BadInput(where, "robots", "expected a list of names, each once")
-    name = get("name", str, "a name")
-    if name not in names:
-        raise BadInput(where, "name", f"expected one of robots, got {name!r}")
-    rate_hz = float(get("rate_hz", (int, float), "a rate in Hz"))
-    if not (isfinite(rate_hz) and rate_hz > 0.0):
-        raise BadInput(where, "rate_hz", f"expected more than 0 Hz, got {rate_hz:g}")
-    radio: dict[str, Any] = get("radio", dict, "an object")
-    if not isinstance(radio.get("kind"), str):
-        raise BadInput(where, "radio.kind", "expected a text")
-    return AboutRobot(
-        name=name,
-        swarm=get("swarm", str, "the swarm's name"),
-        robots=tuple(names),
-        agent=get("agent", str, "the agent's class"),
-        agent_sha256=get("agent_sha256", str, "a digest"),
-        params=get("params", dict, "an object"),
-        body=body_from_mapping(get("body", dict, "a body's sheet"), where),
-        rate_hz=rate_hz,
-        started_utc_ns=get("started_utc_ns", int, "whole nanoseconds since 1970"),
-        radio_kind=radio["kind"],
     )
 
 

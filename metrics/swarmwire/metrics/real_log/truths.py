@@ -165,7 +165,7 @@ def _around(pose: FloatArray) -> tuple[tuple[float, float], Boundary]:
 def _groups(logs: RealLogs) -> Iterator[Group]:
     """Robots that stand next to one another and have one body."""
     start = 0
-    for number, (body, own) in enumerate(groupby(logs.robots, lambda robot: robot.about.body)):
+    for number, (body, own) in enumerate(groupby(logs.robots, lambda robot: robot.body)):
         count = len(list(own))
         yield Group(f"{body.name}-{number}", body, start, start + count)
         start += count

@@ -20,23 +20,9 @@ from swarmwire.metrics.text import number_text
 COLUMNS = ("metric", "emulated", "log", "distance", "spread", "KS", "within")  # heads of the table of metrics
 RADIO_COLUMNS = ("radio", "emulated", "log", "within")  # and of that of the radio
 WITHIN = {True: "yes", False: "no", None: "–"}
-CSV_COLUMNS = (
-    "name",
-    "what",
-    "unit",
-    "kind",
-    "runs",
-    "emulated_q05",
-    "emulated_q50",
-    "emulated_q95",
-    "log",
-    "distance",
-    "spread",
-    "ks",
-    "difference_low",
-    "difference_high",
-    "within",
-)
+NUMBERS = ("runs", "emulated_q05", "emulated_q50", "emulated_q95", "log")  # that metrics and the radio have
+METRIC_NUMBERS = ("distance", "spread", "ks", "difference_low", "difference_high")  # that only metrics have
+CSV_COLUMNS = ("name", "what", "unit", "kind", *NUMBERS, *METRIC_NUMBERS, "within")
 _HEIGHT_IN = 2.1
 _BINS = 40
 _MAX_RUNS = 40  # that are drawn one by one
@@ -155,31 +141,19 @@ def _rows(of: SimToReal) -> list[dict[str, str]]:
     rows: list[dict[str, str]] = []
     for row in of.rows:
         about = {"name": row.metric.name, "what": "metric", "unit": row.metric.unit, "kind": row.metric.kind}
-        numbers = {
-            "runs": len(row.runs),
-            "emulated_q05": row.emulated.low,
-            "emulated_q50": row.emulated.median,
-            "emulated_q95": row.emulated.high,
-            "log": row.log,
-            "distance": row.distance,
-            "spread": row.reach,
-            "ks": row.ks,
-            "difference_low": row.difference.low,
-            "difference_high": row.difference.high,
-        }
+        only = dict(zip(METRIC_NUMBERS, (row.distance, row.reach, row.ks, *row.difference), strict=True))
+        numbers = _numbers(len(row.runs), row.emulated, row.log) | only
         rows.append(about | _number_texts(numbers) | {"within": _word(row.within)})
     for row in of.radio:
         about = {"name": row.of.name, "what": "radio", "unit": row.of.unit, "kind": "total"}
-        numbers = {
-            "runs": row.runs,
-            "emulated_q05": row.emulated.low,
-            "emulated_q50": row.emulated.median,
-            "emulated_q95": row.emulated.high,
-            "log": row.of.log,
-        }
+        numbers = _numbers(row.runs, row.emulated, row.of.log)
         rows.append(about | _number_texts(numbers) | {"within": _word(row.within)})
     rows += [{"name": name, "what": "not in the log"} for name in of.not_in_log]
     return rows + [{"name": name, "what": "not compared"} for name in of.not_compared]
+
+
+def _numbers(runs: int, emulated: Spread, log: float) -> dict[str, float]:
+    return dict(zip(NUMBERS, (runs, emulated.low, emulated.median, emulated.high, log), strict=True))
 
 
 def _number_texts(numbers: dict[str, float]) -> dict[str, str]:

@@ -146,7 +146,7 @@ def measured_log(
     """
     run = real_run(logs, place)
     ticks = math.floor(min(longest_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
-    has_air = any(robot.about.radio_kind == WORLD for robot in logs.robots)
+    has_air = any(robot.about.radio.kind == WORLD for robot in logs.robots)
     lacks = {metric.name: why_not(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
     kept = Metrics([metric for metric in metrics if lacks[metric.name] is None])
     tally = RadioTally()
