@@ -15,7 +15,7 @@ from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
-from swarmwire.comms.radio.config.phy import Access, Fading, Noise, Reception, Shadowing
+from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, Noise, Reception, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
@@ -242,3 +242,41 @@ def drawing(method: str) -> Radio:
         bursts=Bursts(0.2, 0.4),
         measures=ALL_GIVEN,
     )
+
+
+@st.composite
+def signal_radios(draw: st.DrawFn) -> Radio:
+    """Every method, with and without all that may be added; slow enough that frames outlast ticks."""
+    radio = with_access(draw(st.sampled_from(METHODS)))
+    slow = radio.frame == "plain" and draw(st.booleans())
+    walls = draw(st.sampled_from([None, Walls(9.0)]))
+    return replace(
+        radio,
+        bit_rate_bps=draw(st.sampled_from([900, 30_000])) if slow else radio.bit_rate_bps,
+        max_payload_bytes=draw(st.integers(10, 60)),
+        queue_limit=draw(st.integers(0, 4)),
+        send_offset=draw(st.sampled_from(["uniform", "tick", 0.03, 0.25])),
+        loss=draw(st.sampled_from([0.0, 0.3])),
+        jitter_s=draw(st.sampled_from([0.0, 0.3])),
+        shadowing=draw(st.sampled_from([None, Shadowing(6.0, 2.0)])),
+        fading=draw(st.sampled_from([None, Fading()])),
+        bursts=draw(st.sampled_from([None, Bursts(0.1, 0.2)])),
+        bodies=draw(st.sampled_from([None, Bodies()])),
+        walls=walls,
+        line_of_sight=walls is None and draw(st.booleans()),
+        range_m=draw(st.sampled_from([None, 60.0])),
+    )
+
+
+def story(told: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
+    """Everything received in one arena, with what came with it, and every other fate, by tick; then its tally."""
+    rows: list[tuple[object, ...]] = []
+    for tick, one in enumerate(told.news):
+        h, f = one.received, one.finished
+        for i in np.flatnonzero(h.receiver // robots == arena):
+            given = tuple(column[i] for column in h.given.values())
+            rest = h.sender[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
+            rows.append((tick, "received", h.receiver[i] % robots, *rest))
+        columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
+        rows += sorted((tick, "fate", *(column[i] for column in columns)) for i in np.flatnonzero(f.arena == arena))
+    return [*rows, (*told.tally.fates[arena], told.tally.in_range[arena])]

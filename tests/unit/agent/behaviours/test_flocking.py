@@ -98,14 +98,6 @@ def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) 
     return float(np.mean(seen[ticks // 2 :]))
 
 
-def test_where_all_hear_all_the_order_is_that_of_the_noise_alone() -> None:
-    """Each is off the common direction by its own noise: 60 independent ticks, so 5 standard errors allow for luck."""
-    mean, across = np.sin(0.5) / 0.5, 0.5 * (1.0 - np.sin(1.0))
-    along = 0.5 * (1.0 + np.sin(1.0)) - mean**2
-    expected = mean + across / (2.0 * 100 * mean)
-    assert order(1.0, 4.0, 120) == pytest.approx(expected, abs=5.0 * np.sqrt(along / 100 / 60) + 1e-3)
-
-
 def test_a_lost_packet_counts_for_nothing() -> None:
     """So with every packet lost nobody turns but by noise, of which there is none."""
     told = run(PAPER, overrides=[*SHORT, "robots.particles.params.noise_rad=0", "radio.loss=1"])

@@ -93,16 +93,6 @@ def test_what_is_behind_is_in_nobodys_way():
     assert (walker.step(near_rad=np.pi).linear_mps == 0.1).all()
 
 
-def test_who_tumbles_all_the_time_covers_less():
-    few = ["standard_metrics=false", "duration_s=20"]
-    far, tumbling = (
-        run(SCENARIO, seeds=range(1, 4), overrides=[*few, f"robots.walkers.params={{ spell_m = {spell_m} }}"])
-        for spell_m in (2.0, 0.05)
-    )
-    least = min(arena.metrics["coverage"].final for arena in far.arenas)
-    assert least > max(arena.metrics["coverage"].final for arena in tumbling.arenas)
-
-
 def turns(*neighbours: tuple[float, float], **params: float) -> np.ndarray:
     return Walker(Coverage, Present, n=400, **params).first_turns_rad(*neighbours)
 
@@ -191,15 +181,6 @@ def test_who_leaves_turns_its_back_and_approaches_again_after_a_while():
     many.step(NEAR)
     many.step(FAR)
     assert np.mean(many.memory.at == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
-
-
-def test_robots_gather_by_radio_and_not_without():
-    few = ["standard_metrics=false", "duration_s=15", "metrics.0.metric=aggregation"]
-    hearing, deaf = (
-        run(AGGREGATION_SCENARIO, seeds=[1], overrides=o).arenas[0].metrics["aggregation"].final or 0.0
-        for o in (few, [*few, "radio.loss=1.0"])
-    )
-    assert hearing > deaf > 0.0
 
 
 class One:
@@ -320,16 +301,6 @@ def test_each_robot_decides_alone(trial: Trial) -> None:
     assert_rows_independent(BeaconAvoidance, trial)
 
 
-def test_crossing_traffic_meets_without_the_radio_and_not_with_it() -> None:
-    short = ["duration_s=20"]
-    received, unheard = (
-        run(BEACON_SCENARIO, seeds=[2], overrides=o).arenas[0].metrics["collisions"].final
-        for o in (short, [*short, "radio.loss=1.0"])
-    )
-    assert received == 0.0
-    assert unheard not in (0.0, None)
-
-
 class Alone:
     """One robot whose tests say what its rays see."""
 
@@ -431,15 +402,6 @@ def test_by_a_scanner_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
 def test_by_rays_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
     assert_rows_independent(kind, Trial(body="footbot"))
     assert_rows_independent(kind, Trial(body="epuck", seed=2))
-
-
-def test_in_a_corridor_the_rule_deadlocks_and_its_cure_does_not() -> None:
-    rule, cure = (
-        run(CORRIDOR, seeds=[1], overrides=["duration_s=40", f"robots.crowd.agent='swarmwire.agent.behaviours:{kind}'"])
-        for kind in ("ThresholdRule", "SmoothedAvoidance")
-    )
-    assert (rule.metrics["deadlocked"].final or 0.0) >= 0.5
-    assert cure.metrics["deadlocked"].final == 0.0
 
 
 def test_by_rays_the_cure_meets_nobody_where_the_rule_does() -> None:

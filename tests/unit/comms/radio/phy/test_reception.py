@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Antenna, Bodies, Fading, Reception, Shadowing, Walls
+from swarmwire.comms.radio.config.phy import Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.model import Decided
@@ -29,9 +29,9 @@ from tests.support.comms.radio import (
     living,
     make_medium,
     packets,
-    random_traffic,
     run,
     scattered,
+    signal_radios,
     with_access,
 )
 
@@ -173,63 +173,7 @@ def test_bursts_take_packets_of_disks_and_signals_alike():
         assert told.tally.fates[0, Fate.BURST] / told.tally.in_range[0] == pytest.approx(0.25, abs=0.05)
 
 
-@st.composite
-def radios(draw: st.DrawFn) -> Radio:
-    """Every method, with and without all that may be added; slow enough that frames outlast ticks."""
-    radio = with_access(draw(st.sampled_from(METHODS)))
-    slow = radio.frame == "plain" and draw(st.booleans())
-    walls = draw(st.sampled_from([None, Walls(9.0)]))
-    return replace(
-        radio,
-        bit_rate_bps=draw(st.sampled_from([900, 30_000])) if slow else radio.bit_rate_bps,
-        max_payload_bytes=draw(st.integers(10, 60)),
-        queue_limit=draw(st.integers(0, 4)),
-        send_offset=draw(st.sampled_from(["uniform", "tick", 0.03, 0.25])),
-        loss=draw(st.sampled_from([0.0, 0.3])),
-        jitter_s=draw(st.sampled_from([0.0, 0.3])),
-        shadowing=draw(st.sampled_from([None, Shadowing(6.0, 2.0)])),
-        fading=draw(st.sampled_from([None, Fading()])),
-        bursts=draw(st.sampled_from([None, Bursts(0.1, 0.2)])),
-        bodies=draw(st.sampled_from([None, Bodies()])),
-        walls=walls,
-        line_of_sight=walls is None and draw(st.booleans()),
-        range_m=draw(st.sampled_from([None, 60.0])),
-    )
-
-
-def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int) -> Run:
-    """Four ticks of random traffic among robots at random places, some near, some far."""
-    rng = np.random.default_rng(seed)
-    medium = make_medium(radio, robots, range(arenas), [OBSTACLES] * arenas)
-    pose = scattered(arenas * robots, seed) * [rng.choice([1.0, 30.0]), 20.0, 1.0]
-    return run(medium, pose, lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
-
-
-@given(radios(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
-def test_fates_add_up_to_intended_receivers(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int):
-    told = random_run(radio, arenas, robots, seed, quiet_ticks)
-    np.testing.assert_array_equal(told.tally.fates.sum(axis=1), told.tally.intended)
-    assert (told.tally.fates >= 0).all()
-    assert (told.tally.in_range <= told.tally.intended).all()
-
-
-@given(radios(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
-def test_tally_agrees_with_what_is_listed(radio: Radio, arenas: int, robots: int, seed: int):
-    """Received packets, listed links and the tally tell the same story; no receiver has two fates."""
-    told = random_run(radio, arenas, robots, seed, 2)
-    for one in told.news:
-        listed = np.zeros_like(one.tally.fates)
-        np.add.at(listed, (one.finished.arena, one.finished.fate), one.finished.receivers)
-        but_far = [fate for fate in Fate if fate != Fate.OUT_OF_RANGE]
-        np.testing.assert_array_equal(listed[:, but_far], one.tally.fates[:, but_far])
-        assert not listed[:, Fate.OUT_OF_RANGE].any()
-        assert len(one.received) == listed[:, Fate.RECEIVED].sum()
-        assert (one.tally.in_range >= listed[:, Fate.RECEIVED]).all()
-    columns = np.column_stack([told.on_air(name) for name in ("arena", "sender", "sequence", "receiver")])
-    assert len(np.unique(columns, axis=0)) == len(columns)
-
-
-@given(radios(), st.integers(2, 8), st.integers(0, 1000))
+@given(signal_radios(), st.integers(2, 8), st.integers(0, 1000))
 def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int, seed: int):
     rng = np.random.default_rng(seed)
     medium = make_medium(radio, robots)
