@@ -12,7 +12,7 @@ from docs.experiments.places import Places
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
-from swarmwire.deploy.terminal.sweep import sweep_progress
+from swarmwire.deploy.terminal.sweep import SweepProgress
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 
@@ -39,7 +39,7 @@ def _swept(file: Path, folder: Path, seeds: str | None, options: ExecutionOption
     if campaign is None:
         raise BadInput(str(file), "", "expected a campaign, not a scenario")
     plan = plan_of(spec_in(file, campaign, seeds))
-    options = replace(options, observer=sweep_progress(console))
+    options = replace(options, observer=SweepProgress(console))
     if not (folder / ABOUT).exists():
         return begin_sweep(plan, folder, f"swarmwire sweep {file.name}", options)
     if not CampaignFolder(folder).finished:

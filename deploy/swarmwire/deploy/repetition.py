@@ -11,9 +11,8 @@ from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.campaign.sweep import code_changes
 from swarmwire.deploy.config import Recording, Replay, Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.record.provenance import RunFacts, read_facts
+from swarmwire.deploy.record.provenance import RunFacts, changed_files, read_facts
 from swarmwire.deploy.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
-from swarmwire.deploy.record.scenario_copy import changed_files
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, read_campaign

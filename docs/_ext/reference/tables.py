@@ -11,9 +11,8 @@ from typing import Any, cast
 
 from typer.main import get_command
 
-from swarmwire.deploy.catalogue.kinds import kind_named
+from swarmwire.deploy.catalogue.kinds import kind_named, toml
 from swarmwire.deploy.catalogue.schema import Entry, Parameter
-from swarmwire.deploy.catalogue.text import toml
 from swarmwire.deploy.cli.app import app
 
 NOTHING = "–"

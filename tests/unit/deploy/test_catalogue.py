@@ -21,9 +21,8 @@ from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.sensors import SENSOR_SPECS
-from swarmwire.deploy.catalogue.kinds import KINDS, find
+from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
 from swarmwire.deploy.catalogue.schema import Entry, unit_of
-from swarmwire.deploy.catalogue.text import print_entry, print_list
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form

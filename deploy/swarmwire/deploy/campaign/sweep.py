@@ -17,8 +17,16 @@ from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.config import SeedsGiven, seed_list
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder
-from swarmwire.deploy.record.provenance import changes_since, cpu, module_digests, versions
-from swarmwire.deploy.record.scenario_copy import Copies, changed_files, copied_mapping, copy_scenario
+from swarmwire.deploy.record.provenance import (
+    Copies,
+    changed_files,
+    changes_since,
+    copied_mapping,
+    copy_scenario,
+    cpu,
+    module_digests,
+    versions,
+)
 from swarmwire.metrics.campaign.spec import (
     FAILED,
     SCENARIO_FOLDER,

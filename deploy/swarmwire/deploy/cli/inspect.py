@@ -49,8 +49,7 @@ def list_command(
       swarmwire describe kill
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.kinds import KINDS, kind_named
-    from swarmwire.deploy.catalogue.text import print_kinds, print_list
+    from swarmwire.deploy.catalogue.kinds import KINDS, kind_named, print_kinds, print_list
 
     console = Console(highlight=False)
     found = None if kind is None else kind_named(kind)
@@ -85,8 +84,7 @@ def describe_command(
       swarmwire describe mine.toml
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.kinds import find
-    from swarmwire.deploy.catalogue.text import print_entry
+    from swarmwire.deploy.catalogue.kinds import find, print_entry
 
     entry = find(name)
     if as_json:

@@ -84,7 +84,7 @@ def sweep_command(
     from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
     from swarmwire.deploy.config import seed_list
     from swarmwire.deploy.controls import Interrupt
-    from swarmwire.deploy.terminal.sweep import print_sweep, sweep_progress
+    from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 
     given = {
         "design": design,
@@ -99,7 +99,7 @@ def sweep_command(
         source, vary or [], seeds, overrides or [], {key: of for key, of in given.items() if of is not None}
     )
     console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
-    options = ExecutionOptions(executor, workers, batch, sweep_progress(console), interrupt)
+    options = ExecutionOptions(executor, workers, batch, SweepProgress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is not None:
             done = resume_sweep(resume, options, retry_failed=retry_failed, force=force, plan=plan)
@@ -217,12 +217,12 @@ def tune_command(
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
     from swarmwire.deploy.controls import Interrupt
-    from swarmwire.deploy.terminal.sweep import sweep_progress
-    from swarmwire.deploy.terminal.tune import print_tuned, tune_progress
+    from swarmwire.deploy.terminal.sweep import SweepProgress
+    from swarmwire.deploy.terminal.tune import TuneProgress, print_tuned
     from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
 
     console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
-    observers = TuneObservers(tune_progress(console), sweep_progress(console), interrupt)
+    observers = TuneObservers(TuneProgress(console), SweepProgress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is None:
             numbers = {"trials": trials, "parallel_trials": parallel_trials, "sampler_seed": sampler_seed}

@@ -38,7 +38,7 @@ NO_PYTHON = (126, 127)  # what shells say of a program that is not there, or non
 NO_MODULE = re.compile(r"No module named '(\w+)")
 Told = Callable[[int], None]  # bytes that were sent so far
 PACKAGE = "swarmwire.deploy.fleet.host_side"
-MODULES = ("files", "system", "releasing", "serving")  # each after those it imports
+MODULES = ("files", "system", "serving")  # each after those it imports
 OLDEST = (3, 11)
 START = f"""import sys, json
 if sys.version_info < {OLDEST}:

@@ -1,6 +1,7 @@
 """Results of a command, one for each robot: how they are made, watched and printed."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -60,7 +61,7 @@ SILENT = Silent()
 
 
 class Bars:
-    """Watcher that draws a line for each robot that is at work; use it as a context."""
+    """Watcher that draws a line for each robot that is at work, while its `progress` is shown."""
 
     def __init__(self, console: Console) -> None:
         columns = (
@@ -70,40 +71,30 @@ class Bars:
             BarColumn(),
             DownloadColumn(),
         )
-        self._progress = Progress(*columns, console=console, transient=True)
+        self.progress = Progress(*columns, console=console, transient=True)
         self._tasks: dict[str, TaskID] = {}
-
-    def __enter__(self) -> Watcher:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
 
     def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
         """Draw it on."""
         if robot not in self._tasks:
-            self._tasks[robot] = self._progress.add_task(robot, doing=doing, total=None)
-        self._progress.update(self._tasks[robot], doing=doing, completed=done, total=total or None)
+            self._tasks[robot] = self.progress.add_task(robot, doing=doing, total=None)
+        self.progress.update(self._tasks[robot], doing=doing, completed=done, total=total or None)
 
     def end(self, result: Result) -> None:
         """Take its line away."""
         if result.robot in self._tasks:
-            self._progress.remove_task(self._tasks.pop(result.robot))
+            self.progress.remove_task(self._tasks.pop(result.robot))
 
 
-class Nothing:
-    """In the place of `Bars` where there is no terminal."""
-
-    def __enter__(self) -> Watcher:
-        return SILENT
-
-    def __exit__(self, *_: object) -> None: ...
-
-
-def shown_on(console: Console) -> Bars | Nothing:
-    """Bars in a terminal; else nothing until the results."""
-    return Bars(console) if console.is_terminal and not console.is_dumb_terminal else Nothing()
+@contextmanager
+def shown_on(console: Console) -> Generator[Watcher]:
+    """Bars in a terminal while the block lasts; else nothing until the results."""
+    if not console.is_terminal or console.is_dumb_terminal:
+        yield SILENT
+        return
+    bars = Bars(console)
+    with bars.progress:
+        yield bars
 
 
 def result_lines(results: Sequence[Result]) -> list[str]:

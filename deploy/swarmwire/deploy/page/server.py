@@ -4,7 +4,6 @@ import hmac
 import secrets
 import socket
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import AsyncIterable, Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,34 +27,20 @@ from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.deploy.page.news import NewsThread
 
 MAX_STEPS = 100_000
+START_NS = 20 * NS_PER_S
+PAUSE_NS = NS_PER_S // 100
+TOKEN_BYTES = 24
+MAX_CONNECTIONS = 64
 
 
-class _Order(BaseModel, ABC):
+class _Order(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    @abstractmethod
-    def give(self, control: RemoteControl) -> int | None:
-        """Ask the run for it; the number of the event that it began, if any."""
 
+class Go(_Order):
+    """Let no tick begin, go on, or end the run."""
 
-class Pause(_Order):
-    """No tick begins until `resume` or `step`."""
-
-    do: Literal["pause"]
-
-    def give(self, control: RemoteControl) -> None:
-        """Pause."""
-        control.pause()
-
-
-class Resume(_Order):
-    """The run goes on."""
-
-    do: Literal["resume"]
-
-    def give(self, control: RemoteControl) -> None:
-        """Go on."""
-        control.resume()
+    do: Literal["pause", "resume", "stop"]
 
 
 class Step(_Order):
@@ -64,30 +49,12 @@ class Step(_Order):
     do: Literal["step"]
     n: int = Field(1, ge=1, le=MAX_STEPS)
 
-    def give(self, control: RemoteControl) -> None:
-        """Step."""
-        control.step(self.n)
-
 
 class Speed(_Order):
     """At most so many simulated seconds per second of wall time; None: as fast as possible."""
 
     do: Literal["speed"]
     factor: float | None = Field(gt=0, le=1e6)
-
-    def give(self, control: RemoteControl) -> None:
-        """Set it."""
-        control.speed(self.factor)
-
-
-class Stop(_Order):
-    """The run ends."""
-
-    do: Literal["stop"]
-
-    def give(self, control: RemoteControl) -> None:
-        """End it."""
-        control.stop()
 
 
 class Happen(_Order):
@@ -96,10 +63,6 @@ class Happen(_Order):
     do: Literal["event"]
     event: dict[str, Any]
 
-    def give(self, control: RemoteControl) -> int:
-        """Let it happen."""
-        return control.event(self.event)
-
 
 class End(_Order):
     """Something that lasts is over."""
@@ -107,18 +70,24 @@ class End(_Order):
     do: Literal["end"]
     number: int = Field(ge=0)
 
-    def give(self, control: RemoteControl) -> None:
-        """End it."""
-        control.end(self.number)
+
+Order = Annotated[Go | Step | Speed | Happen | End, Field(discriminator="do")]
 
 
-Order = Annotated[Pause | Resume | Step | Speed | Stop | Happen | End, Field(discriminator="do")]
-
-
-START_NS = 20 * NS_PER_S
-PAUSE_NS = NS_PER_S // 100
-TOKEN_BYTES = 24
-MAX_CONNECTIONS = 64
+def give(order: Order, control: RemoteControl) -> int | None:
+    """Ask the run for it; the number of the event that it began, if any."""
+    match order:
+        case Go():
+            {"pause": control.pause, "resume": control.resume, "stop": control.stop}[order.do]()
+        case Step():
+            control.step(order.n)
+        case Speed():
+            control.speed(order.factor)
+        case End():
+            control.end(order.number)
+        case Happen():
+            return control.event(order.event)
+    return None
 
 
 @contextmanager
@@ -202,7 +171,7 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
 
     @app.post("/do")
     def do(order: Annotated[Order, Body()]) -> dict[str, int | None]:
-        number = order.give(control)
+        number = give(order, control)
         news.look()
         return {"event": number}
 

@@ -16,9 +16,8 @@ from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.interfaces import AgentBackend, TimedBackend
 from swarmwire.deploy.host import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
-from swarmwire.deploy.record.provenance import RunFacts
+from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, LiveEventsRecord
-from swarmwire.deploy.record.scenario_copy import copy_scenario
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 from swarmwire.deploy.campaign.store import storing
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, Observer, Sweep, begin_sweep, resume_sweep
 from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record.scenario_copy import FILES, copy_scenario
+from swarmwire.deploy.record.provenance import FILES, copy_scenario
 from swarmwire.deploy.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.tuning.study import Trial
 from swarmwire.metrics.campaign.folder import CampaignFolder

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.sweep import Observer, check_resumable, copied_ov
 from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder
-from swarmwire.deploy.record.scenario_copy import Copies, copy_scenario
+from swarmwire.deploy.record.provenance import Copies, copy_scenario
 from swarmwire.deploy.tuning.best import CheckRun, FreshCheck, best_of, write_best
 from swarmwire.deploy.tuning.spec import (
     Goal,

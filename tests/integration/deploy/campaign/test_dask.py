@@ -181,7 +181,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
 ):
     folder = tmp_path / "c"
     with cluster(tmp_path, 1) as there:
-        monkeypatch.setattr(terminal_sweep, "sweep_progress", lambda _: Observer(there.scheduler.kill))
+        monkeypatch.setattr(terminal_sweep, "SweepProgress", lambda _: Observer(there.scheduler.kill))
         vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
         code, _, errors = called(
             monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,

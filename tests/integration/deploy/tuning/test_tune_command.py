@@ -103,7 +103,7 @@ class Interrupting:
 def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
     folder = tmp_path / "t"
     with monkeypatch.context() as patched:
-        patched.setattr(tune, "tune_progress", lambda _: Interrupting())
+        patched.setattr(tune, "TuneProgress", lambda _: Interrupting())
         code, out, errors = typed(
             "tune", scenario, "--search", AT, *GOAL, "--trials", "6", "--seeds", "1", "--out", folder
         )

@@ -22,7 +22,7 @@ from swarmwire.deploy.fleet.release import (
     robot_settings,
     write_archive,
 )
-from swarmwire.deploy.fleet.result import HostFailed, Nothing, Result, result_lines, shown_on
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, result_lines, shown_on
 from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
@@ -250,7 +250,8 @@ def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
 
 
 def test_elsewhere_nothing_is_drawn():
-    assert isinstance(shown_on(Console(file=io.StringIO())), Nothing)
+    with shown_on(Console(file=io.StringIO())) as watcher:
+        assert watcher is SILENT
 
 
 def test_ctrl_c_ends_it_in_one_line():

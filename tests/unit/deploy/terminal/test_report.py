@@ -16,7 +16,7 @@ from swarmwire.deploy.campaign.sweep import Sweep
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
-from swarmwire.deploy.terminal.sweep import SweepBar, SweepLines, print_sweep, sweep_progress
+from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from tests.support.clocks import StillClock
@@ -122,9 +122,9 @@ def task(runs, failed=0):
     return TaskResult(tuple({"run": run, "ended": "failed" if run < failed else "duration"} for run in range(runs)))
 
 
-def printed(watcher_of, tasks, terminal, done=0):
+def printed(tasks, terminal, done=0):
     clock, text = StillClock(), io.StringIO()
-    watcher = watcher_of(clock, Console(file=text, force_terminal=terminal, width=110))
+    watcher = SweepProgress(Console(file=text, force_terminal=terminal, width=110), clock)
     watcher.begin(Campaign(), done, 0)
     for one in tasks:
         clock.time_ns += NS_PER_S
@@ -134,7 +134,7 @@ def printed(watcher_of, tasks, terminal, done=0):
 
 
 def test_plain_lines_tell_how_far_how_fast_and_how_long():
-    lines = printed(SweepLines, [task(25), task(25, failed=2), task(50)], terminal=False).splitlines()
+    lines = printed([task(25), task(25, failed=2), task(50)], terminal=False).splitlines()
     assert lines == [
         "a [bold] flock: 2 points x 50 seeds = 100 runs",
         "25/100 runs, 25.0 runs/s, 3 s left",
@@ -144,22 +144,17 @@ def test_plain_lines_tell_how_far_how_fast_and_how_long():
 
 
 def test_many_pieces_are_a_few_lines_and_what_was_there_is_no_speed():
-    lines = printed(SweepLines, [task(1)] * 60, terminal=False, done=40).splitlines()
+    lines = printed([task(1)] * 60, terminal=False, done=40).splitlines()
     assert lines[0].endswith("; 40 of them are there")
     assert len(lines) == 7
     assert lines[-1] == "100/100 runs, 1.0 runs/s, 0 s left"
 
 
 def test_a_bar_shows_the_same():
-    text = printed(SweepBar, [task(25, failed=1)], terminal=True)
+    text = printed([task(25, failed=1)], terminal=True)
     assert "a [bold] flock" in text
     assert "25/100" in text
     assert "1 failed" in text
-
-
-def test_a_terminal_gets_a_bar_and_all_else_lines():
-    assert isinstance(sweep_progress(Console(file=io.StringIO(), force_terminal=True)), SweepBar)
-    assert isinstance(sweep_progress(Console(file=io.StringIO())), SweepLines)
 
 
 TIME = {"unit": "s", "kind": "time", "help": "", "listed": False, "hold_s": 0.0}
