@@ -1,6 +1,6 @@
 """Runners that are processes join, leave, are killed, frozen and thawed, in lockstep and real time.
 
-`tests/unit/deploy/test_joining.py` has more cases over the same frames in one process.
+`tests/unit/deploy/test_agents_at_large.py` has more cases over the same frames in one process.
 """
 
 import signal
