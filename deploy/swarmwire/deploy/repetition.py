@@ -25,7 +25,7 @@ class Repetition:
     """A run that was run again."""
 
     result: Result  # of the repetition
-    ended: str | None  # how the run did, as its summary says; None: it left none
+    ended: str | None  # how the run did, as its summary says; None: it left none, as runs of campaigns do
     before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
     compared: int  # ticks, from the first, that could be compared
     first_difference: int | None  # the first tick that came out differently
@@ -166,21 +166,6 @@ def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> Recorded
     return inputs
 
 
-@dataclass(frozen=True)
-class RunAgain:
-    """A run of a campaign that was run again."""
-
-    result: Result  # of the repetition
-    before: str | None  # the run's trajectory hash; None: it is missing yet, or failed
-    why_not: str  # why there is nothing to compare with, or ""
-    changes: tuple[str, ...]  # what is not as it was when the campaign began; a line each
-
-    @property
-    def same(self) -> bool | None:
-        """Whether it came out the same, bit for bit; None: there is nothing to compare with."""
-        return None if self.before is None else self.before == self.result.arenas[0].trajectory_sha256
-
-
 class CampaignRun:
     """A run of a campaign on its way to its repetition.
 
@@ -211,18 +196,22 @@ class CampaignRun:
             record=record,
         )
 
-    def again(self) -> RunAgain:
+    def run(self) -> Repetition:
         """Run it, and compare."""
-        campaign, files = self._campaign, changed_files(self._campaign.files, self._path / SCENARIO_FOLDER)
+        changes = changed_files(self._campaign.files, self._path / SCENARIO_FOLDER)
         before, why_not = self._before()
-        return RunAgain(
+        return Repetition(
             result=finished(self.simulation),
+            ended=None,
             before=before,
-            why_not=why_not,
-            changes=(*files, *code_changes(campaign)),
+            compared=0,
+            first_difference=None,
+            why_not_all=why_not,
+            changes=(*changes, *code_changes(self._campaign)),
         )
 
-    def _before(self) -> tuple[str | None, str]:
+    def _before(self) -> tuple[tuple[str] | None, str]:
+        """The run's trajectory hash, or why there is none."""
         import polars as pl
 
         rows = CampaignFolder(self._path, self._campaign).rows().filter(pl.col("run") == self._run)
@@ -230,4 +219,4 @@ class CampaignRun:
             return None, "the campaign has not come to this run"
         if rows["trajectory_sha256"][0] is None:
             return None, f"the run failed: {rows['error'][0].strip().splitlines()[-1]}"
-        return rows["trajectory_sha256"][0], ""
+        return (rows["trajectory_sha256"][0],), ""

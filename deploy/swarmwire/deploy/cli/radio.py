@@ -54,7 +54,7 @@ def fit_command(
     """
     from rich.console import Console
 
-    from swarmwire.deploy.radio.fit import print_fit, radio_fit_toml
+    from swarmwire.deploy.radio.fit import fit_toml, print_fit
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.canvas import check_picture
 
@@ -65,40 +65,30 @@ def fit_command(
     if not file.exists():
         raise BadInput(str(file), "", "expected a log: there is no such file or folder")
     antenna = _antenna(power_dbm, gain_dbi)
-    network = _network(file, within)
-    if network is not None:
-        _tell_network(network, file, to, write, size)
-        return
     fit = _fit(file, within)
-    text = radio_fit_toml(fit, antenna, file)
+    text = fit_toml(fit, antenna, file)
     print_fit(fit, str(file), Console(highlight=False, markup=False))
     if to is not None:
-        from swarmwire.metrics.drawing.radio_fit import draw_radio_fit
+        from swarmwire.metrics.drawing.radio_fit import draw_network_fit, draw_radio_fit
+        from swarmwire.metrics.radio_fit.fit import RadioFit
 
-        draw_radio_fit(fit, file.name, to, size)
+        if isinstance(fit, RadioFit):
+            draw_radio_fit(fit, file.name, to, size)
+        else:
+            draw_network_fit(fit, file.name, to, size)
         typer.echo(f"written: {to}")
     _write(text, write)
 
 
-def _fit(file: Path, within_m: float | None) -> "RadioFit":
-    from swarmwire.metrics.radio_fit.fit import fit_radio
-    from swarmwire.metrics.radio_fit.logs import read_log
-
-    log = read_log(file)
-    if within_m is not None:
-        log = log.within(within_m)
-        if not len(log.link):
-            raise BadInput("--within", "", f"expected a distance within which there are packets, got {within_m:g} m")
-    return fit_radio(log)
-
-
-def _network(path: Path, within_m: float | None) -> "NetworkFit | None":
-    """The fit of robots' logs; None: it is a table with strengths."""
-    from swarmwire.metrics.radio_fit.fit import fit_network
+def _fit(path: Path, within_m: float | None) -> "RadioFit | NetworkFit":
+    """The fit of a table with strengths, or of robots' logs."""
+    from swarmwire.metrics.radio_fit.fit import fit_network, fit_radio
     from swarmwire.metrics.radio_fit.logs import (
+        RadioLog,
         is_network_table,
         network_log_of_robots,
         network_log_of_table,
+        read_log,
     )
     from swarmwire.metrics.real_log.real_logs import read_real_logs
 
@@ -107,27 +97,12 @@ def _network(path: Path, within_m: float | None) -> "NetworkFit | None":
     elif is_network_table(path):
         log = network_log_of_table(path)
     else:
-        return None
+        log = read_log(path)
     if within_m is not None:
         log = log.within(within_m)
-        if not len(log.lost):
+        if not len(log.link if isinstance(log, RadioLog) else log.lost):
             raise BadInput("--within", "", f"expected a distance within which there are packets, got {within_m:g} m")
-    return fit_network(log)
-
-
-def _tell_network(fit: "NetworkFit", file: Path, to: Path | None, write: Path | None, size: int) -> None:
-    from rich.console import Console
-
-    from swarmwire.deploy.radio.fit import network_fit_toml, print_network_fit
-
-    text = network_fit_toml(fit, file)
-    print_network_fit(fit, str(file), Console(highlight=False, markup=False))
-    if to is not None:
-        from swarmwire.metrics.drawing.radio_fit import draw_network_fit
-
-        draw_network_fit(fit, file.name, to, size)
-        typer.echo(f"written: {to}")
-    _write(text, write)
+    return fit_radio(log) if isinstance(log, RadioLog) else fit_network(log)
 
 
 def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":

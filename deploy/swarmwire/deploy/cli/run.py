@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     from swarmwire.comms.interfaces import Observer
     from swarmwire.deploy.config import RunConfig
-    from swarmwire.deploy.repetition import CampaignRun, Repetition
+    from swarmwire.deploy.repetition import Repetition
     from swarmwire.deploy.result import Result
 
 
@@ -185,60 +185,30 @@ def repeat_command(
     if record.links and out is None:
         raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
     if run is not None:
-        _repeat_of_campaign(CampaignRun(folder, run, runners=runners, out=out, record=record), out, console)
-        return
-    if (folder / ABOUT).exists():
+        repeated = CampaignRun(folder, run, runners=runners, out=out, record=record)
+    elif (folder / ABOUT).exists():
         raise BadInput(str(folder), "", "expected --run NUMBER with it: this is a campaign's folder")
-    repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
-    repeated.simulation.watch(run_progress(repeated.simulation, console))
-    with leaving_when_hung_up(repeated.simulation.interrupt), compiling_told(console):
+    else:
+        repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
+    simulation = repeated.simulation
+    simulation.watch(run_progress(simulation, console))
+    with leaving_when_hung_up(simulation.interrupt), compiling_told(console):
         repetition = repeated.run()
-    _print_repetition(repetition, console)
+    for arena in repetition.result.arenas:
+        console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
+    console.print(_verdict(repetition), markup=False)
+    if repetition.changes:
+        console.print(f"changed since the {'run' if run is None else 'campaign began'}:")
+    elif repetition.same is False and run is None:
+        console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
+    for change in repetition.changes:
+        console.print(f"  {change}", markup=False)
     if out is not None:
         console.print(f"written: {out}")
     if repetition.result.ended == "interrupted":
         raise typer.Exit(INTERRUPTED)
     if not repetition.same:
         raise typer.Exit(DIFFERENT)
-
-
-def _repeat_of_campaign(repeated: "CampaignRun", out: Path | None, console: Console) -> None:
-    """Run it again, tell how it came out, and leave with the exit code that says so."""
-    from swarmwire.deploy.host import compiling_told
-    from swarmwire.deploy.terminal.progress import run_progress
-
-    simulation = repeated.simulation
-    simulation.watch(run_progress(simulation, console))
-    with leaving_when_hung_up(simulation.interrupt), compiling_told(console):
-        again = repeated.again()
-    arena = again.result.arenas[0]
-    console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
-    if again.same is None:
-        console.print(f"nothing to compare with: {again.why_not}", markup=False)
-    else:
-        console.print("the same run, bit for bit" if again.same else "a different run")
-    if again.changes:
-        console.print("changed since the campaign began:")
-    for change in again.changes:
-        console.print(f"  {change}", markup=False)
-    if out is not None:
-        console.print(f"written: {out}")
-    if again.result.ended == "interrupted":
-        raise typer.Exit(INTERRUPTED)
-    if not again.same:
-        raise typer.Exit(DIFFERENT)
-
-
-def _print_repetition(repetition: "Repetition", console: Console) -> None:
-    for arena in repetition.result.arenas:
-        console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
-    console.print(_verdict(repetition))
-    if repetition.changes:
-        console.print("changed since the run:")
-    elif repetition.same is False:
-        console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
-    for change in repetition.changes:
-        console.print(f"  {change}", markup=False)
 
 
 def _verdict(repetition: "Repetition") -> str:
@@ -250,5 +220,7 @@ def _verdict(repetition: "Repetition") -> str:
         return "a different run" + ("" if at is None else f" from tick {at} on")
     if why_not_all:
         return f"the same, bit for bit, in the {repetition.compared} ticks that can be compared: {why_not_all}"
+    if repetition.ended is None:
+        return "the same run, bit for bit"
     early = "" if repetition.ended in ("duration", "stopped") else f", where it ended early: {repetition.ended}"
     return f"the same run, bit for bit: {repetition.result.ticks} ticks{early}"

@@ -12,22 +12,33 @@ from rich.text import Text
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 from swarmwire.metrics.radio_fit.losses import LossFit
-from swarmwire.metrics.radio_fit.tables import Row, network_rows, parameter_rows, residual_rows
+from swarmwire.metrics.radio_fit.tables import (
+    Row,
+    network_comments,
+    network_rows,
+    network_table,
+    parameter_rows,
+    radio_table,
+    residual_rows,
+)
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
+
+MAX_LINKS = 30  # that are told one by one: the worst
+DISK = {"range_m": 1.0}  # what a table without path loss is put into
 
 
-def print_fit(fit: RadioFit, title: str, console: Console) -> None:
-    """Parameters with their standard errors, residuals, models of loss, and what may be biased."""
-    received, links = int(fit.log.received.sum()), len(fit.log.links)
-    packets = len(fit.sequences.lost)
+def print_fit(fit: RadioFit | NetworkFit, title: str, console: Console) -> None:
+    """Parameters with their standard errors, residuals or links, models of loss, and what may be biased."""
+    if isinstance(fit, RadioFit):
+        packets, received, links = len(fit.sequences.lost), int(fit.log.received.sum()), len(fit.log.links)
+    else:
+        packets, received, links = len(fit.log.lost), int((~fit.log.lost).sum()), len(fit.links)
     counts = f"{packets} packet{'s' if packets != 1 else ''} on {links} link{'s' if links != 1 else ''}"
     console.print(f"{title}: {counts}, {received} received", soft_wrap=True)
-    print_parameters(list(parameter_rows(fit)), console)
-    residuals = list(residual_rows(fit))
-    if residuals:
+    print_parameters(_rows(fit), console)
+    if isinstance(fit, RadioFit) and (residuals := list(residual_rows(fit))):
         table = titled_table("residuals of RSSI")
         table.add_column(style="cyan")
         table.add_column(justify="right")
@@ -36,8 +47,16 @@ def print_fit(fit: RadioFit, title: str, console: Console) -> None:
         console.print(table)
     if isinstance(fit.losses, LossFit):
         print_models(fit.losses, console)
+    if isinstance(fit, NetworkFit):
+        _print_links(fit, console)
+        for name, others in fit.neighbours.items():
+            console.print(f"neighbours of {name}: {', '.join(others) or 'none'}", soft_wrap=True)
     for note in fit.notes:
         console.print(f"note: {note}", soft_wrap=True)
+
+
+def _rows(fit: RadioFit | NetworkFit) -> list[Row]:
+    return list(parameter_rows(fit) if isinstance(fit, RadioFit) else network_rows(fit))
 
 
 def print_parameters(rows: Sequence[Row], console: Console) -> None:
@@ -83,25 +102,6 @@ def titled_table(title: str, header: bool = False) -> Table:
     return Table(title=Text(title), show_header=header, title_justify="left", title_style="bold")
 
 
-MAX_LINKS = 30  # that are told one by one: the worst
-
-
-def print_network_fit(fit: NetworkFit, title: str, console: Console) -> None:
-    """Parameters with their standard errors, models of loss, links, neighbours, and what may be biased."""
-    delivered, links = int((~fit.log.lost).sum()), len(fit.links)
-    packets = len(fit.log.lost)
-    counts = f"{packets} packet{'s' if packets != 1 else ''} on {links} link{'s' if links != 1 else ''}"
-    console.print(f"{title}: {counts}, {delivered} received", soft_wrap=True)
-    print_parameters(list(network_rows(fit)), console)
-    if isinstance(fit.losses, LossFit):
-        print_models(fit.losses, console)
-    _print_links(fit, console)
-    for name, others in fit.neighbours.items():
-        console.print(f"neighbours of {name}: {', '.join(others) or 'none'}", soft_wrap=True)
-    for note in fit.notes:
-        console.print(f"note: {note}", soft_wrap=True)
-
-
 def _print_links(fit: NetworkFit, console: Console) -> None:
     shown = sorted(fit.links, key=lambda link: link.pdr)[:MAX_LINKS]
     some = f", the worst {len(shown)} of {len(fit.links)}" if len(shown) < len(fit.links) else ""
@@ -113,42 +113,24 @@ def _print_links(fit: NetworkFit, console: Console) -> None:
     console.print(table)
 
 
-DISK = {"range_m": 1.0}  # what a table without path loss is put into
-
-
-def radio_fit_toml(fit: "RadioFit", antenna: "Antenna", file: Path) -> str:
+def fit_toml(fit: RadioFit | NetworkFit, antenna: "Antenna", file: Path) -> str:
     """The table `[radio]`, with what was left out as comments.
 
     BadInput where nothing could be fitted, or where a scenario would refuse what was.
     """
     import tomli_w
 
-    from swarmwire.metrics.radio_fit.tables import parameter_rows, radio_table
-
-    table = radio_table(fit, antenna)
-    left_out = [f"{row.parameter}: {row.left_out}" for row in parameter_rows(fit) if row.estimate is None]
+    table = radio_table(fit, antenna) if isinstance(fit, RadioFit) else network_table(fit)
+    left_out = [f"{row.parameter}: {row.left_out}" for row in _rows(fit) if row.estimate is None]
     if not table["radio"]:
         raise BadInput(str(file), "", f"nothing could be fitted: {'; '.join(left_out)}")
     comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {one}." for one in left_out)]
-    if "model" not in table["radio"]:
+    if isinstance(fit, NetworkFit):
+        comments += network_comments(fit)
+    elif "model" not in table["radio"]:
         comments.append("Without path loss this is no radio yet: put it into one that has a model or a range_m.")
     _refuse_unfit(table, file)
     return "".join(f"# {comment}\n" for comment in comments) + tomli_w.dumps(table)
-
-
-def network_fit_toml(fit: "NetworkFit", file: Path) -> str:
-    """The table `[radio]` of a network's fit, with what was left out as comments; BadInput as `radio_fit_toml`."""
-    import tomli_w
-
-    from swarmwire.metrics.radio_fit.tables import network_comments, network_rows, network_table
-
-    table = network_table(fit)
-    left_out = [f"{row.parameter}: {row.left_out}" for row in network_rows(fit) if row.estimate is None]
-    if not table["radio"]:
-        raise BadInput(str(file), "", f"nothing could be fitted: {'; '.join(left_out)}")
-    _refuse_unfit(table, file)
-    comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {one}." for one in left_out)]
-    return "".join(f"# {comment}\n" for comment in [*comments, *network_comments(fit)]) + tomli_w.dumps(table)
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:

@@ -97,7 +97,7 @@ def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound,
 def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_again(half, whole, data):
     part = half / "parts" / "part-00000001.parquet"
     part.write_bytes(data)
-    for call in (resume, lambda folder: CampaignRun(folder, 1).again()):
+    for call in (resume, lambda folder: CampaignRun(folder, 1).run()):
         assert refused(call, half).where == str(part)
     part.unlink()
     assert resume(half).is_over
@@ -197,7 +197,7 @@ def test_a_package_that_is_no_more_has_changed(whole):
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))
     assert "gone_away" in str(refused(resume, whole))
-    (change,) = CampaignRun(whole, 0).again().changes
+    (change,) = CampaignRun(whole, 0).run().changes
     assert "gone_away" in change
 
 
