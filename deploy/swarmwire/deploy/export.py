@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
-from rich.progress import track
 
-from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
@@ -57,6 +55,7 @@ class Exporter:
     """
 
     name: str  # as `--kind` selects it
+    help: str  # its content
     suffixes: tuple[str, ...]
     options: frozenset[str]  # the fields of ExportOptions that it uses
     write: Callable[[Path, Path, ExportOptions], str]
@@ -106,9 +105,13 @@ def _write_viewer(run: Path, to: Path, options: ExportOptions) -> str:
     return ""
 
 
-ARENA = Exporter("arena", PICTURE_SUFFIXES, frozenset({"at_s", "arena", "metrics", "size_px"}), _write_arena)
-DELIVERY = Exporter("delivery", PICTURE_SUFFIXES, frozenset({"arena", "size_px"}), _write_delivery)
-VIEWER = Exporter("viewer", (".png",), frozenset({"at_s"}), _write_viewer)
+ARENA = Exporter(
+    "arena", "the arena at one time", PICTURE_SUFFIXES, frozenset({"at_s", "arena", "metrics", "size_px"}), _write_arena
+)
+DELIVERY_HELP = "the share of receivers that received, over distance"
+DELIVERY = Exporter("delivery", DELIVERY_HELP, PICTURE_SUFFIXES, frozenset({"arena", "size_px"}), _write_delivery)
+VIEWER_HELP = "the recording as rerun's viewer shows it; needs a Vulkan driver"
+VIEWER = Exporter("viewer", VIEWER_HELP, (".png",), frozenset({"at_s"}), _write_viewer)
 
 
 DEFAULT_FRAMES_PER_S = {"gif": 10.0, "mp4": 25.0}
@@ -117,6 +120,8 @@ PALETTE_SAMPLES = 8
 
 
 def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: ExportOptions) -> str:
+    from rich.progress import track
+
     from swarmwire.metrics.atomic import check_output_path, output_file
     from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
     from swarmwire.metrics.drawing.film import film_of, footage
@@ -141,8 +146,8 @@ def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: Expor
 
 
 _FILM_OPTIONS = frozenset({"from_s", "until_s", "frames_per_s", "speed", "arena", "metrics", "size_px"})
-GIF = Exporter("film", (".gif",), _FILM_OPTIONS, partial(_write_film, "gif"))
-MP4 = Exporter("film", (".mp4",), _FILM_OPTIONS, partial(_write_film, "mp4"))
+GIF = Exporter("film", "a film", (".gif",), _FILM_OPTIONS, partial(_write_film, "gif"))
+MP4 = Exporter("film", "a film", (".mp4",), _FILM_OPTIONS, partial(_write_film, "mp4"))
 
 
 MAX_S = 1e9  # longer than any run; in ns it still fits 64 bits
@@ -202,11 +207,18 @@ def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     return radio, link
 
 
-CAPTURE = Exporter("capture", (".pcapng",), frozenset({"from_s", "until_s", "arena"}), _write_capture)
+CAPTURE = Exporter(
+    "capture",
+    "the frames on air, for Wireshark",
+    (".pcapng",),
+    frozenset({"from_s", "until_s", "arena"}),
+    _write_capture,
+)
 
 
 def _write_table(run: Path, to: Path, options: ExportOptions) -> str:
     """A row per tick: `time_s`, then a column per metric; a value that is undefined is an empty field."""
+    from swarmwire.comms.config import did_you_mean
     from swarmwire.metrics.atomic import check_output_path, output_file
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.run_folder.reader import RunFolder
@@ -231,10 +243,13 @@ def _write_table(run: Path, to: Path, options: ExportOptions) -> str:
     return f"{int(shown.sum())} rows"
 
 
-METRICS = Exporter("metrics", (".csv",), frozenset({"from_s", "until_s", "arena", "metrics"}), _write_table)
+METRICS = Exporter(
+    "metrics", "metrics over time", (".csv",), frozenset({"from_s", "until_s", "arena", "metrics"}), _write_table
+)
 
 
-EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS)  # the first of a suffix is its default
+EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS)
+DEFAULTS = {suffix: of for of in reversed(EXPORTERS) for suffix in of.suffixes}.values()  # the first of each suffix
 
 
 def find_exporter(to: Path, kind: str | None) -> Exporter:
@@ -247,8 +262,10 @@ def find_exporter(to: Path, kind: str | None) -> Exporter:
     for exporter in fitting:
         if kind in (None, exporter.name):
             return exporter
+    from swarmwire.comms.config import did_you_mean
+
     names = [exporter.name for exporter in fitting]
-    raise BadInput("--kind", "", f"expected of {suffix}: {did_you_mean(names, str(kind))}")
+    raise BadInput("--kind", "", f"expected {did_you_mean(names, str(kind))}, for {suffix}")
 
 
 def export(run: Path, to: Path, options: ExportOptions, kind: str | None = None) -> str:

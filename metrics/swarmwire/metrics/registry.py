@@ -216,6 +216,6 @@ def _class_of(entry: MetricEntry, where: str) -> tuple[type[Metric], list[str]]:
     if spec in packaged:
         return packaged[spec].kind(where, entry.key), [packaged[spec].spec]
     near = "".join(f" (did you mean {name}?)" for name in get_close_matches(spec, [*METRICS, *packaged], n=1))
-    expected = "expected the name of a metric, as swarmwire list metrics tells them"
+    expected = "expected the name of a metric, as swarmwire list metrics prints it"
     a_class = "" if entry.params is None else ", or a class as module:Class or file.py:Class"
     raise BadInput(where, entry.key, f"{expected}{near}{a_class}; got {spec!r}")

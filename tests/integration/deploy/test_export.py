@@ -149,7 +149,7 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
         (["--kind", "arenas"], "--kind", "arena (did you mean this?), delivery, viewer"),
         (["--to", "a.gif", "--until", "9"], "--until", "0 to 2.9 s"),
         (["--arena", "1"], "RUN: arena", "0 to 0"),
-        (["--metric", "ordr"], "--metric: ordr", "order, min_gap"),
+        (["--metric", "ordr"], "--metric: ordr", "order (did you mean this?), min_gap"),
         (["--to", "a.csv", "--metric", "ordr"], "--metric: ordr", "order"),
         (["--to", "a.csv", "--from", "9"], "--from", "0 to 2.9 s"),
         (["--to", "a.avi"], "a.avi", ".gif, .mp4"),

@@ -83,7 +83,7 @@ def test_its_files_know_its_name_and_nothing_is_left_to_fill_in(made):
 def test_it_checks_and_runs_as_it_is_made(made, tmp_path, monkeypatch, capsys):
     scenario = made / "scenario.toml"
     checked = called(monkeypatch, capsys, "check", scenario)[1]
-    assert "good: 10 epuck" in checked
+    assert ": 10 x epuck" in checked
     assert checked.endswith("Hz, engine discs\n")
     code, out, _ = called(monkeypatch, capsys, "run", scenario, "--set", "duration_s=2", "--out", tmp_path / "out")
     assert code == 0

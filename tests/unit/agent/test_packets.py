@@ -136,7 +136,7 @@ def test_who_does_not_declare_it_neither_asks_nor_reads():
             print(robot.radio.tx_status)
 
     assert step(host_of(Silent, [2]), 0, [2]).sent.tx_status_id is None
-    with pytest.raises(AgentFailed, match="reads 'radio.tx_status', which its needs do not name: radio.rssi"):
+    with pytest.raises(AgentFailed, match=r"reads 'radio.tx_status', which its needs do not list \(radio.rssi"):
         step(host_of(Reads, [2]), 0, [2])
 
 

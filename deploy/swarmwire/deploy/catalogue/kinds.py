@@ -59,7 +59,7 @@ def kind_named(name: str) -> Kind:
     found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
     if found is None:
         kinds = did_you_mean((kind.name for kind in KINDS), name)
-        raise BadInput(name, "", f"expected {kinds}; swarmwire describe tells about a single thing")
+        raise BadInput(name, "", f"expected {kinds}; swarmwire describe NAME describes one thing")
     return found
 
 
@@ -124,7 +124,7 @@ SAID_BY_VALUE = ("a number", "a table")
 def print_kinds(console: Console) -> None:
     """All kinds, with how many things there are of each."""
     _print_rows(console, ("kind", "things", "what they are"), [(k.name, str(len(k.entries())), k.help) for k in KINDS])
-    _line(console, "\nswarmwire list KIND names those of one kind, swarmwire describe NAME tells about one of them")
+    _line(console, "\nswarmwire list KIND lists one kind, swarmwire describe NAME describes one thing")
 
 
 def print_list(kind: Kind, console: Console) -> None:

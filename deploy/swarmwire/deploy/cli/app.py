@@ -1,10 +1,12 @@
 """The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code."""
 
 import io
+import re
 import sys
 from typing import Annotated
 
 import typer
+from typer.core import TyperOption
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.comms.wire.ending import end_now
@@ -35,6 +37,7 @@ from swarmwire.deploy.host import refusal, share_heaps
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
 NETWORK, ROBOTS, INSPECT = "Network", "Robots", "Inspect"
+BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -91,13 +94,21 @@ app.command("verify", rich_help_panel=INSPECT)(verify_command)
 def let_help_flow(app: typer.Typer) -> None:
     """Make the paragraphs of all help texts of an app as wide as the terminal; rich would keep our line breaks."""
     for command in app.registered_commands:
-        command.help = flowing(command.help or (command.callback and command.callback.__doc__))
+        help_text = flowing(command.help or (command.callback and command.callback.__doc__))
+        command.help = BETWEEN_EXAMPLES.sub(r"\1\n", help_text)
     for group in app.registered_groups:
         if group.typer_instance is not None:
             let_help_flow(group.typer_instance)
 
 
+def leave_out_types_of_flags() -> None:
+    """Show flags without a type in help texts: typer would write `--view <bool>`, as if the flag took a value."""
+    shown = TyperOption.display_type_rich
+    TyperOption.display_type_rich = lambda self, ctx: None if self.is_flag else shown(self, ctx)  # type: ignore[method-assign]
+
+
 let_help_flow(app)
+leave_out_types_of_flags()
 
 
 def main() -> None:

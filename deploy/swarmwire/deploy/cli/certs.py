@@ -80,7 +80,7 @@ def issue_command(
 ) -> None:
     """Issue certificates: NAME.pem, and NAME.key, which its owner alone may read.
 
-    Whoever connects to an endpoint checks that its address is in the certificate. For example:
+    Each program that connects to an endpoint checks that its address is in the certificate. For example:
 
       swarmwire certs issue lab-ca flock-0 --host 10.0.0.10
 

@@ -10,12 +10,12 @@ from swarmwire.comms.errors import BadInput
 if TYPE_CHECKING:
     from swarmwire.metrics.report.page import Report
 
-Campaign = Annotated[str, typer.Argument(help="A campaign's folder; FOLDER@radio.loss=0.4 is that part of it.")]
+HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
 
 
 def compare_command(
-    a: Campaign,
-    b: Campaign,
+    a: Annotated[str, typer.Argument(help=HELP, metavar="A")],
+    b: Annotated[str, typer.Argument(help=HELP, metavar="B")],
     response: Annotated[
         list[str] | None,
         typer.Option(help="A column of responses, or a metric for its last value. Repeatable.", metavar="NAME"),
@@ -114,7 +114,7 @@ def sim_to_real_command(
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write the numbers to this file, too.", metavar="FILE.csv")] = None,
 ) -> None:
-    """Hold a log of real robots against emulated runs: the same metrics side by side, and how far apart they are.
+    """Compare a log of real robots with emulated runs: the same metrics side by side, and how far apart they are.
 
     With a campaign each metric is within the spread if the log is no farther from the runs than the runs are from one
     another. What a log cannot know (contacts, times on air, who is within range) is left out. For example:

@@ -26,17 +26,11 @@ run are recorded in its folder: `swarmwire repeat` makes them again, bit for bit
 For example:
 
   swarmwire ctl status
-
   swarmwire ctl pause
-
   swarmwire ctl step 10
-
   swarmwire ctl kill flock-3 --for 20
-
   swarmwire ctl set loss=0.6
-
   swarmwire ctl --run runs/flocking-s1-20261121T030405Z speed max
-
   swarmwire ctl --endpoint tls/10.0.0.5:7448 --certs lab-certs status
 """)
 
@@ -121,7 +115,7 @@ def tell(reply: Mapping[str, Any]) -> None:
 
 @ctl_app.command("status")
 def status_command(context: typer.Context, as_json: AsJson = False) -> None:
-    """Tell how a run is doing; of several runs on this machine, a line each.
+    """Print how a run is doing; of several runs on this machine, a line each.
 
     With --json there is a JSON object per run, each on a line. For example:
 
@@ -215,7 +209,7 @@ def _speed(status: dict[str, Any]) -> str:
 
 @ctl_app.command("pause")
 def pause_command(context: typer.Context) -> None:
-    """Let no tick begin from now on, until `resume` or `step`.
+    """Pause the run at the end of the current tick, until `resume` or `step`.
 
     For example:
 
@@ -227,7 +221,7 @@ def pause_command(context: typer.Context) -> None:
 
 @ctl_app.command("resume")
 def resume_command(context: typer.Context) -> None:
-    """Go on.
+    """Resume a paused run.
 
     For example:
 
@@ -241,7 +235,7 @@ def resume_command(context: typer.Context) -> None:
 def step_command(
     context: typer.Context, ticks: Annotated[int, typer.Argument(help="How many ticks.", min=1, metavar="N")] = 1
 ) -> None:
-    """Let exactly N ticks go, then pause.
+    """Run exactly N ticks, then pause.
 
     For example a second of a run with 10 ticks per second:
 
@@ -256,7 +250,7 @@ def speed_command(
     context: typer.Context,
     factor: Annotated[str, typer.Argument(help="Simulated seconds per second, or max.", metavar="FACTOR|max")],
 ) -> None:
-    """Go at so many simulated seconds per second of wall time, or as fast as possible.
+    """Set the speed: simulated seconds per second of wall time, or as fast as possible.
 
     For example at a tenth:
 
@@ -270,7 +264,7 @@ def speed_command(
 
 @ctl_app.command("stop")
 def stop_command(context: typer.Context) -> None:
-    """End the run after the tick that is under way, with its summary and tables.
+    """End the run after the current tick, with its summary and tables.
 
     For example:
 

@@ -154,7 +154,7 @@ def set_command(
         float, typer.Option("--over", help="How long the way there takes, simulated seconds.", min=0, metavar="S")
     ] = 0.0,
 ) -> None:
-    """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` tells what they are.
+    """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` prints them.
 
     For example:
 
@@ -246,7 +246,9 @@ def events_command(context: typer.Context) -> None:
 @events_app.command("end")
 def end_command(
     context: typer.Context,
-    number: Annotated[int, typer.Argument(help="Of the event, as `events` tells it.", min=0, metavar="NUMBER")],
+    number: Annotated[
+        int, typer.Argument(help="Of the event, as `swarmwire ctl events` prints it.", min=0, metavar="NUMBER")
+    ],
 ) -> None:
     """Undo an event that lasts, such as a kill, a partition, a jammer or a number that was set.
 

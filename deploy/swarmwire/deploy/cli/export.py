@@ -8,23 +8,20 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import USUAL_SIZE_PX, Overrides, Seed
+from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
 
 DEFAULT_NAME = "picture.png"
+FILES = "; ".join(f"{', '.join(of.suffixes)}: {of.help}" for of in EXPORTERS if of in DEFAULTS)
+KINDS = "; ".join(f"{of.name} ({', '.join(of.suffixes)}): {of.help}" for of in EXPORTERS if of not in DEFAULTS)
 
 Run = Annotated[Path, typer.Argument(help="A run folder, of a run that goes on or was killed too.", metavar="RUN")]
 To = Annotated[
     Path | None,
-    typer.Option(
-        help="The file. A picture: .png, .svg, .pdf. A film: .gif, .mp4. The radio's frames, for Wireshark: .pcapng. "
-        "Metrics over time: .csv. Default: picture.png in RUN."
-    ),
+    typer.Option(help=f"The file, whose suffix selects its content. {FILES}. Default: picture.png in RUN."),
 ]
 Kind = Annotated[
     str | None,
-    typer.Option(
-        help="Of a picture: arena, delivery (the share of receivers that received, over distance), or viewer (the "
-        "recording as rerun's viewer shows it; needs a Vulkan driver). Default: arena."
-    ),
+    typer.Option(help=f"Another content for the same suffix. {KINDS}. Default: arena."),
 ]
 At = Annotated[
     float | None, typer.Option("--at", help="Time of a picture, in s. Default: the end of the run.", metavar="S")
@@ -42,7 +39,10 @@ Speed = Annotated[
 Arena = Annotated[int | None, typer.Option(help="Which of several arenas. Default: 0.")]
 Metric = Annotated[
     list[str] | None,
-    typer.Option(help="A metric beside the arena, or a column of the table. Repeatable. Default: up to three, or all."),
+    typer.Option(
+        help="A metric beside the arena, or a column of the table. Repeatable. Default: up to three, or all.",
+        metavar="NAME",
+    ),
 ]
 Size = Annotated[
     int | None, typer.Option(help="Longer side in pixels. Default: 1280 (pictures), 480 (GIF), 960 (MP4).")
@@ -71,8 +71,6 @@ def export_command(
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4
     """
-    from swarmwire.deploy.export import ExportOptions, export
-
     console = Console(highlight=False)
     target = to or run / DEFAULT_NAME
     options = ExportOptions(at_s, from_s, until_s, fps, speed, arena, metric or None, size, console)

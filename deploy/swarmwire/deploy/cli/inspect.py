@@ -26,23 +26,24 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     checked = load_scenario(scenario, overrides or [])
     simulation = Simulation(checked)
     static, engines = simulation.static, " and ".join(simulation.world.engines)
-    groups = ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
+    groups = ", ".join(f"{group.stop - group.start} x {group.body.name} ({group.name})" for group in static.groups)
     last_s = (simulation.ticks - 1) / static.rate_hz  # start of the last tick
     late = [f"events.{place}" for place, event in enumerate(checked.events) if event.at_s > last_s]
     too_late = f"; too late to happen: {', '.join(late)}" if late else ""
     length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"
-    typer.echo(f"{scenario}: good: {groups}, {length}, engine {engines}{too_late}")
+    typer.echo(f"OK {scenario}: {groups}, {length}, engine {engines}{too_late}")
 
 
 def list_command(
     kind: Annotated[
-        str | None, typer.Argument(help="bodies, sensors, behaviours, events, metrics, …; all kinds if left out.")
+        str | None,
+        typer.Argument(help="bodies, sensors, behaviours, events, metrics, …; all kinds if left out.", metavar="KIND"),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """List what a scenario or an agent may name: the kinds, or all things of one kind.
 
-    For example, what may befall robots, and then more about one of these:
+    For example all events, and then one of them:
 
       swarmwire list events
 
@@ -65,7 +66,9 @@ def list_command(
 def describe_command(
     name: Annotated[
         str,
-        typer.Argument(help="A name that `swarmwire list` tells, an agent class or a body's sheet of your own."),
+        typer.Argument(
+            help="A name that `swarmwire list` prints, an agent class or a body's sheet of your own.", metavar="NAME"
+        ),
     ],
     as_json: AsJson = False,
 ) -> None:
@@ -101,7 +104,9 @@ def schema_command() -> None:
 
 
 def new_command(
-    name: Annotated[str, typer.Argument(help="The new folder: small letters, digits and _, such as my_swarm.")],
+    name: Annotated[
+        str, typer.Argument(help="The new folder: small letters, digits and _, such as my_swarm.", metavar="NAME")
+    ],
     within: Annotated[Path, typer.Option("--in", help="The folder in which to make it.", metavar="DIR")] = Path(),
 ) -> None:
     """Make a folder to start from: an agent, a scenario with a lossy radio, a test that passes, and a README.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 radio_app = typer.Typer(
-    help="Radios by themselves: what an emulated one does, and what logs of real ones say.",
+    help="Probe an emulated radio without a run, or fit one to logs of real robots.",
     no_args_is_help=True,
 )
 
@@ -138,7 +138,7 @@ POINTS, JSON_POINTS = 200, 50  # of the map, along the longer side of the arena
 def probe_command(
     subject: Annotated[
         str,
-        typer.Argument(help="A scenario, a TOML file, or a radio that `swarmwire list presets` tells.", metavar="WHAT"),
+        typer.Argument(help="A scenario, a TOML file, or a radio that `swarmwire list presets` names.", metavar="WHAT"),
     ],
     contention: Annotated[
         str | None,
@@ -165,7 +165,7 @@ def probe_command(
     size: Size = USUAL_SIZE_PX,
     as_json: AsJson = False,
 ) -> None:
-    """Tell what a radio does by itself.
+    """Probe a radio without a run: coverage, delivery over distance, contention.
 
     A scenario: the strength over its arena from one place, and the delivery of lone packets over distance, as walls and
     shadowing make it; without robots in between. A preset: delivery ratio and mean delay among nodes in one spot that

@@ -217,7 +217,7 @@ def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups 
 def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Stop robots at once, over the swarm's network and by SSH at the same time.
 
-    A line per robot tells by which way it was confirmed. Exit code 1: one of them is not confirmed, so switch it off
+    A line per robot shows by which way it was confirmed. Exit code 1: one of them is not confirmed, so switch it off
     by hand. For example, all robots:
 
       swarmwire robots estop fleet.toml
@@ -233,7 +233,7 @@ COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent
 
 @robots_app.command("status")
 def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None, as_json: AsJson = False) -> None:
-    """Tell what each robot runs, since when, and what its agent says of itself.
+    """Print what each robot runs, since when, and the last report of its agent.
 
     Exit code 1: something is wrong. For example:
 

@@ -49,7 +49,7 @@ def router_command(
         bool, typer.Option("--print", help="Print the settings, for zenohd -c FILE, and end.")
     ] = False,
 ) -> None:
-    """Pass on what runners and a world tell each other, where these cannot reach each other.
+    """Forward messages between runners and a world that cannot reach each other.
 
     It lets through what each may send, as a world does, and goes on until it is interrupted; whom it calls may come
     later, or again. Routers before and behind it are named alike. For example:

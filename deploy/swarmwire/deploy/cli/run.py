@@ -164,7 +164,7 @@ def repeat_command(
     links: Links = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a run again from its folder alone, and tell whether it came out the same, bit for bit.
+    """Run a run again from its folder alone, and check whether it comes out the same, bit for bit.
 
     Of a campaign's folder it is the run that --run names.
 

@@ -97,7 +97,7 @@ def ui_command(
 ) -> None:
     """Open the page of a run that goes on: look at it, pause and step it, break and mend it. Ctrl-C ends the page.
 
-    The page is for browsers of this machine alone, and lets in whoever has its address with the token in it.
+    The page is for browsers of this machine alone, and open to anybody who has its address with the token in it.
     """
     UI.need("ui")
     VIEW.need("ui")

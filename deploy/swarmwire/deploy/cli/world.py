@@ -83,7 +83,7 @@ def world_command(
     insecure: Insecure = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a scenario with agents from elsewhere: it waits for them, and says what to type there.
+    """Run a scenario with agents from elsewhere: wait for them, and print the command that starts them there.
 
     Each comes with swarmwire join, from another terminal or another machine, with the agent that is installed there,
     and gets robots that are free. It may come late, leave, and come back, where run.on_runner_loss of the scenario is
@@ -171,7 +171,7 @@ def join_command(
     key: Key = None,
     insecure: Insecure = False,
 ) -> None:
-    """Play robots of a run that a world elsewhere has opened with swarmwire world.
+    """Run the agents of robots of a run that `swarmwire world` has opened elsewhere.
 
     The agent is the one that is installed here; its file must be the same as the world's: code is never sent. Ctrl-C
     leaves the run. On a machine that has the agents' package alone it is swarmwire-agent join. For example:

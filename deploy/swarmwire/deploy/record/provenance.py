@@ -16,7 +16,7 @@ import importlib
 import json
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -24,13 +24,13 @@ from typing import Any
 
 import tomli_w
 
-from swarmwire.comms.config import check_format, from_json, from_toml
+from swarmwire.comms.config import from_toml, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.spec import CopiedFile
-from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, MetricInfo, metric_infos
+from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, MetricInfo
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
@@ -70,41 +70,10 @@ def read_facts(folder: Path) -> RunFacts:
     path = folder / RUN_JSON
     if not folder.is_dir():
         raise BadInput(str(folder), "", "expected a run folder: there is none")
-    try:
-        found: Any = from_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInput(str(folder), "", f"expected a run folder, with its {RUN_JSON}: {error.strerror}") from None
-    except ValueError:  # no JSON, or no UTF-8
-        found = None
-    try:
-        check_format(found, RUN_FORMAT, str(path))
-        return _facts_in(found)
-    except (KeyError, TypeError, ValueError, OverflowError):
-        raise BadInput(str(path), "", "expected what swarmwire writes at the start of a run") from None
-
-
-def _facts_in(found: dict[str, Any]) -> RunFacts:
-    seeds, ticks, runners = tuple(int(seed) for seed in found["seeds"]), int(found["ticks"]), int(found["runners"])
-    if not seeds or len(set(seeds)) < len(seeds) or min(*seeds, ticks, runners) < 0:
-        raise ValueError(seeds)
-    return RunFacts(
-        seeds=seeds,
-        ticks=ticks,
-        runners=runners,
-        realtime=None if found["realtime"] is None else float(found["realtime"]),
-        files=tuple(CopiedFile(**known_fields(CopiedFile, file)) for file in found["files"]),
-        modules=dict(found["modules"]),
-        cpu=str(found["cpu"]),
-        versions=dict(found["versions"]),
-        gateways=dict(found["gateways"]),
-        metrics=metric_infos(found),
-        subtick_s=None if found["subtick_s"] is None else float(found["subtick_s"]),
-    )
-
-
-def known_fields(kind: type[Any], found: Mapping[str, Any]) -> dict[str, Any]:
-    """All fields of this dataclass; KeyError if one is missing. Others are passed over: added ones keep the format."""
-    return {field.name: found[field.name] for field in fields(kind)}
+    found = read_json(RunFacts, path, RUN_FORMAT)
+    if not found.seeds or len(set(found.seeds)) < len(found.seeds) or min(*found.seeds, found.ticks, found.runners) < 0:
+        raise BadInput(str(path), "", "expected different seeds, and seeds, ticks and runners of at least 0")
+    return found
 
 
 def cpu() -> str:

@@ -80,20 +80,13 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
     before = {path: path.read_bytes() for path in tmp_path.rglob("*")}
     findings = verify(tmp_path)
     assert all(finding.good for finding in findings)
-    assert {finding.part: finding.state for finding in findings} == {
-        "summary.json": State.INTACT,
-        "static.json": State.INTACT,
-        "log.txt": State.INTACT,
-        "run.json": State.INTACT,
-        "trajectory.digests": State.INTACT,
-        "run.rrd": State.NOT_RECORDED,
-        "ticks": State.INTACT,
-        "packets": State.INTACT,
-        "events": State.INTACT,
-        "radio_robots": State.NOT_RECORDED,
-        "radio_distances": State.NOT_RECORDED,
-        "radio_links": State.NOT_RECORDED,
+    files = ("summary.json", "static.json", "log.txt", "run.json", "trajectory.digests", "run.rrd")
+    assert {finding.part for finding in findings} == {*files, *TABLES}
+    assert {finding.part for finding in findings if finding.state == State.NOT_RECORDED} == {
+        "run.rrd",
+        *({*TABLES} - {path.stem for path in tmp_path.glob("*.parquet")}),
     }
+    assert {"ticks", "packets", "events"} <= {finding.part for finding in findings if finding.state == State.INTACT}
     assert "20 rows" in text_of(tmp_path, "ticks")
     assert "up to tick 9 (0.9 s)" in text_of(tmp_path, "ticks")
     assert {path: path.read_bytes() for path in tmp_path.rglob("*")} == before
