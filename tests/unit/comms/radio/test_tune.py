@@ -41,24 +41,41 @@ SLOW = {"bit_rate_bps": 2800, "queue_limit": 4}
 PHY_PAIR = at((0, 0), (5, 0))
 
 
-def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8, ticks: int = 20, seeds: range = range(1)) -> Run:
-    """Everybody broadcasts in each tick; the radio is another one from some ticks on."""
-    out, rows = Run(make_medium(radio, robots, seeds)), robots * len(seeds)
-    pose = np.concatenate([scattered(robots)] * len(seeds))
+def ran(
+    medium: RadioMedium,
+    pose: FloatArray,
+    sent: Callable[[int], SentPackets],
+    changes: dict[int, Change],
+    ticks: int = 16,
+) -> Run:
+    """Changes are made before the tick that they are listed under."""
+    told, held = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks + 1):
-        at_ns = tick_start_ns(tick, RATE_HZ)
-        out.news.append(out.medium.step(at_ns, pose, radio=changes.get(tick)))
+        radio = changes.get(tick, lambda _: None)(held)
+        coming = Disruption.none(len(pose))
+        coming.become(held)
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
         if tick < ticks:
-            out.medium.send(at_ns, tick, everybody(rows)(tick))
-    out.last = out.medium.end()
-    return out
+            medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))
+    told.last = medium.end()
+    return told
 
 
-def links(told: Run, first_s: float, stop_s: float) -> list[tuple[int, ...]]:
-    """Packets on air in a span in the first arena, with their receivers, fates and times."""
+def another(radio: Radio) -> Change:
+    return lambda _: radio
+
+
+def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8) -> Run:
+    """Everybody broadcasts in each tick; the radio is another one from some ticks on."""
+    others = {tick: another(other) for tick, other in changes.items()}
+    return ran(make_medium(radio, robots), scattered(robots), everybody(robots), others, ticks=20)
+
+
+def links(told: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[float, ...]]:
+    """Packets on air in a span, with their receivers, fates and times."""
     columns = [told.finished(name) for name in ("sender", "receiver", "sequence", "fate", "final_at_ns")]
     on_air_s = told.finished("on_air_at_ns") / 1e9
-    rows = np.stack(columns, axis=1)[(told.finished("arena") == 0) & (on_air_s >= first_s) & (on_air_s < stop_s)]
+    rows = np.stack(columns, axis=1)[(on_air_s >= first_s) & (on_air_s < stop_s)]
     return sorted(map(tuple, rows.tolist()))
 
 
@@ -163,30 +180,6 @@ def test_groups_have_their_own_power_or_gain_or_both():
     assert mixed.receive_dbi(RADIO).tolist() == [2.0, -1.0, -1.0, 2.0, 1.0]
 
 
-def ran(
-    medium: RadioMedium,
-    pose: FloatArray,
-    sent: Callable[[int], SentPackets],
-    changes: dict[int, Change],
-    ticks: int = 16,
-) -> Run:
-    """Changes are made before the tick that they are listed under."""
-    told, held = Run(medium), Disruption.none(len(pose))
-    for tick in range(ticks + 1):
-        radio = changes.get(tick, lambda _: None)(held)
-        coming = Disruption.none(len(pose))
-        coming.become(held)
-        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
-        if tick < ticks:
-            medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))
-    told.last = medium.end()
-    return told
-
-
-def tuned_phy(radio: Radio) -> Change:
-    return lambda _: radio
-
-
 def gained(send_db: FloatArray | float = 0.0, receive_db: FloatArray | float = 0.0) -> Change:
     def change(held: Disruption) -> None:
         held.send_gain_db = np.zeros(len(held.alive)) + send_db
@@ -204,13 +197,6 @@ def switched(backlog: int, *off: int) -> Change:
     return change
 
 
-def links_phy(told: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[float, ...]]:
-    columns = [told.finished(name) for name in ("sender", "receiver", "sequence", "fate", "final_at_ns")]
-    on_air_s = told.finished("on_air_at_ns") / 1e9
-    rows = np.stack(columns, axis=1)[(on_air_s >= first_s) & (on_air_s < stop_s)]
-    return sorted(map(tuple, rows.tolist()))
-
-
 def everything(method: str) -> Radio:
     return replace(with_access(method), send_offset="uniform", shadowing=Shadowing(), fading=Fading(), loss=0.1)
 
@@ -218,9 +204,9 @@ def everything(method: str) -> Radio:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_change_that_is_none_changes_nothing(method: str):
     radio = everything(method)
-    same: dict[int, Change] = {tick: tuned_phy(replace(radio)) for tick in range(1, 16)}
+    same: dict[int, Change] = {tick: another(replace(radio)) for tick in range(1, 16)}
     plain = ran(make_medium(radio, 8), FEW, everybody(8), {})
-    assert links_phy(ran(make_medium(radio, 8), FEW, everybody(8), same)) == links_phy(plain)
+    assert links(ran(make_medium(radio, 8), FEW, everybody(8), same)) == links(plain)
     gains: dict[int, Change] = {3: gained(1.0), 4: gained(0.0)}
     apart = ran(
         make_medium(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), gains
@@ -228,17 +214,17 @@ def test_a_change_that_is_none_changes_nothing(method: str):
     silent = ran(
         make_medium(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), {}
     )
-    assert links_phy(apart) == links_phy(silent)
+    assert links(apart) == links(silent)
 
 
 @pytest.mark.parametrize("method", ["none", "aloha"])
 def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone_with_a_phy(method: str):
     radio = everything(method)
     other = replace(radio, antenna=Antenna(-25.0), noise=Noise(5e6, 3.0), loss=0.3)
-    changed = ran(make_medium(radio, 8), FEW, everybody(8), {8: tuned_phy(other)})
-    assert links_phy(changed, 0.0, 0.79) == links_phy(ran(make_medium(radio, 8), FEW, everybody(8), {}), 0.0, 0.79)
+    changed = ran(make_medium(radio, 8), FEW, everybody(8), {8: another(other)})
+    assert links(changed, 0.0, 0.79) == links(ran(make_medium(radio, 8), FEW, everybody(8), {}), 0.0, 0.79)
     alone = ran(make_medium(other, 8), FEW, everybody(8), {})
-    assert links_phy(changed, 0.85, 9.0) == links_phy(alone, 0.85, 9.0)
+    assert links(changed, 0.85, 9.0) == links(alone, 0.85, 9.0)
     np.testing.assert_array_equal(changed.edges, alone.edges)
 
 
@@ -252,7 +238,7 @@ def test_a_frame_on_air_meets_both_noises():
             make_medium(slow, 2),
             at((0, 0), (50, 0)),
             lambda tick: packets([0] * (tick == 0), size=40),
-            {at_tick: tuned_phy(loud)},
+            {at_tick: another(loud)},
         )
         return told.fates().get("RECEIVED", 0)
 
@@ -264,9 +250,9 @@ def test_a_gain_of_the_sender_is_worth_as_much_as_power_and_one_of_the_receiver_
     radio = replace(with_access("aloha"), send_offset="uniform")
     pose = at((0, 0), (95, 0), (0, 99), (-105, 0))
     weaker = ran(make_medium(replace(radio, antenna=Antenna(power_dbm=-3.0)), 4), pose, everybody(4), {})
-    assert links_phy(ran(make_medium(radio, 4), pose, everybody(4), {0: gained(send_db=-3.0)})) == links_phy(weaker)
-    assert links_phy(ran(make_medium(radio, 4), pose, everybody(4), {0: gained(receive_db=-3.0)})) == links_phy(weaker)
-    assert links_phy(weaker) != links_phy(ran(make_medium(radio, 4), pose, everybody(4), {}))
+    assert links(ran(make_medium(radio, 4), pose, everybody(4), {0: gained(send_db=-3.0)})) == links(weaker)
+    assert links(ran(make_medium(radio, 4), pose, everybody(4), {0: gained(receive_db=-3.0)})) == links(weaker)
+    assert links(weaker) != links(ran(make_medium(radio, 4), pose, everybody(4), {}))
 
 
 def test_an_antenna_that_hears_badly_still_sends_well_and_no_edge_leads_to_it():
@@ -308,9 +294,9 @@ def test_gains_elsewhere_do_not_reach_into_an_arena(method: str):
     elsewhere = np.repeat([30.0, 0.0], 8)
     three = ran(make_medium(radio, 8, [1, 5]), np.tile(pose, (2, 1)), everybody(16), {0: gained(elsewhere)})
     own = three.finished("arena") == 1
-    assert len(links_phy(alone)) > 50
+    assert len(links(alone)) > 50
     columns = ("sender", "receiver", "sequence", "fate", "final_at_ns")
-    assert sorted(zip(*(three.finished(name)[own].tolist() for name in columns), strict=True)) == links_phy(alone)
+    assert sorted(zip(*(three.finished(name)[own].tolist() for name in columns), strict=True)) == links(alone)
 
 
 def on_air_ticks(told: Run) -> list[int]:
