@@ -11,14 +11,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks.targets import TARGETS
-from docs.behaviours import places as of_behaviours
+from docs.behaviours import shown as of_behaviours
 from docs.behaviours.degradation import LATENCY, LOSS, degradation_of
 from docs.behaviours.shown import SHOWN
-from docs.experiments.digest import digests
-from docs.experiments.drawing import with_numbers
-from docs.experiments.experiment import Experiment, find_experiment
+from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
 from docs.experiments.experiment import names as experiments
-from docs.experiments.places import HERE, Places
+from docs.experiments.making import digests, with_numbers
 from docs.fault_checks import fault_tables
 from docs.pictures.radio.__main__ import FIGURES
 from docs.protocol_checks import protocol_page

@@ -9,8 +9,7 @@ import numpy as np
 import polars as pl
 
 from docs.behaviours.shown import Shown, find_shown
-from docs.experiments.experiment import Experiment
-from docs.experiments.places import Places
+from docs.experiments.experiment import Experiment, Places
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import plain_legend
 from swarmwire.metrics.report.charts import MedianLine, response_curve

@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from docs.experiments.command import run_app
-from docs.experiments.experiment import find_experiment, names
-from docs.experiments.places import HERE
+from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.making import digest, draw, run, run_app
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from swarmwire.deploy.catalogue.docstrings import flowing
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
@@ -35,8 +35,6 @@ def draw_command(
     asked: Annotated[list[str] | None, typer.Argument(help="Experiments; all without.", metavar="NAME…")] = None,
 ) -> None:
     """Draw NAME.svg from the digests that are there, and put the numbers into NAME.md."""
-    from docs.experiments.drawing import draw
-
     for name in asked or names(HERE):
         experiment = find_experiment(name, HERE)
         typer.echo(draw(experiment, HERE))
@@ -55,8 +53,6 @@ def digest_command(
     ] = None,
 ) -> None:
     """Keep of finished campaigns what the figure and the numbers are made from."""
-    from docs.experiments.digest import digest
-
     for file in digest(find_experiment(name, HERE), HERE, folders or ()):
         typer.echo(f"written: {file}")
 
@@ -78,9 +74,6 @@ def run_command(
     Campaigns lie in campaigns/papers. One that is finished is not run again; of one that was ended, by Ctrl-C or a
     kill, what is missing is run.
     """
-    from docs.experiments.running import run
-    from swarmwire.deploy.campaign.sweep import ExecutionOptions
-
     console = Console(highlight=False)
     typer.echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
 

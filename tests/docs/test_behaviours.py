@@ -9,9 +9,8 @@ import pytest
 from rich.console import Console
 
 from docs.behaviours.degradation import degradation_of
-from docs.behaviours.places import HERE, SCENARIOS
-from docs.behaviours.shown import find_shown
-from docs.experiments.running import run as run_experiment
+from docs.behaviours.shown import HERE, SCENARIOS, find_shown
+from docs.experiments.making import run as run_experiment
 from swarmwire.agent import behaviours
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run

@@ -9,9 +9,8 @@ import numpy as np
 import polars as pl
 from numba import njit
 
-from docs.experiments.digest import digest_of
-from docs.experiments.experiment import Experiment, find_experiment
-from docs.experiments.places import HERE
+from docs.experiments.experiment import HERE, Experiment, find_experiment
+from docs.experiments.making import digest_of
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.deploy.campaign.design import vary_from

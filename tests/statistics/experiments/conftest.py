@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.experiments.places import Places
+from docs.experiments.experiment import Places
 from tests.support.deploy.campaign import scenario_in
 
 CAMPAIGN = """

@@ -7,16 +7,15 @@ import numpy as np
 import polars as pl
 import pytest
 
-from docs.experiments.experiment import find_experiment
+from docs.experiments.experiment import HERE, find_experiment
 from docs.experiments.figures._consensus_model import graph_of
-from docs.experiments.figures._pso_samples import mean_distances
+from docs.experiments.figures._pso import mean_distances
 from docs.experiments.figures.dense import covered, frozen
 from docs.experiments.figures.loss_map import BEHAVIOURS, CHECKS, results, shares
 from docs.experiments.figures.movement import BLIND, FAINT, points
 from docs.experiments.figures.threshold import BOUNDARY, CURE, PARTS, RULE, sample_of
 from docs.experiments.figures.threshold import COUNT as THRESHOLD_COUNT
 from docs.experiments.figures.vicsek import all_to_all
-from docs.experiments.places import HERE
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.deploy.scenario_parts import measuring
 from swarmwire.world.scenario_file import load_scenario

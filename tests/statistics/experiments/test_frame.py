@@ -8,12 +8,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from docs.experiments.__main__ import app
-from docs.experiments.command import run_app
-from docs.experiments.digest import digest, digests
-from docs.experiments.drawing import draw
-from docs.experiments.experiment import find_experiment, names
-from docs.experiments.places import HERE
-from docs.experiments.running import run
+from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.making import digest, digests, draw, run, run_app
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from tests.support.deploy.campaign import InThisProcess
