@@ -28,8 +28,6 @@ from swarmwire.comms.sensors.simple import (
 )
 from swarmwire.metrics.drawing.canvas import (
     CURVE,
-    FAINT,
-    GRID,
     INK,
     LIGHT,
     LIGHT_EDGE,
@@ -39,11 +37,11 @@ from swarmwire.metrics.drawing.canvas import (
     ROW_IN,
     SMALL_PT,
     SOFT,
-    TEXT_PT,
     TITLE_PT,
     Look,
     add_facts,
     new_figure,
+    plain_axes,
     rgb,
     robot_color,
     save,
@@ -169,7 +167,7 @@ def draw_body(body: Body, to: Path, size_px: int) -> None:
     if body.proximity:
         low_in = foot_in + 0.42
         at = place(left_in + 0.22, low_in, LONG_SIDE_IN - _EDGE_IN - left_in - 0.25, _CURVE_IN)
-        _draw_response(figure.add_axes(at), body.proximity)
+        _draw_response(plain_axes(figure, at, "a ray's answer"), body.proximity)
     for i, line in enumerate(reversed(caption)):
         low = (0.14 + i * _CAPTION_ROW_IN) / height_in
         figure.text(_EDGE_IN / LONG_SIDE_IN, low, line, fontsize=SMALL_PT, color=SOFT)
@@ -182,14 +180,8 @@ def _draw_response(axes: Any, proximity: ProximitySpec) -> None:
     axes.plot(100.0 * distance_m, proximity.response.value(distance_m), color=CURVE, lw=1.4)
     axes.set_xlim(0.0, 100.0 * proximity.range_m)
     axes.set_ylim(-0.03, 1.05)
-    axes.set_facecolor("none")
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
-    axes.grid(axis="y", color=GRID, linewidth=0.6)
-    axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     axes.locator_params(axis="y", nbins=2)
     axes.locator_params(axis="x", nbins=5)
-    axes.set_title("a ray's answer", loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
     axes.set_xlabel("distance from the rim in cm", fontsize=SMALL_PT, color=SOFT, labelpad=1)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import polars as pl
@@ -12,29 +11,12 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
+from swarmwire.metrics.run_folder.reader import RunFolder
 
 NO_STATE = -1
 MAX_BY_DEFAULT = 300  # frames
 MAX_FRAMES = 20_000
 _SPEEDS = (1, 2, 4, 5, 8, 10)  # times a power of ten
-
-
-class Recorded(Protocol):
-    """The part of a run folder that a film reads."""
-
-    @property
-    def static(self) -> Static:
-        """The constants of the run."""
-        ...
-
-    @property
-    def measured(self) -> Mapping[str, MetricInfo]:
-        """Unit, kind and bounds of each metric, by name."""
-        ...
-
-    def ticks(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per tick of an arena, as far as it was written."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -62,7 +44,7 @@ class Film:
         return max(0, int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1)
 
 
-def film_of(recorded: Recorded, arena: int, where: str) -> Film:
+def film_of(recorded: RunFolder, arena: int, where: str) -> Film:
     """The film of one arena; BadInput names `where` if there is no such arena, or no tick of it yet."""
     static = recorded.static
     if not 0 <= arena < static.arenas:

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.drawing.canvas import CURVE, FAINT, GRID, INK, SMALL_PT, SOFT, TEXT_PT, Layout, Look
+from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, Layout, Look, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
@@ -76,7 +76,7 @@ class MetricStrip:
         """Draw the fixed parts."""
         every = max(1, len(film.time_s) // _MAX_POINTS)
         self._plots = [
-            _Plot(figure.add_axes(place), name, film, every, last)
+            _Plot(plain_axes(figure, place, titled(name, film.facts)), name, film, every, last)
             for name, (place, last) in zip(names, _places(layout, len(names)), strict=True)
         ]
 
@@ -96,21 +96,14 @@ class _Plot:
         time_s, value, facts = film.time_s, film.metrics[name], film.facts
         self._time_s, self._value, self._every = time_s, value, every
         self._whole = is_count(name, facts)
-        axes.set_facecolor("none")
-        axes.spines[["top", "right", "left"]].set_visible(False)
-        axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
         axes.set_xlim(float(time_s[0]), max(float(time_s[-1]), float(time_s[0]) + 1e-9))
         axes.set_ylim(*limits(name, value, facts))
-        axes.grid(axis="y", color=GRID, linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
         axes.locator_params(axis="y", nbins=3, integer=self._whole)
         axes.locator_params(axis="x", nbins=4, integer=True)
         if last:
             axes.set_xlabel("time in s", fontsize=SMALL_PT, color=SOFT, labelpad=1)
         else:
             axes.tick_params(labelbottom=False)
-        axes.set_title(titled(name, facts), loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
         axes.plot(time_s[::every], value[::every], color=FAINT, lw=1.0, zorder=2)
         [self._past] = axes.plot([], [], color=CURVE, lw=1.4, zorder=3)
         [self._cursor] = axes.plot([], [], color=SOFT, lw=0.7, alpha=0.7, zorder=2.5)

@@ -14,7 +14,6 @@ from swarmwire.metrics.drawing.canvas import (
     CURVE,
     FAINT,
     FLOOR,
-    GRID,
     INK,
     LINK,
     LONG_SIDE_IN,
@@ -115,14 +114,13 @@ def draw_coverage(
     figure.text(0.025, 0.94, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
     _draw_map(figure, static, found, sensitivity_dbm)
     has_strength = distances.mean_dbm is not None
-    delivery = _axes(figure, (0.55, 0.57 if has_strength else 0.36, 0.425, 0.26 if has_strength else 0.47))
-    delivery.set_title("delivery of lone packets over distance in m", **_TITLE)
+    place = (0.55, 0.57, 0.425, 0.26) if has_strength else (0.55, 0.36, 0.425, 0.47)
+    delivery = _axes(figure, place, "delivery of lone packets over distance in m")
     _draw_band(delivery, distances, distances.delivery)
     delivery.set_ylim(-0.03, 1.03)
     explained = delivery
     if distances.mean_dbm is not None:
-        explained = strength = _axes(figure, (0.55, 0.115, 0.425, 0.3))
-        strength.set_title("mean strength in dBm over distance in m", **_TITLE)
+        explained = strength = _axes(figure, (0.55, 0.115, 0.425, 0.3), "mean strength in dBm over distance in m")
         _draw_band(strength, distances, distances.mean_dbm)
         if sensitivity_dbm is not None:
             strength.axhline(sensitivity_dbm, color=SOFT, lw=0.9, ls=(0, (4, 3)), label="sensitivity")
@@ -173,13 +171,10 @@ def _add_scale(figure: Any, shown: Any, bottom: float, width: float) -> None:
     bar.ax.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
 
 
-def _axes(figure: Any, place: tuple[float, float, float, float]) -> Any:
-    axes = figure.add_axes(place)
+def _axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
+    axes = plain_axes(figure, place, title)
     axes.set_facecolor(FLOOR)
     axes.spines[:].set_visible(False)
-    axes.grid(axis="y", color=GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(which="both", labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     return axes
 
 

@@ -27,6 +27,7 @@ from swarmwire.metrics.drawing.canvas import (
 )
 from swarmwire.metrics.drawing.scene import add_legend, draw_scenery, group_entries, light_entry, movable_entry
 from swarmwire.metrics.drawing.swarm import Swarm
+from swarmwire.metrics.text import counted
 
 _AXES_IN = 0.26
 _PANEL_IN = 1.55
@@ -103,10 +104,9 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
 def _counted(obstacles: Sequence[Obstacle]) -> list[str]:
     """The number of obstacles of each shape, movable ones apart."""
     kinds = Counter((obstacle.shape, obstacle.movable) for obstacle in obstacles)
-    plural = {"cylinder": "cylinders", "box": "boxes", "polygon": "polygons"}
+    words = {key: f"{'movable ' if key[1] else ''}{key[0]}" for key in kinds}
     return [
-        f"{count} {'movable ' if movable else ''}{shape if count == 1 else plural[shape]}"
-        for (shape, movable), count in kinds.items()
+        counted(count, words[key], f"{words[key]}{'es' if key[0] == 'box' else 's'}") for key, count in kinds.items()
     ]
 
 

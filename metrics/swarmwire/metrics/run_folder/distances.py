@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import polars as pl
@@ -47,16 +47,14 @@ class RadioDistances(Table):
     name = "radio_distances"
     may_be_null = ("pdr",)
 
-    def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column."""
-        return {
-            "arena": pl.Int32,
-            "from_m": pl.Float64,
-            "to_m": pl.Float64,
-            "intended": pl.Int64,
-            "received": pl.Int64,
-            "pdr": pl.Float64,
-        }
+    types: ClassVar = {
+        "arena": pl.Int32,
+        "from_m": pl.Float64,
+        "to_m": pl.Float64,
+        "intended": pl.Int64,
+        "received": pl.Int64,
+        "pdr": pl.Float64,
+    }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, which writes nothing without a radio."""
@@ -142,7 +140,7 @@ class DistanceCounts(Totals):
             "received": received,
             "pdr": pl.Series(pdr).fill_nan(None),
         }
-        return pl.DataFrame(columns, schema_overrides=RadioDistances().schema())
+        return pl.DataFrame(columns, schema_overrides=RadioDistances.types)
 
     def about(self) -> dict[str, Any]:
         """One of so many packets was counted; receivers that received at a distance that was not known any more."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import polars as pl
@@ -32,21 +32,16 @@ class EventLog(Observer):
         """Add what happened in a tick."""
         for event in truth.events:
             robots = names(event, self._static)
-            self._events.append(
-                {
-                    "at_s": event.at_s,
-                    "tick": truth.tick,
-                    "do": event.do,
-                    "part": event.part,
-                    "ended": event.ended,
-                    "singly": event.singly,
-                    "robots": robots,
-                }
-            )
+            self._events.append({**_entry(event, truth), "singly": event.singly, "robots": robots})
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The events so far."""
         return {"events": self._events}
+
+
+def _entry(event: EventRecord, truth: Truth) -> dict[str, Any]:
+    """What the summary and the table have of an event, in the tick in which it took effect."""
+    return {"at_s": event.at_s, "tick": truth.tick, "do": event.do, "part": event.part, "ended": event.ended}
 
 
 class Events(Table):
@@ -61,18 +56,16 @@ class Events(Table):
     name = "events"
     always = True
 
-    def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column."""
-        return {
-            "at_s": pl.Float64,
-            "tick": pl.Int64,
-            "time_s": pl.Float64,
-            "do": pl.String,
-            "part": pl.String,
-            "ended": pl.Boolean,
-            "arena": pl.Int32,
-            "robots": pl.List(pl.String),
-        }
+    types: ClassVar = {
+        "at_s": pl.Float64,
+        "tick": pl.Int64,
+        "time_s": pl.Float64,
+        "do": pl.String,
+        "part": pl.String,
+        "ended": pl.Boolean,
+        "arena": pl.Int32,
+        "robots": pl.List(pl.String),
+    }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder."""
@@ -101,28 +94,19 @@ class EventRecorder(Observer):
     def begin(self, static: Static) -> None:
         """Open the table."""
         self._static = static
-        self._writer = TableWriter(self._folder, "events", Events().schema(), self._may_drop)
+        self._writer = TableWriter(self._folder, "events", Events.types, self._may_drop)
 
     def see(self, truth: Truth) -> None:
         """Write what happened in this tick."""
         if not truth.events:
             return
         rows: list[dict[str, Any]] = [
-            {
-                "at_s": event.at_s,
-                "tick": truth.tick,
-                "time_s": to_s(truth.time_ns),
-                "do": event.do,
-                "part": event.part,
-                "ended": event.ended,
-                "arena": arena,
-                "robots": robots,
-            }
+            {**_entry(event, truth), "time_s": to_s(truth.time_ns), "arena": arena, "robots": robots}
             for event in truth.events
             for arena, robots in enumerate(names(event, self._static))
             if truth.running[arena] and (robots or not event.singly)
         ]
-        self._writer.put(Chunk(len(rows), partial(_frame, rows)))
+        self._writer.put(Chunk(len(rows), partial(pl.DataFrame, rows, schema=Events.types)))
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Join the parts."""
@@ -141,7 +125,3 @@ def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
     if not event["singly"]:
         return sum(event["tick"] < done for done in ticks)
     return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])
-
-
-def _frame(rows: list[dict[str, Any]]) -> pl.DataFrame:
-    return pl.DataFrame(rows, schema=Events().schema())

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import polars as pl
@@ -37,25 +37,23 @@ class Packets(Table):
     name = "packets"
     may_be_null = ("receiver", "to", "rssi_dbm", "distance_m", "payload")
 
-    def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column."""
-        return {
-            "arena": pl.Int32,
-            "sender": pl.Int32,
-            "receiver": pl.Int32,  # null: never on air
-            "receivers": pl.Int32,
-            "to": pl.Int32,  # null: a broadcast
-            "sequence": pl.Int64,
-            "sent_at_ns": pl.Int64,
-            "on_air_at_ns": pl.Int64,
-            "final_at_ns": pl.Int64,
-            "fate": pl.Enum(FATE_NAMES),
-            "rssi_dbm": pl.Float32,  # null: unknown to the radio
-            "size_bytes": pl.Int32,
-            "topic": pl.String,
-            "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
-            "payload": pl.Binary,  # with its tag
-        }
+    types: ClassVar = {
+        "arena": pl.Int32,
+        "sender": pl.Int32,
+        "receiver": pl.Int32,  # null: never on air
+        "receivers": pl.Int32,
+        "to": pl.Int32,  # null: a broadcast
+        "sequence": pl.Int64,
+        "sent_at_ns": pl.Int64,
+        "on_air_at_ns": pl.Int64,
+        "final_at_ns": pl.Int64,
+        "fate": pl.Enum(FATE_NAMES),
+        "rssi_dbm": pl.Float32,  # null: unknown to the radio
+        "size_bytes": pl.Int32,
+        "topic": pl.String,
+        "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
+        "payload": pl.Binary,  # with its tag
+    }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, if packets are to be recorded."""
@@ -99,7 +97,7 @@ class PacketRecorder(Observer):
         """Open the table."""
         self._static = static
         self._sample = PacketSample(self._share, static.seeds)
-        self._writer = TableWriter(self._folder, "packets", Packets().schema(), self._may_drop)
+        self._writer = TableWriter(self._folder, "packets", Packets.types, self._may_drop)
         self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
         self._parts: list[ReceptionRecords] = []
         self._rows, self._first_tick = 0, 0
@@ -180,7 +178,7 @@ class PacketColumns:
             "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
             "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
         }
-        schema = Packets().schema()
+        schema = Packets.types
         frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
         return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"), to=pl.when(is_addressed).then("to"))
 

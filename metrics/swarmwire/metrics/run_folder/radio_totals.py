@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import polars as pl
@@ -68,21 +68,19 @@ class RadioRobots(Table):
 
     name = "radio_robots"
 
-    def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column."""
-        return {
-            "arena": pl.Int32,
-            "robot": pl.String,
-            "packets": pl.Int64,
-            "packets_on_air": pl.Int64,
-            "airtime_s": pl.Float64,
-            "airtime": pl.Float64,
-            "received_bytes": pl.Int64,
-            "throughput_bps": pl.Float64,
-            "intended": pl.Int64,
-            **{f"as_sender_{FATE_NAMES[fate]}": pl.Int64 for fate in Fate},
-            **{f"as_receiver_{FATE_NAMES[fate]}": pl.Int64 for fate in RECEIVERS_FATES},
-        }
+    types: ClassVar = {
+        "arena": pl.Int32,
+        "robot": pl.String,
+        "packets": pl.Int64,
+        "packets_on_air": pl.Int64,
+        "airtime_s": pl.Float64,
+        "airtime": pl.Float64,
+        "received_bytes": pl.Int64,
+        "throughput_bps": pl.Float64,
+        "intended": pl.Int64,
+        **{f"as_sender_{FATE_NAMES[fate]}": pl.Int64 for fate in Fate},
+        **{f"as_receiver_{FATE_NAMES[fate]}": pl.Int64 for fate in RECEIVERS_FATES},
+    }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, which writes nothing without a radio."""
@@ -164,7 +162,7 @@ class RobotCounts(Totals):
             **{f"as_sender_{FATE_NAMES[fate]}": as_sender[:, fate] for fate in Fate},
             **{f"as_receiver_{FATE_NAMES[fate]}": self.as_receiver[:, fate] for fate in RECEIVERS_FATES},
         }
-        return pl.DataFrame(columns, schema=RadioRobots().schema())
+        return pl.DataFrame(columns, schema=RadioRobots.types)
 
     def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
         """Add packets that left their radios, and what became of packets."""
@@ -210,15 +208,13 @@ class RadioLinks(Table):
 
     name = "radio_links"
 
-    def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column."""
-        return {
-            "arena": pl.Int32,
-            "sender": pl.Int32,
-            "receiver": pl.Int32,
-            "fate": pl.Enum(FATE_NAMES),
-            "packets": pl.Int64,
-        }
+    types: ClassVar = {
+        "arena": pl.Int32,
+        "sender": pl.Int32,
+        "receiver": pl.Int32,
+        "fate": pl.Enum(FATE_NAMES),
+        "packets": pl.Int64,
+    }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, if links are to be recorded."""
@@ -251,7 +247,7 @@ class LinkCounts(Totals):
         """A row per arena, sender, receiver and fate."""
         columns: dict[str, Any] = dict(self.columns())
         columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
-        return pl.DataFrame(columns, schema_overrides=RadioLinks().schema())
+        return pl.DataFrame(columns, schema_overrides=RadioLinks.types)
 
     def add(self, finished: ReceptionRecords) -> None:
         """Add packets whose fate is final."""

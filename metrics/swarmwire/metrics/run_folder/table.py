@@ -61,18 +61,20 @@ class Table(ABC):
     Attributes:
         name: of the table, of its file, and of its key in the summary's `record`.
         always: every run that records tables has it.
+        types: polars' type of each column, of a table that has the same in every run.
         may_be_null: columns that may have missing values.
         optional: columns that the schema has and a table may lack.
     """
 
     name: ClassVar[str]
     always: ClassVar[bool] = False
+    types: ClassVar[dict[str, Any]] = {}
     may_be_null: ClassVar[tuple[str, ...]] = ()
     optional: ClassVar[tuple[str, ...]] = ()
 
-    @abstractmethod
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """The polars type of each column; empty if it depends on the run and `static` is None."""
+        return self.types
 
     @abstractmethod
     def recorder(self, options: RecordOptions) -> Observer | None:

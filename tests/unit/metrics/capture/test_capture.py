@@ -19,8 +19,8 @@ NAMES = ("a-0", "a-1", "a-2")
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
     usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
-    whole = [{**dict.fromkeys(Packets().schema()), **usual, **row} for row in rows]
-    return pl.DataFrame(whole, schema=Packets().schema())
+    whole = [{**dict.fromkeys(Packets.types), **usual, **row} for row in rows]
+    return pl.DataFrame(whole, schema=Packets.types)
 
 
 def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
