@@ -68,6 +68,15 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
 
 
+def some(words: Sequence[str], most: int) -> str:
+    """The first words, and how many more there are.
+
+    >>> some(["a", "b", "c", "d"], 2), some(["a"], 2)
+    ('a, b and 2 more', 'a')
+    """
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
 def sentence(text: str) -> str:
     """The text with a capital letter at its start."""
     return text[:1].upper() + text[1:]

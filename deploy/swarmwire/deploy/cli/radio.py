@@ -12,7 +12,7 @@ from swarmwire.deploy.cli.options import USUAL_SIZE_PX, AsJson, Overrides, Seed,
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.deploy.radio.coverage import CoverageProbe
+    from swarmwire.deploy.radio_coverage import CoverageProbe
     from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 
 
@@ -54,7 +54,7 @@ def fit_command(
     """
     from rich.console import Console
 
-    from swarmwire.deploy.radio.fit import fit_toml, print_fit
+    from swarmwire.deploy.radio_fit import fit_toml, print_fit
     from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.drawing.canvas import check_picture
 
@@ -205,7 +205,7 @@ def _probe_scenario(
     from rich.console import Console
 
     from swarmwire.deploy.host import compiling_told
-    from swarmwire.deploy.radio.coverage import coverage_json, print_coverage, probe_coverage
+    from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.metrics.drawing.canvas import check_picture
 
     if to is not None:

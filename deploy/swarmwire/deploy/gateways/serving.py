@@ -14,8 +14,15 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.deploy.gateways.gateways import Chosen, Gateways, chosen_gateways
-from swarmwire.deploy.gateways.robot_settings import RobotSettings, listening_places, write_settings
+from swarmwire.deploy.gateways.gateways import (
+    Chosen,
+    Gateways,
+    RobotSettings,
+    chosen_gateways,
+    listening_places,
+    write_settings,
+)
+from swarmwire.metrics.text import some
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from swarmwire.world.gateways.tracker import EmulatedTracker
@@ -186,8 +193,7 @@ class Undriven(Observer):
         robots = self._robots()
         if not robots:
             return
-        more = len(robots) - NAMED
-        names = ", ".join(robot.name for robot in robots[:NAMED]) + (f" and {more} more" if more > 0 else "")
+        names = some([robot.name for robot in robots], NAMED)
         file = robots[0].file
         command = f": swarmwire-agent run --config {quote(str(file))}" if file else ""
         self._say(f"{verb} {names}{command}{' and so on' if file and len(robots) > 1 else ''}")

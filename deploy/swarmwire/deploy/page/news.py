@@ -16,6 +16,7 @@ from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.text import some
 
 EVERY_S = 0.2  # between two looks
 KEPT = 240  # values of each number that a page that is opened later still gets
@@ -182,5 +183,4 @@ def whom(event: EventRecord, static: Static) -> str:
         return "nobody"
     if len(changed) == static.robots:
         return "all"
-    more = len(changed) - NAMED
-    return ", ".join(changed[:NAMED]) + (f" and {more} more" if more > 0 else "")
+    return some(changed, NAMED)

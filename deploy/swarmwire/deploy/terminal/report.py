@@ -1,6 +1,6 @@
 """The summary as people read it in a terminal."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -9,7 +9,7 @@ from rich.text import Text
 
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result
-from swarmwire.metrics.text import number_text
+from swarmwire.metrics.text import number_text, some
 
 if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
@@ -101,15 +101,10 @@ def _stop_rows(result: Result) -> Iterator[tuple[str, str]]:
     for condition in dict.fromkeys(result.stop):
         by = [arena for arena in result.arenas if arena.stopped_by == condition]
         if by:
-            yield "stopped", f"{condition}: {_few([f'seed {of.seed} since {of.stop_time_s:g} s' for of in by])}"
+            yield "stopped", f"{condition}: {some([f'seed {of.seed} since {of.stop_time_s:g} s' for of in by], SHOWN)}"
     rest = [f"seed {arena.seed}" for arena in result.arenas if arena.stopped_by is None]
     if result.stop and rest:
-        yield "not stopped", f"{_few(rest)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}"
-
-
-def _few(texts: Sequence[str]) -> str:
-    more = len(texts) - SHOWN
-    return ", ".join(texts[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+        yield "not stopped", f"{some(rest, SHOWN)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}"
 
 
 def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
