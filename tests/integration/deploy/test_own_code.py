@@ -13,8 +13,8 @@ from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.cli.inspect import new_swarm
 from swarmwire.metrics.drawing.film import film_of
 from tests.docs.pages import files_of
+from tests.support.custom_code import CODE, install
 from tests.support.deploy.runs import called, run_spread
-from tests.support.metrics.packages import CODE, install
 
 HEAVY = ("numba", "pydantic", "pymunk", "scipy", "polars", "zenoh", "matplotlib", "rerun")
 FROM_ZERO = "metrics.1.from_m=0.0"

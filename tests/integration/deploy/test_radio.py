@@ -20,9 +20,14 @@ from tests.support.metrics.radio import csv_of, made
 
 WALLED = ROOT / "scenarios" / "flocking-802154.toml"
 REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
-__all__ = ["here"]  # in whose folder all of these tests are
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"
 SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def said(*arguments: str | Path) -> str:
@@ -148,12 +153,6 @@ def test_people_get_a_table_and_a_picture(tmp_path):
     assert (tmp_path / "coverage.png").read_bytes().startswith(b"\x89PNG")
     json.loads(said(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
     assert "</svg>" in (tmp_path / "disk.svg").read_text()
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(here, monkeypatch, capsys):

@@ -1,9 +1,10 @@
-"""Recorded runs and their summaries."""
+"""Recorded runs and their summaries, and files as a power cut or a worn disk leaves them."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords
@@ -93,3 +94,19 @@ def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: 
         "live_events": None,
         **given,
     }
+
+
+def damaged(parquet: bytes) -> st.SearchStrategy[bytes]:
+    """A Parquet file that is cut off, or in which a few bits are turned: as often in its footer as anywhere."""
+    last = len(parquet) - 1
+    footer = len(parquet) - 8 - int.from_bytes(parquet[-8:-4], "little")
+    place = st.integers(0, last) | st.integers(footer, last)
+    turned = st.lists(st.tuples(place, st.integers(0, 7)), min_size=1, max_size=8).map(lambda at: _turned(parquet, at))
+    return turned | turned | st.integers(0, last).map(lambda end: parquet[:end])
+
+
+def _turned(data: bytes, bits: list[tuple[int, int]]) -> bytes:
+    changed = bytearray(data)
+    for place, bit in bits:
+        changed[place] ^= 1 << bit
+    return bytes(changed)

@@ -27,8 +27,8 @@ from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form
 from swarmwire.world.scenario_file import scenario_schema
+from tests.support.custom_code import install
 from tests.support.deploy.runs import LOSSY, ROOT, called
-from tests.support.metrics.packages import install
 
 EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

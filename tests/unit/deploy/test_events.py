@@ -12,8 +12,8 @@ from swarmwire.deploy.campaign.columns import responses_of, row_of
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
+from tests.support.custom_code import CODE
 from tests.support.deploy.runs import PER_ROBOT, ROOT, run_spread
-from tests.support.metrics.packages import CODE
 
 DISRUPTED = ROOT / "scenarios" / "flocking-disrupted.toml"
 # All that the scenario has happen in a minute, within four seconds.

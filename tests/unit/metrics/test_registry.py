@@ -20,7 +20,7 @@ from swarmwire.metrics.registry import (
     select_metrics,
     standard,
 )
-from tests.support.metrics.packages import CODE, install
+from tests.support.custom_code import CODE, install
 from tests.support.metrics.truths import static, truth
 
 

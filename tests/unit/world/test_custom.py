@@ -20,10 +20,10 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
-from tests.support.world import custom_code
+from tests.support import custom_code
 from tests.support.world.scenes import commanded
 
-CODE = Path(__file__).parents[2] / "support" / "world" / "custom_code.py"
+CODE = Path(__file__).parents[2] / "support" / "custom_code.py"
 PAINT, PAINTER = f"{CODE}:Paint", f"{CODE}:Painter"
 BOTH = f'''like = "epuck"
 name = "mine"
@@ -35,7 +35,7 @@ kind = "{PAINTER}"
 '''
 SENSOR, ACTUATOR = "[sensors.x]\nkind = ", "[actuators.x]\nkind = "
 UNKNOWN: Any = "gaussian"
-SHEET: dict[str, Any] = {"like": "epuck", "sensors": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}
+SHEET: dict[str, Any] = {"like": "epuck", "sensors": {"x": {"kind": "tests.support.custom_code:Alone"}}}
 
 
 def scenario(folder: Path, spec: str, count: int = 2) -> Scenario:

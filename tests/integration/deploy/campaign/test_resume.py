@@ -17,9 +17,9 @@ from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.repetition import CampaignRun
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import read_campaign
-from tests.support.damaged import damaged
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
+from tests.support.metrics.recorded import damaged
 
 VARY = {"radio.loss": [0.0, 0.5]}
 ASKED = {"seeds": 2, "vary": VARY, "batch": 2}

@@ -29,7 +29,7 @@ from swarmwire.metrics.run_folder.writer import (
 )
 from swarmwire.metrics.table_file import read_parquet, refuse_corrupt
 from tests.support.clocks import StillClock
-from tests.support.damaged import damaged
+from tests.support.metrics.recorded import damaged
 
 SCHEMA = {"number": pl.Int64, "name": pl.String}
 

@@ -74,7 +74,7 @@ def test_a_sheet_may_start_from_a_body_that_comes_with_swarmwire(tmp_path):
 
 
 def test_a_class_that_bodies_name_is_listed_once(tmp_path):
-    kind = "tests.support.world.custom_code:Alone"
+    kind = "tests.support.custom_code:Alone"
     (tmp_path / "mine.toml").write_text(f'like = "epuck"\nsensors.x.kind = "{kind}"\nsensors.y.kind = "{kind}"\n')
     body = read_body(tmp_path / "mine.toml", "swarm.toml", "robots.flock.body")
     assert custom_code_of([load_body("epuck"), body, body]) == (kind,)
@@ -118,7 +118,7 @@ def test_a_scenario_changes_a_body_for_one_group(tmp_path, body):
     [
         ({"sensors": {"proximity": {"drop_out": 2}}}, "robots.worn.body_overrides.sensors.proximity.drop_out"),
         ({"weight_kg": 1.0}, "robots.worn.body_overrides.weight_kg"),
-        ({"sensors": {"x": {"kind": "tests.support.world.custom_code:Alone"}}}, "robots.worn.body_overrides"),
+        ({"sensors": {"x": {"kind": "tests.support.custom_code:Alone"}}}, "robots.worn.body_overrides"),
     ],
 )
 def test_what_a_scenario_may_not_change_is_named(tmp_path, spec, key):
@@ -128,11 +128,11 @@ def test_what_a_scenario_may_not_change_is_named(tmp_path, spec, key):
 
 
 def test_a_scenario_changes_parameters_of_a_users_own_sense_that_an_entry_point_names(tmp_path, monkeypatch):
-    point = EntryPoint("painted", "tests.support.world.custom_code:Paint", "swarmwire.sensors")
+    point = EntryPoint("painted", "tests.support.custom_code:Paint", "swarmwire.sensors")
     monkeypatch.setattr(loading, "entry_points_of", lambda _: [point])
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsensors.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 2}}})["worn"]
-    assert custom_code_of([worn]) == ("tests.support.world.custom_code:Paint",)
+    assert custom_code_of([worn]) == ("tests.support.custom_code:Paint",)
     with pytest.raises(BadInput, match="at least 1") as caught:
         bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 0}}})
     assert caught.value.key == "robots.worn.body_overrides.sensors.paint.cells"

@@ -46,7 +46,7 @@ SPECS = {
     name: replace(kind.example(), **STAGES, **(OUTLIER if issubclass(kind, RangedSensorSpec) else {}))
     for name, kind in SENSOR_SPECS.items()
 }
-OWN = f"{Path(__file__).parents[3] / 'support' / 'world' / 'custom_code.py'}:Alone"
+OWN = f"{Path(__file__).parents[3] / 'support' / 'custom_code.py'}:Alone"
 NAMES = (*SPECS, "own")
 
 
