@@ -112,11 +112,6 @@ def network_in(folder: Path, purpose: str, name: str | None = None) -> Network:
     return network
 
 
-def name_in(network: Network) -> str:
-    """Whose certificate it is, by the name of its file, as `swarmwire certs` writes it."""
-    return network.certificate.stem if network.certificate else ""
-
-
 def _only(folder: Path, purpose: str) -> str:
     keys = sorted(path.stem for path in folder.glob("*.key") if path.stem != AUTHORITY)
     if (folder / REGISTER).exists():

@@ -14,7 +14,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates import folder as certificate_folder
 from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, renew_authority, revoke
-from swarmwire.deploy.certificates.member import access_in, name_in, network_in
+from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import (
     DAY,
     PURPOSES,
@@ -264,9 +264,10 @@ def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(register
 
 
 def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(registered):
-    assert name_in(network_in(registered, "world")) == "world"
+    assert network_in(registered, "world").certificate == registered / "world.pem"
     network = network_in(registered, "runner", "laptop-2")
-    assert (name_in(network), network.ca, network.proves) == ("laptop-2", registered / "ca.pem", True)
+    assert (network.certificate, network.ca) == (registered / "laptop-2.pem", registered / "ca.pem")
+    assert network.proves
     with pytest.raises(BadInput, match="laptop-1, laptop-2"):
         network_in(registered, "runner")
     with pytest.raises(BadInput, match="nobody"):
@@ -282,7 +283,7 @@ def test_a_machine_with_its_own_files_alone_needs_no_register(registered, tmp_pa
     for name in ("ca.pem", "laptop-1.pem", "laptop-1.key"):
         (own / name).write_bytes((registered / name).read_bytes())
     (own / "laptop-1.key").chmod(0o600)
-    assert name_in(network_in(own, "runner")) == "laptop-1"
+    assert network_in(own, "runner").certificate == own / "laptop-1.pem"
     with pytest.raises(BadInput):
         access_in(own)
 
