@@ -78,7 +78,7 @@ def test_help_teaches(call, monkeypatch, capsys):
 def test_check_says_what_is_in_a_good_scenario(monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "check", LOSSY)
     assert code == 0
-    for text in ("20 epuck", "flock", "120 s", "10 Hz"):
+    for text in ("20 x epuck", "flock", "120 s", "10 Hz"):
         assert text in out
 
 
