@@ -18,8 +18,8 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
-from swarmwire.deploy.record import provenance
-from swarmwire.deploy.result import Result
+from swarmwire.deploy.record import folder, provenance
+from swarmwire.metrics.run_folder.layout import SUMMARY
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from tests.integration.examples.test_examples import EXAMPLES
@@ -90,7 +90,9 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
 
 
 def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(Result, "write", refuses)
+    monkeypatch.setattr(
+        folder, "write_text", lambda path, text: refuses() if path.name == SUMMARY else write(path, text)
+    )
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert code == 1
     assert_names(errors, tmp_path / "run" / "summary.json")
