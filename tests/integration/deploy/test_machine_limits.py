@@ -90,8 +90,9 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
 
 
 def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
+    written = folder.write_text
     monkeypatch.setattr(
-        folder, "write_text", lambda path, text: refuses() if path.name == SUMMARY else write(path, text)
+        folder, "write_text", lambda path, text: (refuses if path.name == SUMMARY else written)(path, text)
     )
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert code == 1
