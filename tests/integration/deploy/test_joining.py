@@ -192,7 +192,7 @@ def test_who_joins_leaves_or_is_lost(joiners, tmp_path, case):
     watcher, settings = Watcher(*steps), (*case.settings, f"run.on_runner_loss={case.on_loss}")
     result = joiners.run(
         *settings,
-        observer=watcher,
+        watcher=watcher,
         start_with=case.start_with,
         realtime=case.realtime,
         subtick=case.subtick,

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, en
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.live.control_server import ControlServer
-from swarmwire.deploy.page.server import MAX_BYTES, Order
+from swarmwire.deploy.page.server import MAX_BYTES, Order, give
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents
@@ -210,4 +210,4 @@ class PageOrders(DocumentTarget):
             order = self.adapter.validate_json(case)
         except ValidationError as error:
             raise ValueError(error.errors()[0]["type"]) from None
-        order.give(AnyRequest())
+        give(order, AnyRequest())
