@@ -32,7 +32,7 @@ ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3
 WRITTEN = "expected what swarmwire writes at the start of a campaign"
 
 Design = Literal["grid", "list", "random", "latin"]
-Value = bool | int | float | str | list[Any] | None  # of a parameter
+Value = bool | int | float | str | list[Any] | Mapping[str, Any] | None  # of a parameter; a map is a TOML table
 Point = Mapping[str, Value]  # path of each parameter that is varied -> its value there
 Stat = Literal["q25", "q50", "q75", "mean", "censored"]  # quartiles, mean, and the share that was cut off
 STATS: tuple[Stat, ...] = get_args(Stat)
