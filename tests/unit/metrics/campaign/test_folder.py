@@ -32,6 +32,13 @@ def test_a_finished_campaign_has_every_run_in_order(tmp_path):
     assert campaign.sample("order", 1).seed.tolist() == [7, 3, 5]
 
 
+def test_the_values_of_a_parameter_may_be_tables(tmp_path):
+    params = [{"gain": 1.0, "blocked": True}, {"gain": 2.0, "blocked": False}]
+    folder = write_campaign(tmp_path / "a", {"robots.flock.params": params})
+    assert [point["robots.flock.params"] for point in CampaignFolder(folder).points] == params
+    assert select(f"{folder}@robots.flock.params={{gain = 2.0, blocked = false}}").points == (1,)
+
+
 def test_parts_give_the_same_rows_as_the_whole(tmp_path):
     whole = CampaignFolder(write_campaign(tmp_path / "whole"))
     parts = CampaignFolder(write_campaign(tmp_path / "parts", parts=3))
