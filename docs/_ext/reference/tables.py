@@ -17,6 +17,8 @@ from swarmwire.deploy.cli.app import app
 
 NOTHING = "–"
 SCENARIOS = Path(__file__).parents[3] / "scenarios" / "behaviours"
+SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
+CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
 KEYS = ("key", "unit", "value", "default", "meaning")
 
 
@@ -37,8 +39,16 @@ def facts_of(kind: str, title: str) -> str:
 def details_of(kind: str) -> str:
     """Each entry of a kind under its name: its text, and the tables of its parameters; each table once."""
     seen: set[str] = set()
-    parts = [part for of in entries(kind) for part in (f"### {code(of.name)}\n\n{text_of(of)}\n", *_tables(of, seen))]
+    parts: list[str] = []
+    for of in entries(kind):
+        settings = [_setting(text) for _, text in of.facts if SETTING.fullmatch(text)]
+        parts += [f"### {code(of.name)}\n", *(f"{text}\n" for text in settings), f"{text_of(of)}\n", *_tables(of, seen)]
     return "\n".join(parts)
+
+
+def _setting(text: str) -> str:
+    """The setting and the header of its table as code; any other text as it is."""
+    return SETTING.sub(r"`\1` in `\2`", text)
 
 
 def keys_of(path: str = "") -> str:
@@ -66,7 +76,7 @@ def behaviour_details(name: str) -> str:
     of = next(of for of in entries("behaviours") if of.name == name)
     module = getattr(behaviours, name).__module__
     target = f"```{{py:class}} swarmwire.agent.behaviours.{name}\n:canonical: {module}.{name}\n:no-typesetting:\n```\n"
-    facts = "".join(f"- {title}: {code(text)}\n" for title, text in of.facts)
+    facts = "".join(f"- {title}: {_setting(text)}\n" for title, text in of.facts)
     return "\n".join([target, facts, text_of(of), "", *_tables(of, set())])
 
 
@@ -228,8 +238,14 @@ def _by_table(parameters: Iterable[Parameter], seen: set[str], prefix: str) -> I
 
 def key_table(keys: Iterable[Parameter]) -> str:
     """A row for each parameter."""
-    rows = [(code(of.name), of.unit, of.expected, _default(of.value, of.required), sentence(of.help)) for of in keys]
+    rows = [(code(of.name), of.unit, _expected(of), _default(of.value, of.required), sentence(of.help)) for of in keys]
     return table(KEYS, rows)
+
+
+def _expected(of: Parameter) -> str:
+    """What a key expects; texts to choose from as TOML has them."""
+    found = CHOICES.fullmatch(of.expected)
+    return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}" if found else of.expected
 
 
 def _default(value: Any, required: bool) -> str:

@@ -125,7 +125,7 @@ def _chosen(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
     for choice, table in tables.items():
         for key in _keys(table, schema, f"{path}."):
             found.setdefault(key.name, {})[choice] = key
-    text = "\n\n".join(f"`{choice}`: {flowing(table.get('description'))}" for choice, table in tables.items())
+    text = "\n\n".join(f'`{tag} = "{choice}"`: {flowing(of.get("description"))}' for choice, of in tables.items())
     yield replace(_joined(found.pop(f"{path}.{tag}")), value=None, required=True, text=text)
     for keys in found.values():
         only = "" if len(keys) == len(tables) else f" (only with {tag} = {' or '.join(keys)})"
