@@ -61,7 +61,7 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 
 .PHONY: soak
 soak: sync ## fuzz every input (about 4 hours), then random faults, then an hour of a hundred processes
-	$(RUN) python -m tests.tools.fuzz
+	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py
 	$(RUN) python -m tests.tools.soak
 
 .PHONY: mutants

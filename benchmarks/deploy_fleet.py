@@ -17,16 +17,12 @@ import asyncssh
 
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.clock import WallClock, to_s
-from swarmwire.deploy.commands.robots.contents import contents_of
-from swarmwire.deploy.fleet.deploy import deploy
-from swarmwire.deploy.fleet.environment.environments import LockedEnvironments
-from swarmwire.deploy.fleet.environment.target import Target
-from swarmwire.deploy.fleet.fleet import Fleet
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.host_side.facts import facts
-from tests.support.deploy.fleet.fake_host import new_key, write_key
-from tests.support.deploy.fleet.small_fleet import AGENT
-from tests.support.deploy.fleet.sshd import SSHD
+from swarmwire.deploy.fleet.deploy import contents_of, deploy
+from swarmwire.deploy.fleet.fleet import Fleet, read_fleet
+from swarmwire.deploy.fleet.host_side.system import facts
+from swarmwire.deploy.fleet.packages import LockedEnvironments, Target
+from tests.support.deploy.fleet.fleets import AGENT
+from tests.support.deploy.fleet.hosts import SSHD, new_key, write_key
 
 KINDS = ("asyncssh", "openssh") if SSHD else ("asyncssh",)  # the last is the one that robots are more like
 FLEET = """format = 1

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import asyncssh
 
-from tests.support.deploy.fleet.fake_host import FakeHost, HostServers, host_servers
-from tests.support.deploy.fleet.sshd import openssh
+from tests.support.deploy.fleet.hosts import FakeHost, HostServers, host_servers, openssh
 
 
 def main() -> None:

@@ -1,21 +1,21 @@
 """What share of a run the metrics cost: those that are measured in every run, and all that there are."""
 
 import statistics
-from typing import Any
 
 from benchmarks.lines import print_line, spread
 from benchmarks.robot_steps import CASES
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import run
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario_file import scenario_from
 
 SETS = {"": None, "-all": list(METRICS)}  # by how the benchmark's name goes on
 
 
-class Timed:
+class Timed(Observer):
     """Observer that measures with each set of metrics in turn, and notes how long each takes in a tick."""
 
     def __init__(self) -> None:
@@ -37,10 +37,6 @@ class Timed:
             start_ns = self._clock.now_ns()
             metrics.see(truth)
             self.spent_ns[name].append(self._clock.now_ns() - start_ns)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing to tell."""
-        return {}
 
     def share_percent(self, name: str) -> float:
         """What a set would have cost of a run with it alone, the first tick left out."""

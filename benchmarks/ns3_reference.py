@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.deploy.radio.probe import radio_of
+from swarmwire.deploy.scenario_parts import radio_of
 
 REFERENCE = Path(__file__).parents[1] / "tests" / "support" / "comms" / "reference"
 PRESETS = {"802.15.4": "ieee802154", "802.11a 6 Mbit/s": "wifi-a-6M", "802.11b 1 Mbit/s": "wifi-b-1M"}

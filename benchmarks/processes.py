@@ -1,23 +1,23 @@
 """A process per robot: how fast the swarm runs, starts, and what each process costs."""
 
 import statistics
-from typing import Any
 from unittest.mock import patch
 
 import psutil
 
 from benchmarks import scenes
 from benchmarks.lines import report, spread
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.deploy.runners import RunnerProcesses
 from swarmwire.world.scenario_file import scenario_from
 
 PLAIN = "benchmarks.plain_agent_host"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
 
 
-class Consumption:
+class Consumption(Observer):
     """Observer that reads what the processes of a run take, at two of its ticks.
 
     Attributes:
@@ -31,9 +31,6 @@ class Consumption:
         self.first, self.last = first, last
         self.uss_mb, self.all_gb, self.runner_us, self.world_ms = list[float](), 0.0, 0.0, 0.0
         self._begun_s = (0.0, 0.0)
-
-    def begin(self, static: Static) -> None:
-        """Nothing to do."""
 
     def see(self, truth: Truth) -> None:
         """Read at two ticks; the memory at the first."""
@@ -54,10 +51,6 @@ class Consumption:
         self.world_ms = (its_s - self._begun_s[0]) / ticks * 1e3
         self.runner_us = (theirs_s - self._begun_s[1]) / ticks / len(runners) * 1e6
         self._begun_s = its_s, theirs_s
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """No part of the summary."""
-        return {}
 
 
 def _processor_s(process: psutil.Process) -> float:

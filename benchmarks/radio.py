@@ -19,7 +19,7 @@ from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
-from swarmwire.deploy.radio.probe import radio_of
+from swarmwire.deploy.scenario_parts import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10
 STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis

@@ -9,8 +9,9 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, run
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.record.recorders import recorders
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import recorders
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 
@@ -18,7 +19,7 @@ from swarmwire.world.scenario_file import scenario_from
 def one_run(scenario: Scenario, folder: Path | None) -> tuple[float, Result]:
     """Seconds from the first tick until everything is on disk and joined, and what came of the run."""
     clock, metrics = WallClock(), Metrics()  # measured a second time in both runs: the recorder reads these
-    observers: list[Observer] = [metrics, *(recorders(folder, metrics, clock) if folder else [])]
+    observers: list[Observer] = [metrics, *(recorders(RecordOptions(folder, metrics, clock)) if folder else [])]
     called_ns = clock.now_ns()
     result = run(scenario, observers=observers)
     return to_s(clock.now_ns() - called_ns) - result.start_time_s, result

@@ -1,6 +1,5 @@
 """What a report of a large campaign takes: time and memory of the command, in a process of its own."""
 
-import json
 import os
 import statistics
 import subprocess
@@ -17,13 +16,14 @@ from benchmarks.lines import print_line, spread
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.metrics.campaign import spec
+from swarmwire.metrics.campaign.spec import Campaign, Response
 
 LOSSES = tuple(place / 20 for place in range(10))
 COUNTS = (5, 10, 20, 40, 80)
 LIMIT_S = 600.0
 METRICS = ("order", "largest_component", "min_gap", "collisions", "target_best", "target_mean", "components")
 TIMES = ("aggregation_time_s", "stop_time_s")
-PLAIN = {"help": "made up", "listed": False, "hold_s": 0.0}  # of a response
 
 
 def report_cost(name: str, repeats: int, *, seeds: int) -> None:
@@ -66,7 +66,7 @@ def write_campaign(folder: Path, seeds: int) -> int:
         time_s = -100.0 * (1.0 + 8.0 * loss) * (20.0 / count) ** 0.5 * np.log(1.0 - _drawn(run, time))
         columns[time] = [value if value < LIMIT_S else None for value in time_s.tolist()]
     pl.DataFrame(columns).write_parquet(folder / "summary.parquet")
-    (folder / "campaign.json").write_text(json.dumps(_about(points, seeds)), encoding="utf-8")
+    spec.write_campaign(_about(points, seeds), folder)
     return len(run)
 
 
@@ -74,25 +74,29 @@ def _drawn(run: IntArray, what: str) -> FloatArray:
     return uniform(derive_key("report-cost"), purpose(what), 0, run, 0)
 
 
-def _about(points: list[tuple[float, int]], seeds: int) -> dict[str, Any]:
+def _about(points: list[tuple[float, int]], seeds: int) -> Campaign:
     numbers = [*(f"{metric}.final" for metric in METRICS), "radio.link_pdr"]
-    responses = [{"column": column, "unit": "", "kind": "number", **PLAIN} for column in numbers]
-    responses += [{"column": column, "unit": "s", "kind": "time", **PLAIN} for column in TIMES]
-    return {
-        "format": 1,
-        "name": "made up",
-        "scenario": "made up",
-        "command": "none",
-        "began_utc": "",
-        "versions": {},
-        "cpu": "",
-        "modules": {},
-        "files": [],
-        "design": "grid",
-        "seeds": list(range(1, seeds + 1)),
-        "vary": {"radio.loss": list(LOSSES), "robots.flock.count": list(COUNTS)},
-        "points": [{"radio.loss": loss, "robots.flock.count": count} for loss, count in points],
-        "overrides": [],
-        "duration_s": LIMIT_S,
-        "responses": responses,
-    }
+    responses = [Response(column, "", "number", "made up") for column in numbers]
+    responses += [Response(column, "s", "time", "made up") for column in TIMES]
+    return Campaign(
+        scenario="made up",
+        command="none",
+        began_utc="",
+        versions={},
+        cpu="",
+        modules={},
+        files=(),
+        name="made up",
+        design="grid",
+        seeds=tuple(range(1, seeds + 1)),
+        vary={"radio.loss": list(LOSSES), "robots.flock.count": list(COUNTS)},
+        points=tuple({"radio.loss": loss, "robots.flock.count": count} for loss, count in points),
+        overrides=(),
+        point_overrides=((),) * len(points),
+        duration_s=LIMIT_S,
+        robots=max(COUNTS),
+        responses=tuple(responses),
+        series=False,
+        record_seeds=(),
+        batch=None,
+    )

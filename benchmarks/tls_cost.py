@@ -24,10 +24,10 @@ from swarmwire.comms.wire.access_control import RunAccess, agents_access
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import unix_endpoint
 from swarmwire.deploy import Simulation
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.folder_access import network_in
-from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.new_medium import new_medium
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.member import network_in
+from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
@@ -144,7 +144,12 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
 def _certificates(folder: Path, names: tuple[str, ...]) -> Path:
     begin_authority(folder, WallClock())
     here = ("127.0.0.1",)
-    issue(folder, [wanted("world", here), *(wanted(name, here, "runner") for name in names)], 1, WallClock())
+    issue(
+        folder,
+        [certificate_request("world", here), *(certificate_request(name, here, "runner") for name in names)],
+        1,
+        WallClock(),
+    )
     return folder
 
 

@@ -8,14 +8,15 @@ from typing import Any
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.world.scenario_file import scenario_from
 
 
-class Timed:
+class Timed(Observer):
     """Observer that records for the viewer, and notes how long that takes in each tick."""
 
     def __init__(self, rrd: Path) -> None:

@@ -25,7 +25,8 @@ from benchmarks import scenes
 from benchmarks.echoes import RUN
 from benchmarks.lines import report
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames, tick_frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
@@ -60,16 +61,13 @@ class Floor:
         return CLOCK.now_ns() * 1e-9 - start_s
 
 
-class Stopwatch:
+class Stopwatch(Observer):
     """Observer that times ticks, and between some of them the floor."""
 
     def __init__(self, floor: Floor) -> None:
         self._floor = floor
         self._since_s = 0.0
         self.tick_s, self.floor_s, self.agents_s = list[float](), list[float](), list[float]()
-
-    def begin(self, static: Static) -> None:
-        """Nothing to do."""
 
     def see(self, truth: Truth) -> None:
         """The end of a tick."""
@@ -81,10 +79,6 @@ class Stopwatch:
             self._floor.tick_s()  # the first after a while finds its processes cold
             self.floor_s += [self._floor.tick_s() for _ in range(3)]
         self._since_s = CLOCK.now_ns() * 1e-9
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """No part of the summary."""
-        return {}
 
 
 def wire_over_floor(name: str, repeats: int, *, robots: int, ticks: int) -> None:

@@ -11,14 +11,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks.targets import TARGETS
-from docs.behaviours import places as of_behaviours
+from docs.behaviours import shown as of_behaviours
 from docs.behaviours.degradation import LATENCY, LOSS, degradation_of
 from docs.behaviours.shown import SHOWN
-from docs.experiments.digest import digests
-from docs.experiments.drawing import with_numbers
-from docs.experiments.experiment import Experiment, find_experiment
+from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
 from docs.experiments.experiment import names as experiments
-from docs.experiments.places import HERE, Places
+from docs.experiments.making import digests, with_numbers
 from docs.fault_checks import fault_tables
 from docs.pictures.radio.__main__ import FIGURES
 from docs.protocol_checks import protocol_page
@@ -26,9 +24,8 @@ from swarmwire.agent import behaviours
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-from swarmwire.deploy.campaign.plan import planned
-from swarmwire.deploy.fleet.fleet_keys import OF_FLEET, OF_ROBOT
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.fleet.fleet import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
 ROOT = Path(__file__).parents[1]
@@ -91,12 +88,15 @@ def behaviour_pages() -> Problems:
 
 def _whole_campaign(name: str, places: Places) -> Problems:
     file = places.campaigns / f"{name}.toml"
-    table = campaign_table(file)
-    plan = planned(asked_in(file, table or {}))
+    campaign = campaign_file(file)
+    if campaign is None:
+        yield f"{file}: is a scenario, not a campaign"
+        return
+    plan = plan_of(spec_in(file, campaign))
     [data] = digests(degradation_of(name, places), places).values()
     levels = [plan.vary()[path] for path in plan.vary()]
     same = [sorted(data[LOSS].unique()), sorted(data[LATENCY].unique())] == levels
-    if not same or set(data["seed"]) != set(plan.asked.seeds) or len(data) != len(plan.points) * len(plan.asked.seeds):
+    if not same or set(data["seed"]) != set(plan.spec.seeds) or len(data) != len(plan.points) * len(plan.spec.seeds):
         yield f"{places.data / name}.parquet: is not of the whole campaign {file.name}"
 
 
@@ -141,7 +141,10 @@ def fleet_keys() -> Problems:
     """The page about fleets has a row for every key of `fleet.toml`."""
     rows = [line.split("|")[1] for line in _text("docs/fleet.md").splitlines() if line.startswith("| `")]
     told = {name for row in rows for name in row.split("`")[1::2]}
-    yield from (f"docs/fleet.md: has no row for {key}" for key in sorted({*OF_FLEET, *OF_ROBOT} - told))
+    yield from (
+        f"docs/fleet.md: has no row for {key}"
+        for key in sorted({*FleetTable.model_fields, *RobotTable.model_fields} - told)
+    )
 
 
 def robot_bytes() -> Problems:

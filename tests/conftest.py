@@ -18,7 +18,8 @@ import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, Phase, settings
 
-# The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`.
+# The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`, `soak` for
+# `make soak`, in which tests/integration/test_fuzz.py goes on for hours.
 _SHARED: dict[str, Any] = {
     "deadline": None,
     "derandomize": True,
@@ -29,6 +30,7 @@ _SHARED: dict[str, Any] = {
 }
 settings.register_profile("quick", max_examples=20, **_SHARED)
 settings.register_profile("full", max_examples=100, **_SHARED)
+settings.register_profile("soak", max_examples=1000, **_SHARED)
 PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "quick")
 settings.load_profile(PROFILE)
 
@@ -36,7 +38,17 @@ UNIT = f"{Path(__file__).parent}/unit/"
 UNIT_LIMIT_S = float(os.environ.get("UNIT_LIMIT_S", "2"))  # of processor time, so that a busy machine fails no test
 # The order of the unit tests, by the start of their path. Of two workers the first then compiles the kernels of radio
 # and world, each once, while the second runs tests that need none of them; whole runs, which need all, come last.
-ORDER = ("comms/radio", "comms/geometry", "comms/events", "world", "agent/behaviours", "metrics", "", "deploy", "test_")
+ORDER = (
+    "comms/radio",
+    "comms/test_geometry",
+    "comms/test_events",
+    "world",
+    "agent/behaviours",
+    "metrics",
+    "",
+    "deploy",
+    "test_",
+)
 # Tracing and Python in place of kernels slow all tests down; the full profile has more examples of each.
 LIMITED = PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT
 CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"

@@ -6,11 +6,10 @@ import typer
 from rich.console import Console
 
 from docs.behaviours.degradation import degradation_of
-from docs.behaviours.picture import draw_picture
-from docs.behaviours.places import HERE, names
-from docs.behaviours.shown import find_shown
-from docs.experiments.command import run_app
-from swarmwire.deploy.commands.help_text import flowing
+from docs.behaviours.shown import HERE, draw_picture, find_shown, names
+from docs.experiments.making import draw, run, run_app
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.catalogue.docstrings import flowing
 
 ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
 
@@ -42,18 +41,14 @@ def picture_command(asked: Names = None) -> None:
 @app.command("degrade")
 def degrade_command(asked: Names = None, workers: Workers = None) -> None:
     """Sweep what is missing of the campaign, digest it, and draw the figure and the numbers from the digest."""
-    from docs.experiments.running import run
-    from swarmwire.deploy.campaign.sweeping import Means
-
     for name in asked or names(HERE):
-        typer.echo(run(degradation_of(name, HERE), HERE, None, Means(workers=workers), Console(highlight=False)))
+        options = ExecutionOptions(workers=workers)
+        typer.echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
 
 
 @app.command("draw")
 def draw_command(asked: Names = None) -> None:
     """Draw the figure, and put the numbers into the page, from the digest that is there."""
-    from docs.experiments.drawing import draw
-
     for name in asked or names(HERE):
         typer.echo(draw(degradation_of(name, HERE), HERE))
 

@@ -9,13 +9,11 @@ import numpy as np
 import polars as pl
 
 from docs.behaviours.shown import Shown, find_shown
-from docs.experiments.experiment import Experiment
-from docs.experiments.places import Places
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.report.figures.column_axes import plain_legend
-from swarmwire.metrics.report.figures.response_curve import MedianLine, response_curve
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample
+from docs.experiments.experiment import Experiment, Places
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.report.axes import plain_legend
+from swarmwire.metrics.report.charts import MedianLine, response_curve
+from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.summary import summary
 
 LOSS, LATENCY = "loss", "latency_s"

@@ -1,8 +1,10 @@
-"""What is shown of each behaviour: the picture's trails and metrics, and the response that loss and latency spoil."""
+"""What is shown of each behaviour: a picture with trails and metrics, and the response that loss and latency spoil."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from docs.experiments.places import Places
+from docs.experiments.experiment import ROOT, Places
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
@@ -10,6 +12,17 @@ PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' re
 BEFORE_WALLS = "oscillation", "deadlocked"  # how robots fare that something holds up
 CONTACTS = "contacts between robots per robot-hour"
 FOUND = "time until half of them are at the light, s"
+SCENARIOS = ROOT / "scenarios" / "behaviours"
+HERE = Places(
+    figures=ROOT / "docs" / "behaviours",
+    campaigns=SCENARIOS / "campaigns",
+    swept=ROOT / "campaigns" / "behaviours",
+    data=ROOT / "docs" / "behaviours" / "data",
+    pages=ROOT / "docs" / "behaviours",
+    figure_ending="-degradation.svg",
+)
+SIZE_PX = 960
+COLORS = 128
 
 
 @dataclass(frozen=True)
@@ -65,3 +78,29 @@ def find_shown(name: str, places: Places) -> Shown:
     if not campaign.exists():
         raise BadInput(str(campaign), "", "is missing: expected the campaign of a behaviour")
     return SHOWN[name]
+
+
+def names(places: Places) -> tuple[str, ...]:
+    """Of all behaviours that have a campaign, in the order of the alphabet."""
+    return tuple(sorted(file.stem for file in places.campaigns.glob("*.toml")))
+
+
+def draw_picture(name: str, places: Places) -> Path:
+    """Run the behaviour's scenario and draw it into NAME.png; where that is."""
+    from PIL import Image
+
+    from swarmwire.deploy import Recording, run
+    from swarmwire.metrics.drawing.animation import FilmFigure
+    from swarmwire.metrics.drawing.film import film_of
+    from swarmwire.metrics.run_folder.reader import RunFolder
+
+    shown, to = find_shown(name, places), places.pages / f"{name}.png"
+    with TemporaryDirectory() as folder:
+        run(SCENARIOS / f"{name}.toml", out=folder, record=Recording(rrd=False))
+        film = film_of(RunFolder(Path(folder)), 0, name)
+        figure = FilmFigure(film, SIZE_PX, [*shown.metrics], shown.trail_s)
+        at = len(film.time_s) - 1 if shown.at_s is None else film.index_at(shown.at_s)
+        picture = Path(folder) / to.name
+        figure.save(at, picture)
+        Image.open(picture).convert("RGB").quantize(COLORS).save(to, optimize=True)
+    return to

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from docs.experiments.command import run_app
-from docs.experiments.experiment import find_experiment, names
-from docs.experiments.places import HERE
-from swarmwire.deploy.commands.help_text import flowing
+from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.making import digest, draw, run, run_app
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.catalogue.docstrings import flowing
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
 
@@ -35,8 +35,6 @@ def draw_command(
     asked: Annotated[list[str] | None, typer.Argument(help="Experiments; all without.", metavar="NAME…")] = None,
 ) -> None:
     """Draw NAME.svg from the digests that are there, and put the numbers into NAME.md."""
-    from docs.experiments.drawing import draw
-
     for name in asked or names(HERE):
         experiment = find_experiment(name, HERE)
         typer.echo(draw(experiment, HERE))
@@ -55,8 +53,6 @@ def digest_command(
     ] = None,
 ) -> None:
     """Keep of finished campaigns what the figure and the numbers are made from."""
-    from docs.experiments.digest import digest
-
     for file in digest(find_experiment(name, HERE), HERE, folders or ()):
         typer.echo(f"written: {file}")
 
@@ -78,11 +74,8 @@ def run_command(
     Campaigns lie in campaigns/papers. One that is finished is not run again; of one that was ended, by Ctrl-C or a
     kill, what is missing is run.
     """
-    from docs.experiments.running import run
-    from swarmwire.deploy.campaign.sweeping import Means
-
     console = Console(highlight=False)
-    typer.echo(run(find_experiment(name, HERE), HERE, seeds, Means(workers=workers), console))
+    typer.echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""An experiment, as its file among the figures describes it.
+"""An experiment, as its file among the figures describes it, and where what belongs to it lies.
 
 CAMPAIGNS = ("vicsek", "dense")      campaign files, and what their digests are called
 COLUMNS = ("order.mean",)            responses that the digests keep
@@ -8,20 +8,49 @@ def digested(folder, runs): ...      where a choice of columns is not enough: fr
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import getdoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from docs.experiments.places import Places
+import polars as pl
+
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 
-if TYPE_CHECKING:
-    import polars as pl
-
+ROOT = Path(__file__).parents[2]
 NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "told")
+
+
+@dataclass(frozen=True)
+class Places:
+    """Folders of experiments: what is written by hand, and what their commands make."""
+
+    figures: Path  # NAME.py: what is kept, drawn and told
+    campaigns: Path  # CAMPAIGN.toml, as `swarmwire sweep` takes them
+    swept: Path  # CAMPAIGN/: folders of campaigns
+    data: Path  # CAMPAIGN.parquet: digests of them
+    pages: Path  # figures, and NAME.md if there is a page
+    figure_ending: str = ".svg"  # of a figure's name, after the experiment's
+
+    def figure_of(self, name: str) -> Path:
+        """Where the figure of an experiment lies."""
+        return self.pages / f"{name}{self.figure_ending}"
+
+    def trial(self, seeds: str) -> "Places":
+        """The same with all that is made put aside: a trial with a few seeds must not replace what is published."""
+        aside = self.swept / f"seeds-{seeds.replace(':', '-').replace(',', '-')}"
+        return replace(self, swept=aside, data=aside / "data", pages=aside)
+
+
+HERE = Places(
+    figures=ROOT / "docs" / "experiments" / "figures",
+    campaigns=ROOT / "scenarios" / "papers",
+    swept=ROOT / "campaigns" / "papers",
+    data=ROOT / "docs" / "experiments" / "data",
+    pages=ROOT / "docs" / "experiments",
+)
 
 
 @dataclass(frozen=True)
@@ -34,15 +63,15 @@ class Experiment:
     columns: tuple[str, ...]
     module: Any
 
-    def draw(self, runs: "Mapping[str, pl.DataFrame]") -> Any:
+    def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
         """The matplotlib figure."""
         return self.module.draw(runs)
 
-    def told(self, runs: "Mapping[str, pl.DataFrame]") -> str:
+    def told(self, runs: Mapping[str, pl.DataFrame]) -> str:
         """The numbers, as Markdown."""
         return str(self.module.told(runs)).strip()
 
-    def digested(self, folder: Path, runs: "pl.DataFrame") -> "pl.DataFrame | None":
+    def digested(self, folder: Path, runs: pl.DataFrame) -> pl.DataFrame | None:
         """Its own digest of a campaign; None: it is content with a choice of columns."""
         return self.module.digested(folder, runs) if hasattr(self.module, "digested") else None
 

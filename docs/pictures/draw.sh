@@ -9,18 +9,18 @@ trap 'rm -rf "$runs"' EXIT
 swarmwire run scenarios/flocking-disrupted.toml --quiet --select flock-8 --out "$runs/flocking-disrupted"
 swarmwire run scenarios/split.toml --quiet --out "$runs/split"
 swarmwire run scenarios/pso.toml --quiet --out "$runs/pso"
-swarmwire screenshot "$runs/flocking-disrupted" --tick 300 --to docs/rerun.png
-swarmwire export "$runs/flocking-disrupted" --gif --to docs/demo.gif
-swarmwire export "$runs/split" --png 35 --to docs/split.png
-swarmwire export "$runs/pso" --png 55 --to docs/pso.png
+swarmwire export "$runs/flocking-disrupted" --kind viewer --at 30 --to docs/rerun.png
+swarmwire export "$runs/flocking-disrupted" --to docs/demo.gif
+swarmwire export "$runs/split" --at 35 --to docs/split.png
+swarmwire export "$runs/pso" --at 55 --to docs/pso.png
 swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"
-swarmwire export "$runs/drones" --png 50 --to docs/drones.png
+swarmwire export "$runs/drones" --at 50 --to docs/drones.png
 for body in epuck epuck2 flockbot footbot kilobot point turtlebot3-burger; do
   swarmwire draw "$body" --size 900 --to "docs/bodies/$body.png"
 done
 swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
-swarmwire export "$runs/warehouse" --pdr --to docs/delivery.png
+swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages

@@ -6,16 +6,15 @@ uv run python docs/pictures/panel.py
 import io
 import re
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel_view import panel_view
+from swarmwire.deploy.terminal.panel import panel_view
 from swarmwire.world.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]
@@ -25,7 +24,7 @@ AT_TICK = 420
 RUNNERS = 4
 
 
-class Picture:
+class Picture(Observer):
     """Observer that draws the panel of one tick and ends the run."""
 
     def __init__(self, simulation: Simulation, console: Console) -> None:
@@ -43,10 +42,6 @@ class Picture:
             simulation = self._simulation
             self._console.print(panel_view(self._figures, simulation.controls, simulation.health(), WIDTH, keys=True))
             simulation.controls.quit()
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing is left to draw."""
-        return {}
 
 
 def main() -> None:

@@ -12,8 +12,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.sensors.sensor import Field, Noise, RangedSensorSpec
 from swarmwire.comms.truth import Group
-from swarmwire.metrics.drawing.canvas import save
-from swarmwire.metrics.drawing.looks import FAINT
+from swarmwire.metrics.drawing.canvas import FAINT, save
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Sensor
 

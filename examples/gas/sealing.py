@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)
@@ -18,9 +17,9 @@ class Sealing(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        def measure(moment: Moment):
-            states, state = moment.truth.states, moment.truth.state.reshape(moment.alive.shape)
+        def measure(view: TickView):
+            states, state = view.truth.states, view.truth.state.reshape(view.alive.shape)
             sealing = state == states.index("sealing") if "sealing" in states else state < 0
-            return moment.sum_alive(sealing.astype(np.float64)) / moment.per_robot_alive
+            return view.sum_alive(sealing.astype(np.float64)) / view.per_robot_alive
 
         return measure

@@ -9,13 +9,12 @@ import pytest
 from rich.console import Console
 
 from docs.behaviours.degradation import degradation_of
-from docs.behaviours.places import HERE, SCENARIOS
-from docs.behaviours.shown import find_shown
-from docs.experiments.running import run as run_experiment
+from docs.behaviours.shown import HERE, SCENARIOS, find_shown
+from docs.experiments.making import run as run_experiment
 from swarmwire.agent import behaviours
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.deploy.campaign.sweeping import Means
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
 
 CLASSES: dict[str, Any] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): getattr(behaviours, name) for name in behaviours.__all__
@@ -44,7 +43,7 @@ overrides = ['duration_s = 20', 'robots.nodes.count = 4', 'arena.size_m = [1.0, 
 "radio.latency_s" = [0.0, 0.5]
 """)
     own = replace(HERE, campaigns=tmp_path, swept=tmp_path / "swept", data=tmp_path / "data", pages=tmp_path)
-    told = run_experiment(degradation_of("consensus", own), own, None, Means(workers=1), Console(quiet=True))
+    told = run_experiment(degradation_of("consensus", own), own, None, ExecutionOptions(workers=1), Console(quiet=True))
     rows = [line.split("|")[1:-1] for line in told.splitlines() if "%" in line and "|" in line]
     assert [row[0].strip() for row in rows] == ["0 %", "100 %"]
     soon, late = (float(cell.split()[0]) for cell in rows[0][1:])

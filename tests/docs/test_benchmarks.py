@@ -3,7 +3,7 @@
 from benchmarks.report_cost import write_campaign
 from benchmarks.table import rows
 from benchmarks.targets import Target, most
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
+from swarmwire.metrics.campaign.folder import CampaignFolder
 
 
 def test_a_target_is_met_on_its_own_side():

@@ -15,9 +15,8 @@ import pytest
 from swarmwire.deploy import run
 from tests.docs.pages import ROOT, commands_of
 from tests.docs.test_pages import UV
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.machines.namespaces import Machine, machines
-from tests.support.deploy.machines.on_machines import Started
+from tests.support.deploy.machines import Machine, Started, machines
+from tests.support.deploy.runs import LOSSY
 
 PAGE = "docs/machines.md"
 NAMES = ("lab", "gate", "laptop")

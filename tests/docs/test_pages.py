@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.deploy import run
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
-from tests.support.deploy.commands import called
+from tests.support.deploy.runs import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")

@@ -22,11 +22,11 @@ from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.cli.app import app
 from tests.docs.pages import ROOT, blocks_of, files_of
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
 TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
@@ -77,7 +77,12 @@ def test_the_rehearsal_on_the_page_moves_robots_that_hear_one_another(tmp_path, 
 def feed(tmp_path) -> Path:
     """The page's program, beside a folder with the certificates of a robot and of the tracker."""
     begin_authority(tmp_path / "lab-ca", WallClock())
-    issue(tmp_path / "lab-ca", [wanted(name, ("127.0.0.1",)) for name in ("flock-0", "tracker")], 1, WallClock())
+    issue(
+        tmp_path / "lab-ca",
+        [certificate_request(name, ("127.0.0.1",)) for name in ("flock-0", "tracker")],
+        1,
+        WallClock(),
+    )
     file = tmp_path / "pose_feed.py"
     file.write_text(files_of(PAGE)[file.name])
     return file
@@ -112,7 +117,7 @@ def test_a_single_line_of_a_camera_becomes_a_pose_by_the_tracker_s_certificate(f
 
 def test_a_camera_with_the_certificate_of_another_ca_is_told_that_nobody_listens(feed, tmp_path):
     begin_authority(tmp_path / "other", WallClock())
-    issue(tmp_path / "other", [wanted("tracker", ())], 1, WallClock())
+    issue(tmp_path / "other", [certificate_request("tracker", ())], 1, WallClock())
     with listening(tmp_path / "lab-ca") as (tracker, endpoints):
         done = fed(feed, endpoints, tmp_path / "other")
         assert done.returncode == 1

@@ -24,7 +24,7 @@ from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
 from swarmwire.deploy import run
-from swarmwire.deploy.cli import app
+from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.scenario_file import scenario_schema
@@ -80,7 +80,8 @@ def test_the_scenario_page_tells_every_tables_rows_once(site):
     texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
     assert sum("probability that a packet within reach is lost" in text.lower() for text in texts) == 1
     assert sum("drawn; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
-    assert any(row.count("required") == 1 and "duration_s" in row and "in s, above 0" in row for row in texts)
+    cells = [text.strip().split("\n") for text in texts]
+    assert ["duration_s", "s", "a number above 0 and at most 1000000000", "required", "Length of the run."] in cells
 
 
 def test_the_events_have_a_section_each(site):
@@ -153,7 +154,8 @@ def test_the_command_line_page_names_every_command_and_option(site):
     group: Any = get_command(app)
     for name, command in commands_within(group):
         assert name in named
-        for option in (option for of in command.params for option in of.opts if option.startswith("--")):
+        shown = [of for of in command.params if not getattr(of, "hidden", False)]
+        for option in (option for of in shown for option in of.opts if option.startswith("--")):
             assert any(option in item for item in named), option
     assert "runs/<scenario>-s<seed>-<UTC>" in html.unescape(page(site, "command-line"))  # no tags, no dashes
     assert "Without --realtime" in page(site, "command-line")

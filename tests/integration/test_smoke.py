@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.deploy import Result, RunFolder, run
-from tests.support.deploy.commands import LOSSY, ROOT, called, family, runners_of, started
+from tests.support.deploy.runs import LOSSY, ROOT, called, family, runners_of, started
 from tests.support.robots.rigs import RIGS
 
 MAIN = ("avoidance", "flocking", "flocking-lossy", "pso", "flocking-disrupted", "flocking-802154")

@@ -1,9 +1,16 @@
-"""Clocks that a test moves."""
+"""Clocks that tests drive, and waiting for other threads and processes."""
 
-from swarmwire.comms.clock import NS_PER_S
+from collections.abc import Callable
+from threading import Event
+from typing import TypeVar
+
+from swarmwire.comms.clock import NS_PER_S, WallClock, to_ns
 
 MS = NS_PER_S // 1000
 ORIGIN_NS = 77  # clocks count from anywhere
+TIMEOUT_S = 60.0  # of a machine that is busy: whatever holds does so in milliseconds
+EACH_S = 0.005
+T = TypeVar("T")
 
 
 class FakeClock:
@@ -42,3 +49,13 @@ class GoingClock(FakeClock):
     def now_ns(self) -> int:
         self.time_ns += self._step_ns
         return self.time_ns
+
+
+def until(look: Callable[[], T], holds: Callable[[T], object] = bool) -> T:
+    """What `look` returns as soon as it `holds`; AssertionError if it does not in a minute."""
+    clock, pause = WallClock(), Event()
+    end_ns = clock.now_ns() + to_ns(TIMEOUT_S)
+    while not holds(found := look()):
+        assert clock.now_ns() < end_ns, f"it did not come to hold; last seen: {found!r}"
+        pause.wait(EACH_S)
+    return found

@@ -15,7 +15,7 @@ from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 ANY_PORT = ("tcp/127.0.0.1:0",)
 ROBOTS = ("flock-0", "flock-1", "flock-2")

@@ -1,4 +1,4 @@
-"""What is written for another version is refused where it is read, in one line that says what was expected."""
+"""What users rely on is only changed on purpose, and what is written for another version is refused in one line."""
 
 import json
 from collections.abc import Callable
@@ -19,29 +19,30 @@ from swarmwire.comms.wire import control_frames, frames, observer_frames
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.radio_bridge import BridgeInfo
 from swarmwire.deploy import RunFolder
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.campaign_file import campaign_table
+from swarmwire.deploy.campaign.spec import campaign_file
 from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet_file import read_fleet
+from swarmwire.deploy.fleet.fleet import read_fleet
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
-from swarmwire.deploy.record.origin import read_origin
-from swarmwire.deploy.tuning.tuning import read_tuning
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.real_log.about import read_about_robot
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.deploy.record.provenance import read_facts
+from swarmwire.deploy.tuning.spec import read_tuning
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import read_campaign
+from swarmwire.metrics.real_log.robot_log import read_about_robot
+from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.agent.runners import assigned_robots
+from tests.tools.stable import kept
 
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": ("scenario.toml", load_scenario),
-    "campaign file": ("campaign.toml", campaign_table),
+    "campaign file": ("campaign.toml", campaign_file),
     "fleet": ("fleet.toml", read_fleet),
     "robot settings": ("robot.toml", lambda at: read_settings(at, {})),
     "summary": ("summary.json", lambda at: RunFolder(at.parent).summary),
     "static": ("static.json", lambda at: RunFolder(at.parent).static),
     "tables": ("static.json", lambda at: RunFolder(at.parent).ticks()),
     "run": ("run.json", lambda at: RunFolder(at.parent).measured),
-    "run to repeat": ("run.json", lambda at: read_origin(at.parent)),
+    "run to repeat": ("run.json", lambda at: read_facts(at.parent)),
     "campaign": ("campaign.json", lambda at: read_campaign(at.parent)),
     "campaign results": ("campaign.json", lambda at: CampaignFolder(at.parent)),
     "tuning": ("tuning.json", lambda at: read_tuning(at.parent)),
@@ -167,3 +168,26 @@ def test_an_agent_that_names_another_version_is_refused_and_one_that_names_this_
     for other in (API_VERSION - 1, API_VERSION + 1):
         with pytest.raises(NoAgent, match=rf"\.api: expected {API_VERSION}[^\n]*, got {other}$"):
             load_mine(tmp_path, other)
+
+
+DECIDE = (
+    "no longer there. If that is wanted, raise the version (docs/stability.md says where it stands), tell users in "
+    "CHANGELOG.md, and write the list again: `python -m tests.tools.stable.kept`."
+)
+
+
+@pytest.mark.parametrize("name", kept.STABLE)
+def test_nothing_that_users_rely_on_is_removed(name: str):
+    assert kept.removed(name) == [], DECIDE
+
+
+def test_an_addition_passes_and_a_removal_or_a_change_does_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "keys.txt").write_text("# one\na: number\n# two\na: number\nb: text\n")
+    monkeypatch.setattr(kept, "place_of", lambda name: tmp_path / f"{name}.txt")
+    for now, removed in (
+        ("# one\na: number\nz: new\n# two\nb: text\na: number\n# three\n", []),
+        ("# one\na: number\n# two\nb: text\n", ["# two: a: number"]),
+        ("# one\na: number\n# two\na: number\nb: number\n", ["# two: b: text"]),
+    ):
+        monkeypatch.setitem(kept.STABLE, "keys", lambda text=now: text)
+        assert kept.removed("keys") == removed

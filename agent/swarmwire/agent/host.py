@@ -353,12 +353,19 @@ def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
 
 
 def _failed(robots: list[str], error: BaseException, context: StepContext | None = None) -> AgentFailed:
-    """The failure of an agent: its time, and the traceback from the agent's own code on."""
-    frames = error.__traceback__
-    while frames is not None and frames.tb_frame.f_globals["__name__"] in (__name__, make.__module__):
-        frames = frames.tb_next
+    """The failure of an agent: its time, and the traceback of the agent's own lines."""
+    told = traceback.TracebackException.from_exception(error)
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    agents = [place for place, name in enumerate(modules) if not _is_machinery(name)]
+    if agents:  # what called the agent, and what it called, is no line of the agent's
+        told.stack = traceback.StackSummary.from_list(told.stack[agents[0] : agents[-1] + 1])
     when = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
-    return AgentFailed(robots_text(robots), "".join(traceback.format_exception(type(error), error, frames)) + when)
+    return AgentFailed(robots_text(robots), "".join(told.format()) + when)
+
+
+def _is_machinery(module: str) -> bool:
+    """Whether it is a module of swarmwire's, but of no agent."""
+    return module.startswith("swarmwire.") and not module.startswith("swarmwire.agent.behaviours")
 
 
 def _of_rows(received: ReceivedPackets, rows: IntArray) -> ReceivedPackets:

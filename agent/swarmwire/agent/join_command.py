@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.agent.runner import Arrivals
 
-ABOUT = """Play robots of a run that a world elsewhere has opened with `swarmwire world`.
+ABOUT = """Run the agents of robots of a run that `swarmwire world` has opened elsewhere.
 
 The agent is the one that is installed here; its file must be the same as the world's."""
 

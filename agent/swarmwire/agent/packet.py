@@ -33,6 +33,14 @@ class NotDeclared(AttributeError):
     """An agent reads a sensor or a measurement that its `needs` do not name."""
 
 
+def undeclared(need: str, needs: tuple[str, ...], of: str = "") -> NotDeclared:
+    """The error, with the declaration that mends it; `of` says of what it was read."""
+    named, mended = ", ".join(needs) or "none", ", ".join(f'"{name}"' for name in (*needs, need))
+    return NotDeclared(
+        f"reads {need!r}{of}, which its needs do not list ({named}); declare needs = ({mended}{'' if needs else ','})"
+    )
+
+
 class Columns:
     """The fields of k messages of one class, each a float64 array (k,) under its own name."""
 
@@ -193,5 +201,5 @@ class Packet(Generic[M]):
 def measured_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
     """A measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
     if need not in needs:
-        raise NotDeclared(f"reads {need!r} of a packet, which its needs do not name: {', '.join(needs) or 'none'}")
+        raise undeclared(need, needs, " of a packet")
     return table.given[column]

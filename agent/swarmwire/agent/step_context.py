@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.packet import NotDeclared, Packets, ReceivedLists
+from swarmwire.agent.packet import Packets, ReceivedLists, undeclared
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import IncompatibleBody
@@ -233,4 +233,4 @@ class StepContext:
 
     def _require(self, need: str) -> None:
         if need not in self.needs:
-            raise NotDeclared(f"reads {need!r}, which its needs do not name: {', '.join(self.needs) or 'none'}")
+            raise undeclared(need, self.needs)

@@ -6,6 +6,7 @@ errors. `did_you_mean` names the known keys in an error about an unknown one.
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field
@@ -13,12 +14,17 @@ from difflib import get_close_matches
 from enum import IntEnum
 from math import isfinite
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Any, Self, TypeVar, cast
+
+import msgspec
 
 from swarmwire.comms.errors import BadInput
 
+T = TypeVar("T")
+
 FORMAT_KEY = "format"  # in a file: the version of its format
 MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # in msgpack
+MISSING_FIELD = re.compile(r"Object missing required field `(\w+)`")  # as msgspec says it
 TOO_DEEP = "lists or tables within one another, too many to be meant"
 
 
@@ -94,16 +100,17 @@ class ExplainedEnum(IntEnum):
 
 
 def did_you_mean(known: Iterable[str], name: object = None) -> str:
-    """The text "one of a, b, c" for an error about an unknown `name`, with a suggestion if a known name is close to it.
+    """The text "one of a, b, c" for an error about an unknown `name`; a known name close to it stands first.
 
-    >>> did_you_mean(["range_m", "loss"], "range")
-    'one of range_m, loss (did you mean range_m?)'
+    >>> did_you_mean(["loss", "range_m", "model"], "range")
+    'one of range_m (did you mean this?), loss, model'
     """
     names = list(known)
     if not names:
         return "none"
     close = get_close_matches(name, names, n=1) if isinstance(name, str) else []
-    return f"one of {', '.join(names)}" + "".join(f" (did you mean {match}?)" for match in close)
+    first = [f"{match} (did you mean this?)" for match in close]
+    return f"one of {', '.join([*first, *(known for known in names if known not in close)])}"
 
 
 def from_json(text: str | bytes) -> Any:
@@ -139,6 +146,33 @@ def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, 
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(str(path), "", f"expected TOML: {error}") from None
+
+
+def converted(kind: type[T], value: object, where: str) -> T:
+    """A value of a file, made of maps, lists and plain values, as an instance of a typed class (msgspec converts it).
+
+    BadInput names the file and the key that does not fit. Unknown keys are ignored, unless the class refuses them.
+    """
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        fault, _, path = str(error).partition(" - at `$")
+        missing = MISSING_FIELD.fullmatch(fault)
+        key = path.rstrip("`") + (f".{missing[1]}" if missing else "")
+        expected = "is missing: expected a value" if missing else f"{fault[0].lower()}{fault[1:]}"
+        raise BadInput(where, key.strip("."), expected) from None
+
+
+def read_json(kind: type[T], path: Path, known: int) -> T:
+    """The JSON object of a file as an instance of a typed class; BadInput unless it is one, of the known format."""
+    try:
+        found = from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(str(path.parent), path.name, f"expected a readable file: {error.strerror}") from None
+    except ValueError as error:  # no JSON, or no UTF-8
+        raise BadInput(str(path), "", f"expected JSON: {error}") from None
+    check_format(found, known, str(path))
+    return converted(kind, found, str(path))
 
 
 def check_plain(value: object, where: str, key: str) -> None:

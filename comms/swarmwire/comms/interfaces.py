@@ -32,20 +32,26 @@ class AgentBackend(Protocol):
         ...
 
 
-class Observer(Protocol):
-    """A passive part of a run: a metric, a recorder, a progress display. It cannot change the run."""
+class Observer:
+    """A passive part of a run: a metric, a recorder, a progress display. It cannot change the run.
+
+    Override the methods that are needed.
+
+    Attributes:
+        before_agents: begin before the run waits for its agents, where they come from elsewhere.
+    """
+
+    before_agents = False
 
     def begin(self, static: Static) -> None:
         """Called once before the first tick."""
-        ...
 
     def see(self, truth: Truth) -> None:
         """Called after each tick; an observer may keep the arrays, but not write to them."""
-        ...
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Called after the last tick; `last` counts the packets in flight. Return this observer's summary entries."""
-        ...
+        return {}
 
 
 class StopConditions(Protocol):

@@ -11,8 +11,8 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 (`digest_of`) and the fields of the tuples that it is given.
 
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
-`_source_stamp`, `_index_key`, `_compile_for_args`. So pyproject.toml pins numba's minor version, and
-`tests/unit/comms/test_kernels.py` fails when one of them is not as it was.
+`_source_stamp`, `_index_key`, `_compile_for_args`, `ensure_blas`. So pyproject.toml pins numba's minor version, and
+`tests/unit/comms/test_draws.py` fails when one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -24,6 +24,8 @@ import sys
 from collections.abc import Callable
 from enum import Enum
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from types import CodeType, ModuleType
 from typing import Any, NoReturn, TypeVar, cast
 
@@ -32,11 +34,30 @@ import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.types import BaseNamedTuple
+from numba.np import linalg
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}  # modules whose functions numba knows by itself
 PLAIN = bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype
+
+
+def _load_arrays_without_scipy() -> None:
+    """Load numba's array functions without scipy.linalg, which takes 0.2 s and is imported to see that it is there.
+
+    Linear algebra in a compiled function still imports it.
+    """
+    if find_spec("scipy") is None:
+        return
+    imported = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = imported
+
+
+_load_arrays_without_scipy()
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:

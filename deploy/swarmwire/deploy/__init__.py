@@ -6,18 +6,17 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.deploy.kernel_cache import keep_kernels
+from swarmwire.deploy.host import keep_kernels
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.sweeping import Sweep, resume, sweep
+    from swarmwire.deploy.campaign.sweep import Sweep, resume, sweep
+    from swarmwire.deploy.config import Listening, Recording, RunConfig
     from swarmwire.deploy.gateways.gateways import Gateways
-    from swarmwire.deploy.listening import Listening
-    from swarmwire.deploy.record.recording import Recording
+    from swarmwire.deploy.record.provenance import RunFacts
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
-    from swarmwire.deploy.running import run
-    from swarmwire.deploy.simulation import Simulation
-    from swarmwire.metrics.run_folder import RunFolder
+    from swarmwire.deploy.simulation import Simulation, run
+    from swarmwire.metrics.run_folder.reader import RunFolder
 
 __all__ = [
     "ArenaResult",
@@ -28,6 +27,8 @@ __all__ = [
     "Recording",
     "Repetition",
     "Result",
+    "RunConfig",
+    "RunFacts",
     "RunFolder",
     "Simulation",
     "Statistics",
@@ -40,16 +41,18 @@ __all__ = [
 
 _PLACES = {
     "Gateways": "swarmwire.deploy.gateways.gateways",
-    "Listening": "swarmwire.deploy.listening",
-    "Recording": "swarmwire.deploy.record.recording",
+    "Listening": "swarmwire.deploy.config",
+    "Recording": "swarmwire.deploy.config",
     "Repetition": "swarmwire.deploy.repetition",
-    "RunFolder": "swarmwire.metrics.run_folder",
+    "RunConfig": "swarmwire.deploy.config",
+    "RunFacts": "swarmwire.deploy.record.provenance",
+    "RunFolder": "swarmwire.metrics.run_folder.reader",
     "Simulation": "swarmwire.deploy.simulation",
-    "Sweep": "swarmwire.deploy.campaign.sweeping",
+    "Sweep": "swarmwire.deploy.campaign.sweep",
     "repeat": "swarmwire.deploy.repetition",
-    "resume": "swarmwire.deploy.campaign.sweeping",
-    "run": "swarmwire.deploy.running",
-    "sweep": "swarmwire.deploy.campaign.sweeping",
+    "resume": "swarmwire.deploy.campaign.sweep",
+    "run": "swarmwire.deploy.simulation",
+    "sweep": "swarmwire.deploy.campaign.sweep",
 }  # all else is part of a result
 
 keep_kernels()

@@ -1,5 +1,5 @@
 """`python -m swarmwire.deploy` is the command `swarmwire`."""
 
-from swarmwire.deploy.cli import program
+from swarmwire.deploy.cli.app import program
 
 program()

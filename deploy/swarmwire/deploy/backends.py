@@ -1,22 +1,25 @@
-"""Who decides for the robots of a run: agents in this process, or runners that this machine starts."""
+"""The agent backend of a run: agents in this process, runners of this machine, or runners that others start."""
 
+import hashlib
 from collections.abc import Callable, Generator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
+from swarmwire.agent.agent import agent_sha256, load_agent
+from swarmwire.agent.host import layout_of
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.interfaces import AgentBackend
 from swarmwire.comms.truth import Static
-from swarmwire.deploy.endpoint import local_endpoint
-from swarmwire.deploy.gateways.served import Served
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.new_terms import new_terms
-from swarmwire.deploy.runner_processes import RunnerProcesses
+from swarmwire.comms.wire.join import GroupInfo, SessionInfo
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.gateways.serving import Served
+from swarmwire.deploy.runners import RunnerProcesses, local_endpoint
 from swarmwire.world.backends import allocation as assignments
-from swarmwire.world.backends.join_policy import ListenSettings
+from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
 from swarmwire.world.backends.registry import Loss, RunnerEvent
@@ -24,6 +27,8 @@ from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
+
+KEPT = ("wait", "stand", "coast")  # answers to a lost runner after which another may take over
 
 
 @dataclass(frozen=True)
@@ -40,9 +45,9 @@ class Backends:
     socket: Path | None  # where runners meet the world; None: at a private place
     stopped: Callable[[], bool]  # whether waiting for runners is to end
     listening: Listening | None  # for runners that others start, if it does
-    lost: Callable[[Loss], None]  # is told of a runner that was lost while the run went on
-    changed: Callable[[RunnerEvent], None]  # is told of every runner that came or went
-    say: Callable[[str], None]  # what people should know at once
+    lost: Callable[[Loss], None]  # called with each runner that is lost while the run goes on
+    changed: Callable[[RunnerEvent], None]  # called with each runner that joins, leaves, is lost or returns
+    say: Callable[[str], None]  # prints and logs a message
     subticks: Subticks | None = None  # of real time, in which packets cross also between ticks
 
     @contextmanager
@@ -65,7 +70,8 @@ class Backends:
                 )
             return
         if self.listening is not None:
-            backend = self._remote(self.listening.door(self.run_id), [whole], self._around_open(self.listening))
+            hooks = self._listening_hooks(self.listening)
+            backend = self._remote(self.listening.for_agents(self.run_id), [whole], hooks)
             with closing(backend):
                 backend.open()
                 yield backend
@@ -100,24 +106,21 @@ class Backends:
                 for process in processes:
                     process.stop()
 
-    def _around_open(self, listening: Listening) -> BackendHooks:
-        """What the backend of a world that listens asks and tells."""
-        told = listening.told
+    def _listening_hooks(self, listening: Listening) -> BackendHooks:
+        """The callbacks of the backend of a world that listens."""
+        observer = listening.observer
 
-        def changed(change: RunnerEvent, free: tuple[str, ...]) -> None:
-            self.changed(change)
-            self.say(str(change))
-            if told is not None:
-                told.changed(change, free)
+        def changed(event: RunnerEvent, free: tuple[str, ...]) -> None:
+            self.changed(event)
+            self.say(str(event))
+            observer.changed(event, free)
 
         def refused(runner: str, why: str) -> None:
             self._refused(runner, why)
-            if told is not None:
-                told.refused(runner, why)
+            observer.refused(runner, why)
 
         def opened(endpoints: tuple[str, ...]) -> None:
-            if told is not None:
-                told.opened(endpoints, self.run_id)
+            observer.opened(endpoints, self.run_id)
 
         return BackendHooks(lambda: None, self.stopped, self.lost, changed, refused, opened)
 
@@ -133,7 +136,7 @@ class Backends:
         self, door: ListenSettings | str, parts: list[Assignment], around: BackendHooks
     ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
-        terms = new_terms(self.scenario, self.static, self.agents, self.run_id, factor, self.listening)
+        policy = self._join_policy(factor)
         timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
         if self.pace:
             return RealTimeBackend(
@@ -146,10 +149,39 @@ class Backends:
                 on_loss,
                 self.pace,
                 table.watchdog_s,
-                terms,
+                policy,
                 self.subticks,
             )
-        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, policy=terms)
+        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, policy=policy)
+
+    def _join_policy(self, factor: float | None) -> JoinPolicy:
+        """The terms on which runners join, in real time at this factor, or in lockstep."""
+        scenario, static, listening = self.scenario, self.static, self.listening
+        kinds = {group: load_agent(spec) for group, spec in self.agents.items()}
+        memory = {group: layout_of(kind) for group, kind in kinds.items()}
+        kept = memory if scenario.run.on_runner_loss in KEPT else None
+        if listening is None:
+            return JoinPolicy(memory=kept)
+        groups = tuple(
+            GroupInfo(
+                name=group.name,
+                agent=scenario.robots[group.name].agent,
+                agent_sha256=agent_sha256(kinds[group.name]),
+                robots=(group.stop - group.start) * static.arenas,
+                free=(),
+            )
+            for group in static.groups
+        )
+        session_info = SessionInfo(
+            run=self.run_id,
+            scenario=scenario.name,
+            scenario_sha256=_sha256(scenario.source),
+            swarmwire=version("swarmwire-deploy"),
+            rate_hz=static.rate_hz,
+            real_time=factor,
+            groups=groups,
+        )
+        return JoinPolicy(session_info, True, listening.start_with, listening.limits, kept)
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""
@@ -161,3 +193,9 @@ class Backends:
         takeover = f"python -m swarmwire.agent.agent_host {endpoint} {self.run_id} {agents} NAME"
         until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
         self.say(f"lost runner {loss}; {until}, such as: {takeover}")
+
+
+def _sha256(source: str) -> str:
+    """Of the scenario's file; "" if it was made in Python."""
+    path = Path(source)
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

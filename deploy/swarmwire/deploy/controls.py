@@ -1,7 +1,12 @@
-"""What people ask of a run while it goes on: pause, step, another speed, the end. What the run does is the same."""
+"""What people ask of a run while it goes on: pause, step, another speed, the end; and the signals that end it.
 
+The trajectory of the run stays the same.
+"""
+
+import signal
 import threading
 from collections.abc import Callable
+from types import FrameType, TracebackType
 
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadInput
@@ -186,3 +191,39 @@ class Controls:
         self.speed, self._asked = speed, True
         self._next_ns = self._clock.now_ns()
         self._since = None  # measured anew from the next tick on
+
+
+class Interrupt:
+    """While entered, SIGINT, SIGTERM and SIGHUP ask for the end of the run after the tick under way.
+
+    A second SIGINT or SIGTERM ends it at once; SIGHUP asks only, since shell and system both may send it. In the main
+    thread only. A SIGHUP that is ignored (nohup) stays so.
+
+    Attributes:
+        asked: whether one of them came.
+        hung_up: whether SIGHUP did: nobody reads what is printed.
+    """
+
+    def __init__(self) -> None:
+        self.asked = self.hung_up = False
+        self._before: dict[signal.Signals, object] = {}
+
+    def __enter__(self) -> "Interrupt":
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._before[number] = signal.signal(number, self._handle)
+            if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+                self._before[signal.SIGHUP] = signal.signal(signal.SIGHUP, self._hang_up)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)  # pyright: ignore[reportArgumentType] - what signal() gave back, it takes
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+    def _hang_up(self, number: int, frame: FrameType | None) -> None:
+        self.asked = self.hung_up = True

@@ -1,4 +1,4 @@
-"""A run again, from its folder alone: from the scenario, files and inputs in it; and whether it came out the same."""
+"""A run again, from its folder alone, or one of a campaign; and whether it came out the same."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,18 +7,17 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.deploy.arguments import Runners
+from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.sweep import code_changes
+from swarmwire.deploy.config import Recording, Replay, Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.record.live_events import read_live_events
-from swarmwire.deploy.record.origin import Origin, read_origin
-from swarmwire.deploy.record.recording import Recording
-from swarmwire.deploy.record.trajectory_log import TrajectoryCheck, ticks_logged
-from swarmwire.deploy.replay import Replay
+from swarmwire.deploy.record.provenance import RunFacts, changed_files, read_facts
+from swarmwire.deploy.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.record.names import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
-from swarmwire.metrics.run_folder import RunFolder
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, read_campaign
+from swarmwire.metrics.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
+from swarmwire.metrics.run_folder.reader import RunFolder
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Repetition:
     """A run that was run again."""
 
     result: Result  # of the repetition
-    ended: str | None  # how the run did, as its summary says; None: it left none
+    ended: str | None  # how the run did, as its summary says; None: it left none, as runs of campaigns do
     before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
     compared: int  # ticks, from the first, that could be compared
     first_difference: int | None  # the first tick that came out differently
@@ -66,7 +65,7 @@ class RepeatedRun:
 
     Attributes:
         simulation: what will run.
-        origin: from what the run was made.
+        facts: from what the run was made.
     """
 
     def __init__(
@@ -79,9 +78,9 @@ class RepeatedRun:
         record: Recording | None = None,
     ) -> None:
         self._folder = folder = Path(folder)
-        self.origin = read_origin(folder)
+        self.facts = read_facts(folder)
         self._summary = _read_summary(folder)
-        self._inputs = _inputs(folder, self.origin, self._summary)
+        self._inputs = _inputs(folder, self.facts, self._summary)
         live_events, self._live_events_sha256 = read_live_events(folder)
         if self._summary and self._summary.live_events_sha256 and not live_events:
             expected = "expected the record of what people did to this run, on which it depends"
@@ -90,19 +89,19 @@ class RepeatedRun:
             raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
         self.simulation = Simulation(
             folder / SCENARIO,
-            seeds=self.origin.seeds,
+            seeds=self.facts.seeds,
             runners=runners,
             out=out,
             observers=observers,
             record=record,
-            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, live_events, self.origin.subtick_s),
+            replay=Replay(self._ticks(recorded_anew=out is not None), self._inputs, live_events, self.facts.subtick_s),
         )
         self._check = TrajectoryCheck(folder, self.simulation.hashes)
         self.simulation.watch(self._check)
 
     def run(self) -> Repetition:
         """Run it, and compare."""
-        changes = self.origin.changes(self._folder, self.simulation.code)
+        changes = self.facts.changes(self._folder, self.simulation.code)
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
@@ -126,7 +125,7 @@ class RepeatedRun:
             wanted = self._summary.ticks
         else:
             known = ticks_logged(self._folder)
-            wanted = known if known and not recorded_anew else self.origin.ticks
+            wanted = known if known and not recorded_anew else self.facts.ticks
         return min(wanted, self._inputs.end_tick) if self._inputs else wanted
 
     def _why_not_all(self, result: Result) -> str:
@@ -157,11 +156,67 @@ def _read_summary(folder: Path) -> _Summary | None:
     return _Summary(found["ended"], found["ticks"], hashes, inputs.get("sha256"), given.get("sha256"))
 
 
-def _inputs(folder: Path, origin: Origin, summary: _Summary | None) -> RecordedInputs | None:
+def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> RecordedInputs | None:
     inputs = recorded_inputs(folder)
-    driven = bool(origin.gateways) or (origin.realtime is not None and (origin.runners > 0 or origin.subtick_s))
+    driven = bool(facts.gateways) or (facts.realtime is not None and (facts.runners > 0 or facts.subtick_s))
     from_outside = driven or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
         expected = "expected the record of what came from outside, on which this run depends"
         raise BadInput(str(folder / INPUTS), "", expected)
     return inputs
+
+
+class CampaignRun:
+    """A run of a campaign on its way to its repetition.
+
+    Attributes:
+        simulation: what will run.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        run: int,
+        *,
+        runners: Runners = None,
+        out: Path | str | None = None,
+        record: Recording | None = None,
+    ) -> None:
+        """BadInput if the folder holds no campaign, or the campaign no such run."""
+        self._path, self._run = path, run
+        self._campaign = campaign = read_campaign(path)
+        if not 0 <= run < campaign.runs:
+            raise BadInput("--run", "", f"expected a run from 0 to {campaign.runs - 1}, got {run}")
+        self.simulation = Simulation(
+            CampaignFolder(path, campaign).scenario,
+            seeds=[campaign.seed_of(run)],
+            overrides=campaign.point_overrides[campaign.point_of(run)],
+            runners=runners,
+            out=out,
+            record=record,
+        )
+
+    def run(self) -> Repetition:
+        """Run it, and compare."""
+        changes = changed_files(self._campaign.files, self._path / SCENARIO_FOLDER)
+        before, why_not = self._before()
+        return Repetition(
+            result=finished(self.simulation),
+            ended=None,
+            before=before,
+            compared=0,
+            first_difference=None,
+            why_not_all=why_not,
+            changes=(*changes, *code_changes(self._campaign)),
+        )
+
+    def _before(self) -> tuple[tuple[str] | None, str]:
+        """The run's trajectory hash, or why there is none."""
+        import polars as pl
+
+        rows = CampaignFolder(self._path, self._campaign).rows().filter(pl.col("run") == self._run)
+        if not len(rows):
+            return None, "the campaign has not come to this run"
+        if rows["trajectory_sha256"][0] is None:
+            return None, f"the run failed: {rows['error'][0].strip().splitlines()[-1]}"
+        return (rows["trajectory_sha256"][0],), ""

@@ -1,17 +1,22 @@
-"""What a run comes to: the summary as a typed result."""
+"""The result of a run: the summary as typed values."""
 
-import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.clock import tick_start_ns, to_s
+from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
-from swarmwire.deploy.record.live_events import LiveEventsRecord
-from swarmwire.deploy.record.scenario_copy import CopiedFile
-from swarmwire.metrics.record.formats import SUMMARY_FORMAT
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.deploy.record.provenance import RunFacts
+from swarmwire.deploy.record.replay_logs import LiveEventsRecord
+from swarmwire.deploy.wiring import RunParts
+from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
+from swarmwire.metrics.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.registry import RunnerEvent
+
+NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
 
 @dataclass(frozen=True)
@@ -83,36 +88,32 @@ class EventResult:
 
 @dataclass(frozen=True)
 class Result:
-    """One execution: the same as `summary.json`."""
+    """The result of one run: the same as `summary.json`."""
 
     scenario: str
     robots: int  # in each arena
     engine: str  # that moved the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
-    ended: str  # "duration" | "stopped" (all arenas) | "interrupted" | "left" (by whoever stepped it) | "failed"
+    ended: str  # "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller that steps it) | "failed"
+    error: str | None  # why it failed
     ticks: int  # of the arena that ran longest
     sim_time_s: float
     wall_time_s: float  # of the loop
     start_time_s: float  # from the call to the first tick
+    stop: tuple[str, ...]  # what ends an arena, in words: "order at least 0.9 for 5 s"
     arenas: tuple[ArenaResult, ...]
-    global_sensors: dict[str, list[str]]  # bodies that know more than their surroundings, and by which sense
     events: tuple[EventResult, ...]  # in order
-    counts: dict[str, int]  # late, missing, malformed, clipped: whatever was not as it should be, by name
-    cpu: str
-    versions: dict[str, str]
-    modules: dict[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
-    stop: tuple[str, ...] = ()  # what ends an arena, in words: "order at least 0.9 for 5 s"
-    files: tuple[CopiedFile, ...] = ()  # in the run folder, from which the run can be repeated
-    inputs: InputsRecord | None = None  # what came from outside, if anything did
-    live_events: LiveEventsRecord | None = None  # what people did to it while it went on, if anything
-    lost_runners: tuple[str, ...] = ()  # that the run survived: name, robots and reason
-    runner_events: tuple[RunnerEvent, ...] = ()  # who joined, left, was lost and returned, in order
-    realtime: RealTimeReport | None = None
-    gateways: dict[str, str] = field(default_factory=dict[str, str])  # by group: the kind, where it has one
-    error: str | None = None  # why it failed
-    record: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]], compare=False)  # tables
-    out: Path | None = field(default=None, compare=False)  # the run folder
+    global_sensors: dict[str, list[str]]  # by body: sensors that measure more than its surroundings
+    counts: dict[str, int]  # faults, by name: late, missing, malformed, clipped
+    lost_runners: tuple[str, ...]  # that the run survived: name, robots and reason
+    runner_events: tuple[RunnerEvent, ...]  # runners that joined, left, were lost and returned, in order
+    realtime: RealTimeReport | None
+    facts: RunFacts  # from what the run was made
+    inputs: InputsRecord | None  # recorded actions that came from outside, if any did
+    live_events: LiveEventsRecord | None  # recorded live events, if there were any
+    record: dict[str, dict[str, Any]] = field(compare=False)  # tables
+    out: Path | None = field(compare=False)  # the run folder
 
     @property
     def realtime_factor(self) -> float:
@@ -167,38 +168,91 @@ class Result:
             "lost_runners": list(self.lost_runners),
             "runner_events": [asdict(change) for change in self.runner_events],
             "realtime": asdict(self.realtime) if self.realtime else None,
-            "gateways": self.gateways,
+            "gateways": dict(self.facts.gateways),
             "record": self.record,
-            "cpu": self.cpu,
-            "versions": self.versions,
-            "modules": self.modules,
-            "files": [asdict(file) for file in self.files],
+            "cpu": self.facts.cpu,
+            "versions": dict(self.facts.versions),
+            "modules": dict(self.facts.modules),
+            "files": [asdict(file) for file in self.facts.files],
             "inputs": asdict(self.inputs) if self.inputs else None,
             "live_events": asdict(self.live_events) if self.live_events else None,
         }
 
-    def write(self, path: Path) -> None:
-        """Write `summary.json`."""
-        write_whole(path, json.dumps(self.summary(), indent=2) + "\n")
+
+def result_of(
+    parts: RunParts, entries: Mapping[str, Any], *, ended: str, error: str | None, wall_s: float, start_s: float
+) -> Result:
+    """The result of a run that is over; `entries` are the observers' entries for the summary."""
+    static, loop, facts, realtime = parts.world.static, parts.entered_loop(), parts.facts, parts.real_time_report()
+    record = record_summary(entries)
+    dropped = {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
+    runners = max(facts.runners, len({event.runner for event in parts.runner_events}))
+    return Result(
+        scenario=static.name,
+        robots=static.robots,
+        runners=runners,
+        engine=" and ".join(parts.world.engines),
+        mode="realtime" if realtime else "lockstep" if runners else "local",
+        ended=ended,
+        error=error,
+        ticks=loop.ticks_done,
+        sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
+        wall_time_s=wall_s,
+        start_time_s=start_s,
+        stop=tuple(entries.get("stop", ())),
+        arenas=_arenas(parts, entries, ended),
+        events=tuple(EventResult(**event) for event in entries["events"]),
+        global_sensors=_global_sensors(static),
+        counts={**loop.counts(), **parts.failed_observers(), **dropped},
+        lost_runners=tuple(str(loss) for loss in parts.losses),
+        runner_events=tuple(parts.runner_events),
+        realtime=realtime,
+        facts=facts,
+        inputs=parts.folder.inputs(),
+        live_events=parts.folder.live_events(),
+        record=record,
+        out=parts.folder.path,
+    )
 
 
-def arena_result(
-    seed: int,
-    ended: str,
-    ticks: int,
-    sim_time_s: float,
-    sha256: str,
-    counts: dict[str, int],
-    radio: dict[str, Any] | None,
-    metrics: dict[str, Any],
-    stop: dict[str, Any],
-) -> ArenaResult:
-    """The parts of the observers' summaries that belong to one arena, typed."""
-    of_radio = None if radio is None else _radio_result(**radio)
-    of_metrics = {name: Statistics(**value) for name, value in metrics.items()}
-    return ArenaResult(seed, ended, ticks, sim_time_s, sha256, counts, of_radio, of_metrics, **stop)
+def _arenas(parts: RunParts, entries: Mapping[str, Any], ended: str) -> tuple[ArenaResult, ...]:
+    static, loop = parts.world.static, parts.entered_loop()
+    nothing = [None] * static.arenas
+    columns = zip(
+        static.seeds,
+        parts.world.running.tolist(),
+        loop.arena_ticks.tolist(),
+        loop.hexdigests(),
+        loop.arena_counts(),
+        entries.get("radio", nothing),
+        entries["metrics"],
+        entries.get("stops", nothing),
+        strict=True,
+    )
+    return tuple(
+        ArenaResult(
+            seed=seed,
+            ended=ended if running else "stopped",
+            ticks=ticks,
+            sim_time_s=to_s(tick_start_ns(ticks, static.rate_hz)),
+            trajectory_sha256=sha256,
+            counts=counts,
+            radio=None if radio is None else _radio_result(**radio),
+            metrics={name: Statistics(**value) for name, value in metrics.items()},
+            **(stop or NO_STOP),
+        )
+        for seed, running, ticks, sha256, counts, radio, metrics, stop in columns
+    )
 
 
 def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any], **counts: Any) -> RadioResult:
     air, agent = Percentiles(**latency_air_s), Percentiles(**latency_agent_s)
     return RadioResult(**counts, latency_air_s=air, latency_agent_s=agent)
+
+
+def _global_sensors(static: Static) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for body in (group.body for group in static.groups):  # two of one name, by sheets of users' own, are one entry
+        own = found.setdefault(body.name, [])
+        own += [name for name, sheet in body.sensors.items() if sheet.is_global and name not in own]
+    return {body: sensors for body, sensors in found.items() if sensors}

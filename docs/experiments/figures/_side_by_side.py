@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import SMALL_PT, SOFT, TEXT_PT, Look
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
-from swarmwire.metrics.statistics.interval import Interval
+from swarmwire.metrics.statistics.sample import Interval
 
 PANEL_IN, HEIGHT_IN = 2.9, 2.35
 _LEFT_IN, _RIGHT_IN, _FOOT_IN, _HEAD_IN = 0.42, 0.12, 0.42, 0.26

@@ -10,8 +10,8 @@ import polars as pl
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, means, panels, table, within
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SOFT
-from swarmwire.metrics.statistics.change_point import ChangePoint, change_point
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT
+from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 
 CAMPAIGNS = ("dense", "dense-box", "dense-box-coarse")
 MEASURED = ("order", "order_local", "rotation", "speed", "deadlocked")

@@ -12,14 +12,12 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-from swarmwire.metrics.report.svg import blank_figure
-from swarmwire.metrics.statistics.binomial import binomial_interval
+from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.axes import ordered_colors
+from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.sample import Sample, time_sample
-from swarmwire.metrics.statistics.summary import summary
-from swarmwire.metrics.statistics.texts import quartiles_text
+from swarmwire.metrics.statistics.summary import quartiles_text, summary
 
 CAMPAIGNS = ("fragmentation-obstacle", "fragmentation-partition", "fragmentation-jammer")
 COLUMNS = ("fragmentations.final", "fragmented.mean", "unrejoined.final", "rejoin_median.final", "rejoin_worst.final")

@@ -7,8 +7,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.metrics.statistics.sample import number_sample
-from swarmwire.metrics.statistics.summary import Summary, summary
-from swarmwire.metrics.statistics.texts import interval_text, number_text
+from swarmwire.metrics.statistics.summary import Summary, interval_text, summary
+from swarmwire.metrics.text import number_text
 
 LOSS, LATENCY = "radio.loss", "radio.latency_s"
 CAMPAIGNS = ("lennard-jones",)
@@ -32,10 +32,9 @@ def points(runs: Mapping[str, pl.DataFrame], column: str) -> list[tuple[float, f
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """A panel for each response over loss, a line for each latency: means with their intervals."""
-    from swarmwire.metrics.drawing.looks import INK, SOFT, TEXT_PT
-    from swarmwire.metrics.drawing.plain_axes import plain_axes
-    from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-    from swarmwire.metrics.report.svg import blank_figure
+    from swarmwire.metrics.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
+    from swarmwire.metrics.report.axes import ordered_colors
+    from swarmwire.metrics.report.page import blank_figure
 
     figure = blank_figure(6.4, 4.2)
     for k, (column, title) in enumerate(SHOWN.items()):

@@ -9,12 +9,10 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import new_figure
-from swarmwire.metrics.drawing.looks import FAINT, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.statistics.binomial import binomial_interval
+from swarmwire.metrics.drawing.canvas import FAINT, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, new_figure
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.difference import difference
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample, number_sample
+from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 
 RADIOS = ("", "-bursts")
 BEHAVIOURS = ("avoidance", "flocking", "pso")

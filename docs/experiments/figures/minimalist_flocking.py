@@ -13,11 +13,10 @@ import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
-from swarmwire.metrics.statistics.summary import summary
-from swarmwire.metrics.statistics.texts import interval_text, number_text, quartiles_text
+from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary
+from swarmwire.metrics.statistics.survival import kaplan_meier, resampled_quantiles
+from swarmwire.metrics.text import number_text
 
 COUNT = "robots.swarm.count"
 SEPARATION, LATERAL, REAR = (f"robots.swarm.params.{name}_diameters" for name in ("separation", "lateral", "rear"))
@@ -63,10 +62,9 @@ def swarms(runs: Mapping[str, pl.DataFrame]) -> dict[tuple[str, int], pl.DataFra
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Survival curves: a row for each series, a column for each share; full lines by one hop, dashed by clusters."""
-    from swarmwire.metrics.drawing.looks import INK, SOFT, TEXT_PT
-    from swarmwire.metrics.drawing.plain_axes import plain_axes
-    from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-    from swarmwire.metrics.report.svg import blank_figure
+    from swarmwire.metrics.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
+    from swarmwire.metrics.report.axes import ordered_colors
+    from swarmwire.metrics.report.page import blank_figure
 
     figure, groups = blank_figure(6.4, 4.4), swarms(runs)
     sizes = sorted({n for _, n in groups})

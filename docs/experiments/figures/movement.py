@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.metrics.drawing.looks import ACCENT, SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.figures.ordered_colors import ordered_colors
-from swarmwire.metrics.report.svg import blank_figure
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import number_sample
+from swarmwire.metrics.drawing.canvas import ACCENT, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.axes import ordered_colors
+from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.statistics.sample import Interval, number_sample
 from swarmwire.metrics.statistics.summary import Summary, summary
 
 CAMPAIGNS = ("movement",)

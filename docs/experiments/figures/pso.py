@@ -5,18 +5,24 @@ from typing import Any
 
 import polars as pl
 
-from docs.experiments.figures._pso_panels import (
+from docs.experiments.figures._pso import (
+    FIRST,
+    HALF,
     LIMIT_S,
     Kind,
+    against_model,
+    at,
+    digested,
     distance_curves,
     panels,
     share_curve,
     time_curve,
+    times,
     times_by,
+    values,
+    variants_table,
 )
-from docs.experiments.figures._pso_samples import FIRST, HALF, at, digested, times, values
-from docs.experiments.figures._pso_tables import against_model, variants_table
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT, Look
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, Look
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
 

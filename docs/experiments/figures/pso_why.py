@@ -5,12 +5,9 @@ from typing import Any
 
 import polars as pl
 
-from docs.experiments.figures._pso_panels import Kind, ladder
-from docs.experiments.figures._pso_samples import at, digested
-from docs.experiments.figures._pso_tables import steps_table, variants_table
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
+from docs.experiments.figures._pso import Kind, at, digested, ladder, steps_table, variants_table
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
 

@@ -12,13 +12,12 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
-from swarmwire.metrics.statistics.degradation import Degradation, Fit, degradation, relative_to_unharmed
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import number_sample
 from swarmwire.metrics.statistics.summary import summary
+from swarmwire.metrics.statistics.trends import Degradation, Fit, degradation, relative_to_unharmed
 
 COVERAGE, SEARCH = "resilience-coverage", "resilience-search"
 CAMPAIGNS = (COVERAGE, SEARCH)
@@ -158,7 +157,7 @@ def _fits(fits: Degradation | None) -> tuple[str, str, str]:
     if fits is None:
         return "–", "–", "–"
     apart = fits.linear.aic - fits.exponential.aic
-    form = fits.better.form if fits.told else "not told apart"
+    form = fits.better.form if fits.is_clear else "not told apart"
     return _slope(fits.linear), _slope(fits.exponential), f"{apart:+.1f}: {form}"
 
 

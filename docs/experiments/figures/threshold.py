@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT
-from swarmwire.metrics.drawing.plain_axes import plain_axes
-from swarmwire.metrics.report.svg import blank_figure
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
-from swarmwire.metrics.statistics.interval import Interval
-from swarmwire.metrics.statistics.sample import Sample, number_sample
+from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 from swarmwire.metrics.statistics.summary import summary
 
 CAMPAIGNS = ("article-rule", "article-pair", "article-three", "article-parts")

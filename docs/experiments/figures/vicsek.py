@@ -9,8 +9,8 @@ import polars as pl
 
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, means, panels, table, within
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.drawing.looks import ACCENT, CURVE, SOFT
-from swarmwire.metrics.statistics.interval import Interval
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT
+from swarmwire.metrics.statistics.sample import Interval
 
 CAMPAIGNS = ("vicsek", "vicsek-long", "vicsek-all", "vicsek-512")
 COLUMNS = ("order.late",)  # mean over the part of each run that is not burn-in

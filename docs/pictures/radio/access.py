@@ -14,8 +14,8 @@ from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.deploy.radio.probe import radio_of
-from swarmwire.metrics.drawing.looks import INK
+from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.metrics.drawing.canvas import INK
 
 LOADS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 SENDERS, FRAME_BYTES, RATE_HZ, TICKS = 200, 30, 10, 20

@@ -12,8 +12,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.metrics.drawing.looks import INK
-from swarmwire.metrics.radio_fit.link_field import link_covariance
+from swarmwire.metrics.drawing.canvas import INK
+from swarmwire.metrics.radio_fit.shadowing import link_covariance
 
 SHADOWING = Shadowing(deviation_db=4.0, correlation_m=5.0)
 SIDE_M, STEPS = 40.0, 80

@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from swarmwire.metrics.drawing.canvas import new_figure, save
-from swarmwire.metrics.drawing.looks import FAINT, GRID, INK, LONG_SIDE_IN, SOFT, rgb
-from swarmwire.metrics.palette import robot_color
+from swarmwire.metrics.drawing.canvas import FAINT, GRID, INK, LONG_SIDE_IN, SOFT, new_figure, rgb, robot_color, save
 
 FOLDER = Path(__file__).parents[2] / "radio"
 SIZE_PX = 1280

@@ -1,1 +1,1 @@
-"""What is measured of a run, recorded and drawn; it knows the contract in comms and neither world nor agents."""
+"""Metrics, recorded tables, drawings and reports of runs; depends on comms, not on world or agents."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,10 @@ class FirstPattern(Metric):
         """A fresh measure, which keeps the first values."""
         first: FloatArray = np.full((static.arenas, static.robots), np.nan)
 
-        def measure(moment: Moment) -> FloatArray | float:
-            if moment.truth.value is None:
+        def measure(view: TickView) -> FloatArray | float:
+            if view.truth.value is None:
                 return np.nan
-            value = moment.truth.value.reshape(first.shape)
+            value = view.truth.value.reshape(first.shape)
             np.copyto(first, value, where=np.isnan(first))
             pattern = first - first.mean(axis=1, keepdims=True)
             square = (pattern * pattern).sum(axis=1)

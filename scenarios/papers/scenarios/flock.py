@@ -6,8 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.swarm.aggregation import Aggregation
 from swarmwire.metrics.swarm.order import Order
 
@@ -26,7 +25,7 @@ class Flock(Aggregation):
         """A fresh measure."""
         aligned, together = Order().begin(static), super().begin(static)
 
-        def measure(moment: Moment) -> FloatArray:
-            return np.minimum(aligned(moment), together(moment))
+        def measure(view: TickView) -> FloatArray:
+            return np.minimum(aligned(view), together(view))
 
         return measure

@@ -11,10 +11,9 @@ from numba import njit
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
-from swarmwire.metrics.swarm.close_pairs import OfClosePairs
-from swarmwire.metrics.swarm.radii import radii_m
+from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.swarm.aggregation import OfClosePairs
+from swarmwire.metrics.swarm.pairs import radii_m
 
 
 @dataclass(frozen=True)
@@ -32,9 +31,9 @@ class NearWall(Metric):
         half_m = 0.5 * np.array(static.arena_size_m)
         reach_m = radii_m(static) + self.gap_m
 
-        def measure(moment: Moment) -> FloatArray:
-            to_wall_m = np.min(half_m - np.abs(moment.position_m), axis=2)
-            return moment.sum_alive((to_wall_m < reach_m).astype(np.float64)) / moment.per_robot_alive
+        def measure(view: TickView) -> FloatArray:
+            to_wall_m = np.min(half_m - np.abs(view.position_m), axis=2)
+            return view.sum_alive((to_wall_m < reach_m).astype(np.float64)) / view.per_robot_alive
 
         return measure
 
@@ -58,8 +57,8 @@ class FlockSpeed(OfClosePairs):
         """A fresh measure."""
         pairs, least, most = self.close_pairs(static), self.least, self.most
 
-        def measure(moment: Moment) -> FloatArray:
-            return _speed_mps(pairs.of(moment), moment.velocity, moment.alive, least, most)
+        def measure(view: TickView) -> FloatArray:
+            return _speed_mps(pairs.of(view), view.velocity, view.alive, least, most)
 
         return measure
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.metrics.swarm.aggregation_time import AggregationTime
+from swarmwire.metrics.swarm.aggregation import AggregationTime
 
 
 @dataclass(frozen=True)

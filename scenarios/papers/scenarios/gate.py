@@ -6,8 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)
@@ -27,13 +26,13 @@ class Gate(Metric):
         """A fresh measure, which keeps the places of the tick before."""
         before: FloatArray | None = None
 
-        def measure(moment: Moment) -> FloatArray:
+        def measure(view: TickView) -> FloatArray:
             nonlocal before
-            x, y = moment.pose[:, :, 0], moment.pose[:, :, 1]
+            x, y = view.pose[:, :, 0], view.pose[:, :, 1]
             was = x if before is None else before
             before = x.copy()
             left = (was > 0.0) & (x <= 0.0) & (y > 0.0)
             right = (was <= 0.0) & (x > 0.0) & (y > 0.0)
-            return moment.sum_alive(left.astype(np.float64) - right)
+            return view.sum_alive(left.astype(np.float64) - right)
 
         return measure

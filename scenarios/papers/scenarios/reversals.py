@@ -7,8 +7,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,11 @@ class Reversals(Metric):
         changes, robot_ticks = np.zeros(static.arenas), np.zeros(static.arenas)
         ticks_per_min = static.rate_hz * 60.0
 
-        def measure(moment: Moment) -> FloatArray:
-            forward = moment.truth.command[:, 0].reshape(way.shape)
-            now = np.where(np.abs(forward) > self.dead_band_mps, np.sign(forward), way) * moment.alive
+        def measure(view: TickView) -> FloatArray:
+            forward = view.truth.command[:, 0].reshape(way.shape)
+            now = np.where(np.abs(forward) > self.dead_band_mps, np.sign(forward), way) * view.alive
             np.add(changes, np.count_nonzero(now * way < 0.0, axis=1), out=changes)
-            np.add(robot_ticks, moment.robots_alive, out=robot_ticks)
+            np.add(robot_ticks, view.robots_alive, out=robot_ticks)
             way[...] = now
             robot_min = np.where(robot_ticks > 0, robot_ticks / ticks_per_min, np.nan)
             return changes / robot_min

@@ -6,8 +6,8 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.bodies.body import body_names
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli import app
-from tests.support.deploy.commands import LOSSY, ROOT
+from swarmwire.deploy.cli.app import app
+from tests.support.deploy.runs import LOSSY, ROOT
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))

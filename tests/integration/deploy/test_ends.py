@@ -1,21 +1,68 @@
-"""However a run over processes ends, it says so, and nothing of it is left behind."""
+"""How runs end: limits, stops, killed processes, foreign frames."""
 
 import json
 import os
+import re
 import signal
 import subprocess
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import psutil
 import pytest
+import zenoh
 
-from swarmwire.metrics.verify.verify import verify
-from tests.support.deploy.commands import LOSSY, family, runners_of, started, swarmwire
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
+from swarmwire.deploy import run
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import check_recording, verify
+from swarmwire.metrics.run_folder.writer import part_file, parts_of
+from tests.support.deploy.runs import (
+    LOSSY,
+    called,
+    family,
+    record_run,
+    runners_of,
+    started,
+    started_in_haste,
+    swarmwire,
+)
 
 LONG = ["--set", "duration_s=3600", "--runners", "4", "--set", "robots.flock.count=8"]
 GONE_S = 20.0  # of a machine that is busy: they are gone in a fraction of a second
 Act = Callable[[subprocess.Popen[str]], object]
+AGENTS = """
+import threading
+from swarmwire.agent import Agent, Robot
+
+class Faulty(Agent):
+    def __init__(self):
+        self.steps = 0
+
+    def step(self, robot: Robot) -> None:
+        print("hello from an agent", flush=True)
+        self.steps += 1
+        if self.steps == 3:
+            raise ZeroDivisionError("the third step is too much")
+
+class Stuck(Agent):
+    def step(self, robot: Robot) -> None:
+        threading.Event().wait()
+"""
+DURATION = "duration_s=12"
+KILL = 'events=[{at_s=1.0, do="kill", robots={group="flock", share=0.2}}]'
+SOME_PERIODS_NS = NS_PER_S // 2  # a recorder's period of two seconds lasts 40 ms here
+MOMENTS = [57, "ends"]  # amid its ticks, and while the parts are joined
 
 
 @pytest.fixture
@@ -77,26 +124,6 @@ def test_it_ends_in_order_with_a_summary_and_whole_records(long_run, tmp_path, a
     assert not alive
 
 
-AGENTS = """
-import threading
-from swarmwire.agent import Agent, Robot
-
-class Faulty(Agent):
-    def __init__(self):
-        self.steps = 0
-
-    def step(self, robot: Robot) -> None:
-        print("hello from an agent", flush=True)
-        self.steps += 1
-        if self.steps == 3:
-            raise ZeroDivisionError("the third step is too much")
-
-class Stuck(Agent):
-    def step(self, robot: Robot) -> None:
-        threading.Event().wait()
-"""
-
-
 def playing(folder: Path, name: str) -> list[str]:
     agent = folder / "agents.py"
     agent.write_text(AGENTS)
@@ -121,3 +148,133 @@ def test_an_interrupt_ends_a_run_that_waits_for_an_agent(tmp_path):
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["ended"] == "interrupted"
     _, alive = psutil.wait_procs(children, timeout=GONE_S)
     assert not alive
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The same run, not killed."""
+    folder = tmp_path_factory.mktemp("whole")
+    record_run(folder, overrides=[DURATION, KILL])
+    return RunFolder(folder)
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
+    process = started_in_haste(tmp_path, DURATION, KILL)
+    with process:
+        assert process.stdout is not None
+        assert any(line.strip() == str(moment) for line in process.stdout)
+        process.kill()
+    folder = RunFolder(tmp_path)
+    assert folder.summary is None
+    assert folder.static == whole.static
+    findings = {finding.part: finding for finding in verify(tmp_path)}
+    for name in ("ticks", "packets", "events"):
+        assert findings[name].state in (State.PARTIAL, State.INTACT), findings[name]
+        parts = parts_of(tmp_path, name)
+        assert parts == [part_file(tmp_path, name, number) for number in range(len(parts))] or folder.files(name)
+        if folder.files(name) or name != "ticks":
+            left = getattr(folder, name)()
+            assert left.equals(getattr(whole, name)().head(len(left)))
+    if folder.files("ticks"):
+        ticks = folder.ticks(0)["tick"].to_list()
+        assert ticks == list(range(len(ticks)))
+        assert len(folder.robots()) == len(ticks) * whole.static.robots
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """A long run's folder, killed amid its ticks; a tick that was over some periods before, and the last that was."""
+    folder, clock = tmp_path_factory.mktemp("killed"), WallClock()
+    process = started_in_haste(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
+    before, due_ns, seen = None, 0, list[int]()
+    with process:
+        assert process.stdout is not None
+        ticks = (int(line) for line in process.stdout if line.strip().isdecimal())
+        for tick in ticks:
+            seen.append(tick)
+            if before is None and len(parts_of(folder, "ticks")) >= 3:
+                before, due_ns = tick, clock.now_ns() + SOME_PERIODS_NS
+            if before is not None and clock.now_ns() >= due_ns:
+                break
+        process.kill()
+        return folder, before, max(*seen, *ticks)
+
+
+def test_a_killed_run_leaves_its_recording_up_to_the_last_period(killed):
+    pytest.importorskip("rerun", reason="needs the extra [view]")
+    folder, before, last = killed
+    state, told = check_recording(folder / "run.rrd")
+    assert state is State.PARTIAL
+    reach = re.search(r"readable up to tick (\d+); it was never closed$", told)
+    assert reach, told
+    assert before <= int(reach[1]) <= last + 1  # the recorder sees a tick before it is printed
+
+
+def test_verify_tells_how_far_a_killed_run_came(killed, monkeypatch, capsys):
+    folder, *_ = killed
+    last = pl.scan_parquet(parts_of(folder, "ticks")).select(pl.col("tick").max()).collect().item()
+    code, out, errors = called(monkeypatch, capsys, "verify", folder)
+    assert (code, errors) == (1, "")
+    assert f"up to tick {last}" in " ".join(out.split())
+    last = out.strip().splitlines()[-1]
+    assert last.startswith("not intact: ")
+    assert "summary.json missing, ticks partial" in last
+
+
+def test_verify_is_content_with_a_whole_run_and_refuses_what_is_none(whole, tmp_path, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "verify", whole.path)
+    assert (code, errors) == (0, "")
+    assert out.strip().splitlines()[-1].startswith("intact: ")
+    code, _, errors = called(monkeypatch, capsys, "verify", tmp_path)
+    assert (code, errors.count("\n")) == (2, 1)
+    assert errors.startswith(f"error: {tmp_path}: ")
+
+
+class Vandal(Observer):
+    """An observer that speaks to the agents' endpoint as a stranger would, in the middle of a run."""
+
+    def __init__(self, path: str) -> None:
+        self._path, self.keys = path, Keys("unknown")
+
+    def see(self, truth: Truth) -> None:
+        """Every kind of bad frame, once."""
+        if truth.tick != 3:
+            return
+        with open_runner(unix_endpoint(self._path)) as session:
+            answer = self.keys.answer("r0")
+            rows = np.arange(7, dtype=np.int64)
+            nothing = {"rows": rows, "command": np.zeros((4, 7))}
+            for key, payload in (
+                (answer, b"\x00garbage"),
+                (answer, b""),
+                (answer, b"\x00" * (frames.MAX_BYTES + 1)),
+                (answer, frames.encode("dance", 4, {})),
+                (answer, frames.encode("actions", 1, nothing)),
+                (self.keys.answer("stranger"), frames.encode("actions", 4, {})),
+                (self.keys.frame("r1"), b"\x00garbage"),
+                (self.keys.frame("r1"), frames.encode("tick", 0, {})),
+                ("swarmwire/*/answer/r0", frames.encode("failed", 4, {}, {"robots": "all", "traceback": "lies"})),
+            ):
+                session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+            # The loop, in whose thread this runs, can only answer afterwards.
+            list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
+
+
+def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
+    path = tmp_path / "s"
+    simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3, socket=path)
+    vandal = Vandal(str(path))
+    vandal.keys = Keys(simulation.run_id)
+    simulation.watch(vandal)
+    result = finished(simulation)
+    assert result.ticks == 20
+    assert result.trajectory_sha256 == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
+    counts = result.counts
+    assert counts["malformed_frames"] == 2
+    assert counts["oversized_frames"] == 1
+    assert counts["unexpected_kind_frames"] == 1
+    assert counts["wrong_tick_frames"] == 1
+    assert counts["unknown_runner_frames"] == 2
+    assert counts["frames_dropped_by_runners"] == 2
+    assert counts["bad_join"] == 1

@@ -1,24 +1,68 @@
-"""`swarmwire export`, in this process, of run folders made by hand."""
+"""Exports."""
 
+import re
+import shutil
+import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli import app
-from tests.support.metrics.films import Folder, film, ticks_frame
+from swarmwire.deploy import RunFolder
+from swarmwire.deploy import run as run_scenario
+from swarmwire.deploy.cli.app import app
+from swarmwire.deploy.config import Recording
+from swarmwire.metrics.drawing.film import film_of
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
+from tests.support.deploy.runs import ROOT
+from tests.support.metrics.films import Capture, Folder, film, read, ticks_frame
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 SMALL = ("--size", "200")
+SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
+SHORT = ["duration_s=0.5", "robots.flock.count=6"]
+MEASURES = "measures={range={},bearing={}}"
+HEADERS = {"ieee802154": (283, 36 + 9), "wifi-b-1M": (127, 15 + 24 + 8 + 28), "argos-rab": (147, 20)}
+FIELDS = {
+    "ieee802154": ["wpan.src16", "wpan.dst16", "wpan.seq_no"],
+    "wifi-b-1M": ["ip.src", "ip.dst", "udp.length"],
+    "argos-rab": ["frame.len"],
+}
+FIRST = {
+    "ieee802154": ["0xffff", "0"],
+    "wifi-b-1M": ["255.255.255.255", "14"],
+    "argos-rab": ["26"],
+}
+FAULTS = [
+    (["--at", "1"], "--at"),
+    (["--kind", "delivery"], "--kind"),
+    (["--fps", "5"], "--fps"),
+    (["--from", "5", "--until", "4"], "--until"),
+    (["--from", "0.1", "--until", "0.1"], "--until"),
+    (["--from", "nan"], "--from"),
+    (["--until", "inf"], "--until"),
+    (["--size", "300"], "--size"),
+    (["--arena", "3"], "--arena"),
+]
+DAMAGED = [
+    (pl.lit(99).cast(pl.Int32).alias("sender"), "sender is beyond 5"),
+    (pl.lit(-1).cast(pl.Int32).alias("to"), "to is below 0"),
+    (pl.lit(None).cast(pl.Int64).alias("on_air_at_ns"), "on_air_at_ns is null"),
+    (pl.col("on_air_at_ns").cast(pl.String), "on_air_at_ns .*String.* Int64"),
+    (pl.lit("eaten").alias("fate"), "fate .*String.* Enum"),
+]
 
 
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A run folder of three seconds at 10 Hz."""
-    reader = ModuleType("swarmwire.metrics.run_folder")
+    reader = ModuleType("swarmwire.metrics.run_folder.reader")
     reader.RunFolder = Folder
     monkeypatch.setitem(sys.modules, reader.__name__, reader)
     folder = tmp_path / "run"
@@ -44,21 +88,28 @@ def test_a_picture_is_of_the_end_unless_a_time_is_named(run, tmp_path):
     assert export(run, *SMALL).startswith(f"written: {run}/picture.png (")
     end = pixels(run / "picture.png")
     assert max(end.shape) == 200
-    for name, time in (("bare", []), ("end", ["end"]), ("last", ["2.9"]), ("first", ["0"])):
-        export(run, *SMALL, "--to", tmp_path / f"{name}.png", "--png", *time)
-    for name, same in (("bare", True), ("end", True), ("last", True), ("first", False)):
+    for name, time, same in (("end", [], True), ("last", ["--at", "2.9"], True), ("first", ["--at", "0"], False)):
+        export(run, *SMALL, "--to", tmp_path / f"{name}.png", *time)
         assert np.array_equal(pixels(tmp_path / f"{name}.png"), end) == same
 
 
-def test_a_bare_png_may_stand_before_the_run_folder(run):
-    export("--png", run, *SMALL)
-    assert (run / "picture.png").exists()
+def test_a_table_holds_the_metrics_over_time(run, tmp_path):
+    of, to = film(ticks=30), tmp_path / "metrics.csv"
+    assert export(run, "--to", to) == f"written: {to} (30 rows)\n"
+    table = pl.read_csv(to)
+    assert table.columns == ["time_s", *film_of(Folder(run), 0, "run").metrics]
+    assert table["time_s"].to_list() == of.time_s.tolist()
+    np.testing.assert_array_equal(table["order"].cast(float).to_numpy(), of.metrics["order"])
+    export(run, "--to", to, "--metric", "order", "--from", "1", "--until", "2")
+    part = pl.read_csv(to)
+    assert part.columns == ["time_s", "order"]
+    assert part["time_s"].to_list() == [at_s for at_s in of.time_s.tolist() if 1.0 <= at_s <= 2.0]
 
 
 def test_a_gif_lasts_as_long_as_the_run_and_says_what_it_is(run):
     from PIL import Image
 
-    told = export(run, "--gif", *SMALL)
+    told = export(run, "--to", run / "film.gif", *SMALL)
     assert told.splitlines()[0] == "30 frames, 10 a second, 1 x real time"
     assert told.splitlines()[1].startswith(f"written: {run}/film.gif (")
     with Image.open(run / "film.gif") as gif:
@@ -70,7 +121,7 @@ def test_an_mp4_is_of_the_time_and_speed_asked_for(run, tmp_path):
     import imageio_ffmpeg
 
     to = tmp_path / "a.mp4"
-    told = export(run, "--mp4", "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
+    told = export(run, "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
     assert told.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
     assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
 
@@ -82,7 +133,7 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
     whole.unlink()
     (run / "ticks").mkdir()
     ticks_frame(film(ticks=12)).write_parquet(run / "ticks" / "part-0.parquet")
-    export(run, "--gif", *SMALL)
+    export(run, "--to", run / "film.gif", *SMALL)
     with Image.open(run / "film.gif") as gif:
         assert gif.n_frames == 12
 
@@ -90,16 +141,19 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
 @pytest.mark.parametrize(
     ("arguments", "place", "expected"),
     [
-        (["--gif", "--mp4"], "export", "one of --png, --gif, --mp4 and --pdr"),
-        (["--png", "3", "--gif"], "export", "one of --png, --gif, --mp4 and --pdr"),
-        (["--png", "7"], "--png", "0 to 2.9 s, or end"),
-        (["--png", "nan"], "--png", "0 to 2.9 s, or end"),
-        (["--fps", "5"], "--fps", "--gif or --mp4"),
-        (["--gif", "--until", "9"], "--until", "0 to 2.9 s"),
+        (["--at", "7"], "--at", "0 to 2.9 s"),
+        (["--at", "nan"], "--at", "0 to 2.9 s"),
+        (["--fps", "5"], "--fps", ".gif, .mp4"),
+        (["--to", "a.gif", "--at", "1"], "--at", ".png"),
+        (["--to", "a.gif", "--kind", "arena"], "--kind", "film"),
+        (["--kind", "arenas"], "--kind", "arena (did you mean this?), delivery, viewer"),
+        (["--to", "a.gif", "--until", "9"], "--until", "0 to 2.9 s"),
         (["--arena", "1"], "RUN: arena", "0 to 0"),
-        (["--metric", "ordr"], "--metric: ordr", "order, min_gap"),
-        (["--mp4", "--to", "a.gif"], "a.gif", ".mp4"),
-        (["--gif", "--size", "5"], "--size", "100 to 8000 pixels"),
+        (["--metric", "ordr"], "--metric: ordr", "order (did you mean this?), min_gap"),
+        (["--to", "a.csv", "--metric", "ordr"], "--metric: ordr", "order"),
+        (["--to", "a.csv", "--from", "9"], "--from", "0 to 2.9 s"),
+        (["--to", "a.avi"], "a.avi", ".gif, .mp4"),
+        (["--to", "a.gif", "--size", "5"], "--size", "100 to 8000 pixels"),
     ],
 )
 def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch, arguments, place, expected):
@@ -112,9 +166,9 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch,
 
 
 def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
-    from swarmwire.metrics.drawing.film_figure import FilmFigure
+    from swarmwire.metrics.drawing.animation import FilmFigure
 
-    export(run, "--mp4", *SMALL)
+    export(run, "--to", run / "film.mp4", *SMALL)
     before = (run / "film.mp4").read_bytes()
     frame = FilmFigure.frame
 
@@ -125,6 +179,104 @@ def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
 
     monkeypatch.setattr(FilmFigure, "frame", failing)
     with pytest.raises(RuntimeError, match="half way"):
-        export(run, "--mp4", *SMALL)
+        export(run, "--to", run / "film.mp4", *SMALL)
     assert (run / "film.mp4").read_bytes() == before
     assert {path.name for path in run.iterdir()} == {"ticks.parquet", "film.mp4"}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory) -> dict[str, Path]:
+    """A run for each kind of link."""
+    made: dict[str, Path] = {}
+    for preset in HEADERS:
+        made[preset] = tmp_path_factory.mktemp("runs") / preset
+        overrides = [*SHORT, f'radio={{preset="{preset}",{MEASURES}}}']
+        run_scenario(SCENARIO, overrides=overrides, out=made[preset], record=Recording(packets=1.0))
+    return made
+
+
+def exported(folder: Path, to: Path, *options: str) -> Capture:
+    ended = CliRunner().invoke(app, ["export", str(folder), "--to", str(to), *options], catch_exceptions=False)
+    assert ended.exit_code == 0, ended.output
+    found = read(to)
+    assert f"({len(found.packets)} frames)" in ended.output
+    return found
+
+
+@pytest.mark.parametrize("preset", HEADERS)
+def test_a_capture_holds_each_packet_on_air_once_with_headers_and_payload(folders, tmp_path, preset):
+    found, packets = exported(folders[preset], tmp_path / "t.pcapng"), RunFolder(folders[preset]).packets()
+    link_type, header_bytes = HEADERS[preset]
+    on_air = packets.drop_nulls("receiver").unique(["sender", "sequence"]).sort("on_air_at_ns", "sender", "sequence")
+    assert found.link_type == link_type
+    assert len(found.packets) > 20
+    assert [one.at_ns for one in found.packets] == on_air["on_air_at_ns"].to_list()
+    assert [one.data[header_bytes:] for one in found.packets] == on_air["payload"].to_list()
+    assert all(one.length == len(one.data) == header_bytes + 6 for one in found.packets)
+    comments = [comment for one in found.packets for comment in one.comments]
+    assert sum(comment.startswith("received: ") for comment in comments) > 20
+    assert comments[0].endswith("to all: Heading, packet 0")
+
+
+def test_a_capture_can_be_of_a_part_of_the_run(folders, tmp_path):
+    whole = exported(folders["ieee802154"], tmp_path / "whole.pcapng")
+    part = exported(folders["ieee802154"], tmp_path / "part.pcapng", "--from", "0.1", "--until", "0.3")
+    kept = [one for one in whole.packets if 100_000_000 <= one.at_ns < 300_000_000]
+    assert part.packets == kept
+    assert 0 < len(kept) < len(whole.packets)
+
+
+@pytest.mark.skipif(shutil.which("tshark") is None, reason="needs tshark")
+@pytest.mark.parametrize("preset", HEADERS)
+def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
+    to = tmp_path / "t.pcapng"
+    found = exported(folders[preset], to)
+    fields = ["_ws.malformed", "frame.time_epoch", *FIELDS[preset]]
+    command = ["tshark", "-r", str(to), "-T", "fields", *(part for name in fields for part in ("-e", name))]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    rows = [line.split("\t") for line in ended.stdout.splitlines()]
+    assert len(rows) == len(found.packets)
+    assert {row[0] for row in rows} == {""}
+    assert [row[1] for row in rows] == [f"0.{one.at_ns:09d}" for one in found.packets]
+    assert rows[0][-len(FIRST[preset]) :] == FIRST[preset]
+
+
+@pytest.mark.parametrize(("options", "option"), FAULTS)
+def test_what_does_not_fit_a_capture_is_refused(folders, tmp_path, options, option):
+    with pytest.raises(BadInput, match=f"^{option}: expected "):
+        exported(folders["argos-rab"], tmp_path / "t.pcapng", *options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_older_kind_of_capture_is_refused_with_the_name_of_the_newer(folders, tmp_path):
+    with pytest.raises(BadInput, match=r"t\.pcap: .*\.pcapng"):
+        exported(folders["argos-rab"], tmp_path / "t.pcap")
+
+
+@pytest.mark.parametrize(("change", "text"), DAMAGED)
+def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(folders, tmp_path, change, text):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "packets.parquet"
+    pl.read_parquet(file).with_columns(change).write_parquet(file)
+    with pytest.raises(BadInput, match=rf"packets\.parquet: .*{text}"):
+        exported(folder, tmp_path / "t.pcapng")
+    assert not (tmp_path / "t.pcapng").exists()
+    (found,) = (finding for finding in verify(folder) if finding.part == "packets")
+    assert found.state is State.DAMAGED
+    assert re.match(text, found.text)
+
+
+def test_packets_whose_arenas_are_no_numbers_are_refused_in_one_line_with_the_file(folders, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "packets.parquet"
+    pl.read_parquet(file).with_columns(pl.col("arena").cast(pl.String)).write_parquet(file)
+    with pytest.raises(BadInput, match=r"^\S+packets\.parquet: expected [^\n]+$"):
+        exported(folder, tmp_path / "t.pcapng")
+
+
+def test_a_run_whose_packets_were_not_recorded_is_refused_with_the_way_out(tmp_path):
+    run_scenario(SCENARIO, overrides=SHORT, out=tmp_path / "run")
+    with pytest.raises(BadInput, match="--packets all"):
+        exported(tmp_path / "run", tmp_path / "t.pcapng")

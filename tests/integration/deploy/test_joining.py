@@ -1,6 +1,6 @@
 """Runners that are processes join, leave, are killed, frozen and thawed, in lockstep and real time.
 
-`tests/unit/deploy/test_joining.py` has more cases over the same frames in one process.
+`tests/unit/deploy/test_agents_at_large.py` has more cases over the same frames in one process.
 """
 
 import signal
@@ -11,8 +11,8 @@ import pytest
 
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import repeat, run
-from tests.support.deploy.commands import LOSSY
 from tests.support.deploy.joiners import Joiners, Watcher, interrupt, moving
+from tests.support.deploy.runs import LOSSY
 
 When = Callable[[Joiners, Truth], bool]
 LEFT, OVER = (130, "left the run"), (0, "the run is over")

@@ -10,14 +10,15 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.registry import METRICS
-from swarmwire.metrics.verify.verify import verify
+from swarmwire.metrics.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS
-from tests.support.encoded_backend import EncodedBackend
+from tests.support.world.locksteps import EncodedBackend
 
 TICKS = 24
 SEEDS = (1, 2, 3, 4, 5)
@@ -230,7 +231,7 @@ def test_runners_do_not_mind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
     assert there.counts == here.counts
 
 
-class Looks:
+class Looks(Observer):
     """Keeps every truth."""
 
     def begin(self, static: Static) -> None:
@@ -238,9 +239,6 @@ class Looks:
 
     def see(self, truth: Truth) -> None:
         self.seen.append(truth)
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        return {}
 
 
 def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_path: Path) -> None:

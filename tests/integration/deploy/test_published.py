@@ -18,15 +18,12 @@ from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.deploy.live import published
-from swarmwire.deploy.live.following import RunGone, following
-from swarmwire.deploy.live.live_file import Live, read_live
+from swarmwire.deploy.live.following import Live, RunGone, following, read_live
 from swarmwire.deploy.live.published import Published
-from swarmwire.metrics.metrics import Metrics
-from tests.support.clocks import StillClock
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.watching import At, watcher
+from swarmwire.metrics.measure import Metrics
+from tests.support.clocks import StillClock, until
+from tests.support.deploy.runs import LOSSY, At, watcher
 from tests.support.metrics.truths import edges, static, tally, truth
-from tests.support.waiting import until
 
 MANY = ["robots.flock.count=300", 'robots.flock.place={how="arena"}', "arena.size_m=[20,20]", "duration_s=6"]
 

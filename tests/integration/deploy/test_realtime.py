@@ -1,18 +1,27 @@
-"""Runs in real time over real processes, with a subtick and without: what happens, in no set time."""
+"""Runs in real time keep to the clock, and are rehearsed before they begin."""
 
 import json
 from pathlib import Path
 from typing import Any
 
 import msgpack
+import numpy as np
 import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import repeat, run
+from swarmwire.comms.packets import Fate
+from swarmwire.deploy import Simulation, repeat, run, wiring
+from swarmwire.deploy.gateways.serving import RunGateways
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
-from swarmwire.metrics.record.names import INPUTS
-from tests.support.deploy.commands import LOSSY, called
+from swarmwire.deploy.scenario_parts import new_medium
+from swarmwire.deploy.warm_up import warm_up
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.layout import INPUTS
+from swarmwire.metrics.swarm.order import Speed
+from swarmwire.world.scenario_file import load_scenario
+from swarmwire.world.world import World
+from tests.support.deploy.runs import LOSSY, called
 
 RELAY = """
 from swarmwire.agent import Agent, Message, Robot, u2
@@ -46,6 +55,7 @@ EVENTS = f"""[
     {{ do = "blackout", {OF_FIVE}, at_s = 0.4, for_s = 0.3 }},
 ]"""
 SUBTICK_S = 0.002
+FLOCKING = Path(__file__).parents[3] / "scenarios" / "robots" / "flocking-epuck2.toml"
 
 
 def runners_here() -> list[psutil.Process]:
@@ -70,14 +80,14 @@ def frames_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def test_a_run_in_real_time_ends_and_its_fates_add_up():
-    result = run(LOSSY, overrides=["duration_s=4"], runners=4, realtime=20)
+    result = run(LOSSY, overrides=["duration_s=4"], runners=4, realtime=5)
     assert (result.mode, result.ended, result.ticks) == ("realtime", "duration", 40)
-    assert result.wall_time_s >= 4 / 20
+    assert result.wall_time_s >= 4 / 5
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended
     assert result.radio.fates["received"] > 0
     assert result.realtime is not None
-    assert (result.realtime.factor, result.realtime.subtick_s) == (20, None)
+    assert (result.realtime.factor, result.realtime.subtick_s) == (5, None)
     summary = result.summary()["realtime"]
     assert {"factor", "late_answers", "missed_ticks", "worst_lag_s", "frames_dropped", "watchdog_stops"} <= set(summary)
 
@@ -122,8 +132,54 @@ def contradicting(folder: Path) -> None:
 
 
 def test_the_command_takes_a_subtick_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
-    arguments = ("--realtime", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
+    arguments = ("--realtime", "1", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
     assert code == 0, errors
     assert "in subticks of 5.0 ms" in " ".join(out.split())
     assert "ticks began late" in out
+
+
+def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measured(monkeypatch) -> None:
+    scenario = load_scenario(FLOCKING)
+    world = World(scenario, [1], {"flock": ("radio.range",)})
+    fates, see = np.zeros(len(Fate), np.int64), Metrics.see
+
+    def seen(self, truth) -> None:
+        fates[:] += truth.tally.fates[0]
+        see(self, truth)
+
+    monkeypatch.setattr(Metrics, "see", seen)
+    before = world.pose.copy()
+    warm_up(world, new_medium(scenario, world, None), [Speed()])
+    assert np.hypot(*(world.pose - before)[:, :2].T).min() > 0.0
+    assert fates[Fate.RECEIVED] > 0
+
+
+def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:
+    said = list[str]()
+    monkeypatch.setattr(wiring, "warm_up", lambda world, *_: said.append(f"rehearsed {world.static.robots}"))
+    simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
+    served = RunGateways.served
+    monkeypatch.setattr(RunGateways, "served", lambda *given: (said.append("served"), served(*given))[1])
+    with simulation:
+        assert simulation.world is not None
+    assert said == ["rehearsed 8", "served"]
+
+
+def test_every_run_in_real_time_is_rehearsed_and_goes_as_it_would_without(monkeypatch) -> None:
+    rehearsed = list[int]()
+    monkeypatch.setattr(wiring, "warm_up", lambda world, *rest: (rehearsed.append(1), warm_up(world, *rest)))
+    results = list[list[str]]()
+    for factor in (None, 1000.0):
+        with Simulation(FLOCKING, realtime=factor) as simulation:
+            simulation.run(5)
+        results.append(simulation.result.trajectory_sha256)
+    assert rehearsed == [1]
+    assert results[0] == results[1]
+
+
+def test_runs_that_keep_to_no_clock_are_not_rehearsed(monkeypatch) -> None:
+    monkeypatch.setattr(wiring, "warm_up", None)
+    with Simulation(FLOCKING) as simulation:
+        simulation.run(1)
+    assert simulation.result.ticks == 1

@@ -10,10 +10,9 @@ import pytest
 import tomli_w
 
 from swarmwire.deploy import run
-from swarmwire.deploy.campaign.sweeping import sweep
-from tests.support.deploy.commands import LOSSY, called
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import METRICS, SMALL, flock, watched
+from swarmwire.deploy.campaign.sweep import sweep
+from tests.support.deploy.runs import LOSSY, called
+from tests.support.metrics.real_logs import METRICS, SMALL, as_logs, flock, watched
 
 
 @pytest.fixture(scope="module")

@@ -13,18 +13,15 @@ import pytest
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.deploy.live import live_view, viewer_program
-from swarmwire.deploy.live.following import following
-from swarmwire.deploy.live.live_file import read_live
+from swarmwire.deploy.live import live_view, viewer
+from swarmwire.deploy.live.following import following, read_live
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.live.showing import Drawer, RadioModel
-from swarmwire.deploy.live.whole_recording import whole
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.viewer.program import end, free_port, is_open, program
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.watching import At
-from tests.support.waiting import until
+from swarmwire.deploy.live.viewer import Drawer, ViewOptions, whole
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.viewer.screenshot import end, free_port, is_open, program
+from tests.support.clocks import until
+from tests.support.deploy.runs import LOSSY, At
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 
@@ -93,9 +90,9 @@ def test_a_view_that_is_killed_leaves_no_viewer_and_no_file(folder, tmp_path, mo
     temporary.mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
     with viewing(folder / "run.rrd") as (process, _):
-        [viewer] = family(process)
+        [child] = family(process)
         process.kill()
-        until(lambda: not viewer.is_running() or viewer.status() == psutil.STATUS_ZOMBIE)
+        until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
     assert not list(temporary.iterdir())
 
 
@@ -104,10 +101,10 @@ def test_the_page_is_at_the_port_asked_for_and_the_view_ends_with_its_viewer(fol
     with viewing(folder / "run.rrd", "--port", port) as (process, page):
         assert page.startswith(f"http://127.0.0.1:{port}/")
         taken = f"--port: {port}: "
-        with pytest.raises(BadInput, match=taken), viewer_program.viewer(WallClock(), None, web=True, web_port=port):
+        with pytest.raises(BadInput, match=taken), viewer.viewer(WallClock(), None, web=True, web_port=port):
             pass
-        [viewer] = family(process)
-        viewer.terminate()
+        [child] = family(process)
+        child.terminate()
         assert process.wait(30) == 0
 
 
@@ -209,7 +206,7 @@ def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path):
 
     def follow():
         seen = held.enter_context(following(read_live(tmp_path)))
-        drawer = Drawer(seen, f"rerun+http://127.0.0.1:{port}/proxy", RadioModel(clock, print, lambda: False))
+        drawer = Drawer(seen, f"rerun+http://127.0.0.1:{port}/proxy", ViewOptions(clock, print, lambda: False))
         drawer.start()
         held.callback(drawer.join)
 

@@ -1,18 +1,66 @@
-"""The examples run as they stand."""
+"""The examples."""
 
+import ast
+import os
+import signal
 import subprocess
 import sys
+from collections.abc import Generator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import numpy as np
 import polars as pl
 import pytest
 from nbclient import NotebookClient
 
 from examples.loss_sweep import FLOCK, LOSSES, table
-from swarmwire.deploy import Simulation, repeat, run
+from examples.protocol.runner import BROADCAST, TAG, VERSION
+from swarmwire.agent.behaviours.flocking import Heading
+from swarmwire.comms import packets
+from swarmwire.comms.wire import frames
+from swarmwire.deploy import Result, Simulation, backends, repeat, run
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.runners import RunnerProcesses
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario_file import load_scenario
+from tests.support.deploy.joiners import HERE, Joiners
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
+GAS = EXAMPLES / "gas" / "gas-leak.toml"
+LAMP = EXAMPLES / "ways" / "lamp.toml"
+PROGRAM = EXAMPLES / "protocol" / "runner.py"
+OWN = 3  # robots that it plays
+ROOT = Path(__file__).parents[3]
+EXAMPLE = ROOT / "examples" / "ros2" / "drive_and_turn.py"
+STAND_IN = ROOT / "tests" / "support" / "examples" / "ros2" / "stand_in"
+PACE = 2.0
+SCENARIO = """
+format = 1
+name = "two bases, each in front of a wall"
+duration_s = 30.0
+
+[arena]
+size_m = [3.0, 3.0]
+
+[robots.flock]
+body = "turtlebot3-burger"
+count = 2
+place = { how = "poses", poses = [[0.8, 0.6, 0.0], [-0.8, -0.6, 3.14159]] }
+agent = "idle.py:Idle" # of the world's own: ROS takes its place
+"""
+IDLE = """
+from swarmwire.agent import Agent
+
+
+class Idle(Agent):
+    needs = ("scan", "odometry", "imu", "compass", "battery")
+
+    def step(self, robot):
+        pass
+"""
 
 
 def test_the_sweep_has_a_row_for_each_loss_and_seed():
@@ -21,9 +69,6 @@ def test_the_sweep_has_a_row_for_each_loss_and_seed():
     delivered = runs.group_by("loss", maintain_order=True).agg(pl.col("link_pdr").mean())["link_pdr"]
     assert delivered.is_sorted(descending=True)
     assert runs.filter(pl.col("loss") == 0.0)["link_pdr"].to_list() == [1.0, 1.0]
-
-
-GAS = EXAMPLES / "gas" / "gas-leak.toml"
 
 
 def test_robots_with_an_own_sense_and_an_own_actuator_seal_the_leak():
@@ -74,3 +119,168 @@ def test_the_notebook_runs_from_top_to_bottom(monkeypatch):
     assert outputs[-1]["data"]["text/plain"] == "True"
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
     assert not [output for output in outputs if output.output_type == "error"]
+
+
+def run_of(way: str, duration_s: float) -> Result:
+    return run(LAMP, overrides=[f"robots.seekers.agent='{way}.py:Seeker'", f"duration_s={duration_s}"])
+
+
+@pytest.fixture(scope="module")
+def plain() -> Result:
+    return run_of("plain", 60.0)
+
+
+def test_most_seekers_come_to_the_lamp(plain: Result):
+    distance_m = plain.metrics["target_mean"]
+    assert distance_m.final is not None
+    assert distance_m.max is not None
+    assert distance_m.final < 0.5 * distance_m.max
+
+
+@pytest.mark.parametrize("way", ["state_machine", "behaviour_tree"])
+def test_every_way_moves_the_swarm_alike(way: str, plain: Result):
+    assert run_of(way, 60.0).trajectory_sha256 == plain.trajectory_sha256
+
+
+class Mixed:
+    """Runners of swarmwire, but for one robot fewer of them each: the last is a process of the example."""
+
+    def __init__(
+        self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool
+    ) -> None:
+        assert waited_for
+        self._others = RunnerProcesses(endpoint, run_id, agents, names[:-1])
+        self._own = subprocess.Popen([sys.executable, str(PROGRAM), endpoint, "--name", "foreign"])
+
+    def trouble(self) -> str | None:
+        """None: a runner that is missing is told of by the time-out."""
+        return self._others.trouble()
+
+    def stop(self) -> None:
+        """End them; the example leaves by itself when the run ends."""
+        self._others.stop()
+        try:
+            self.code = self._own.wait(10.0)
+        finally:
+            self._own.kill()
+            self._own.wait()
+
+
+def scenario(**changes: object) -> Scenario:
+    return load_scenario(EXAMPLES / "protocol" / "flock.toml").model_copy(update={"duration_s": 6.0, **changes})
+
+
+@pytest.fixture
+def mixed(monkeypatch: pytest.MonkeyPatch) -> list[Mixed]:
+    """What started the runners of the runs of this test."""
+    started: list[Mixed] = []
+
+    def start(*given: Any, **more: Any) -> Mixed:
+        started.append(Mixed(*given, **more))
+        return started[-1]
+
+    monkeypatch.setattr(backends, "RunnerProcesses", start)
+    return started
+
+
+def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(mixed: list[Mixed]) -> None:
+    boids = scenario()
+    boids = boids.model_copy(
+        update={
+            "robots": {
+                "flock": boids.robots["flock"].model_copy(
+                    update={"agent": "tests.support.examples.protocol.boids:Boid"}
+                )
+            }
+        }
+    )
+    alone, together = run(boids), run(boids, runners=2)
+    assert mixed[0].code == 0
+    assert together.trajectory_sha256 == alone.trajectory_sha256
+    assert together.counts == alone.counts
+    assert together.radio is not None
+    assert together.radio.fates["received"] > 2000
+
+
+def test_its_robots_and_those_of_swarmwire_hear_one_another(mixed: list[Mixed]) -> None:
+    assert Heading.tag == TAG
+    result = run(scenario(), runners=2)
+    assert mixed[0].code == 0
+    assert not {name for name in result.counts if name.endswith("_frames")}
+    order = result.metrics["order"].final
+    assert order is not None
+    assert order > 0.9
+
+
+def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
+    text = PROGRAM.read_text(encoding="utf-8")
+    modules = [alias.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for alias in node.names]
+    modules += [str(node.module) for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+    assert {name for name in modules if name.split(".")[0] not in sys.stdlib_module_names} == {"msgpack", "zenoh"}
+    assert len(text.splitlines()) < 150
+    assert (VERSION, BROADCAST) == (frames.VERSION, packets.BROADCAST)
+
+
+class Both(Joiners):
+    """The example, and a runner of swarmwire for the robots that it leaves."""
+
+    def start(self, name: str, *arguments: str | Path, label: str = "") -> None:
+        if name != "foreign":
+            super().start(name, *arguments, label=label)
+            return
+        command = [sys.executable, str(PROGRAM), self.endpoint, "--name", name, *map(str, arguments)]
+        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:
+    """Its code is not in the run folder, and the scenario's agent does something else."""
+    joiners = Both(tmp_path)
+    joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
+    flock = EXAMPLES / "protocol" / "flock.toml"
+    with closing(joiners):
+        listening = Listening(HERE, observer=joiners)
+        result = run(flock, overrides=["duration_s=3"], listening=listening, out=tmp_path / "run")
+    assert result.runner_events[0].runner == "foreign"
+    assert result.inputs is not None
+    assert result.inputs.first_tick == 0
+    assert result.trajectory_sha256 != run(flock, overrides=["duration_s=3"]).trajectory_sha256
+    assert repeat(tmp_path / "run").same
+
+
+@contextmanager
+def node(transport: str, endpoint: str, namespace: str) -> Generator[subprocess.Popen[str]]:
+    """The example in a process of its own, interrupted in the end as by Ctrl-C."""
+    paths = os.pathsep.join([str(STAND_IN), str(ROOT)])
+    command = [sys.executable, str(EXAMPLE), "--ros-args", "-r", f"__ns:={namespace}"]
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": paths, "ROS_STAND_IN": f"{transport} {endpoint}"},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+        assert (process.returncode, errors) == (0, "")
+
+
+def test_the_example_drives_ahead_and_turns_before_walls(tmp_path):
+    (tmp_path / "two.toml").write_text(SCENARIO)
+    (tmp_path / "idle.py").write_text(IDLE)
+    with Simulation(tmp_path / "two.toml") as compiled:  # in real time it would be behind at once
+        compiled.run(2)
+    with Simulation(tmp_path / "two.toml", gateways="ros2", realtime=PACE) as simulation:
+        assert simulation.served
+        endpoints = [robot.address for robot in simulation.served.robots]
+        with node("rmw", endpoints[0], "/flock_0"), node("bridge", endpoints[1], "/flock_1"):
+            gone_m, turned_rad = np.zeros(2), np.zeros(2)
+            while not ((gone_m > 0.15).all() and (turned_rad > 0.5).all()):
+                assert simulation.tick < simulation.ticks, f"driven {gone_m} m, turned {turned_rad} rad"
+                before = simulation.world.pose
+                simulation.step()
+                by = simulation.world.pose - before
+                gone_m += np.hypot(by[:, 0], by[:, 1])
+                turned_rad += np.abs(np.remainder(by[:, 2] + np.pi, 2 * np.pi) - np.pi)
+                assert np.abs(simulation.world.pose[:, :2]).max() < 1.3, "it drove into a wall"

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from docs.experiments.places import Places
-from tests.support.deploy.campaign.small import scenario_in
+from docs.experiments.experiment import Places
+from tests.support.deploy.campaign import scenario_in
 
 CAMPAIGN = """
 format = 1
@@ -27,7 +27,7 @@ COLUMNS = ("radio.link_pdr",)
 
 
 def draw(runs):
-    from swarmwire.metrics.report.figures.column_axes import column_axes
+    from swarmwire.metrics.report.axes import column_axes
 
     figure, axes = column_axes("received", "loss")
     axes.plot(runs["two-losses"]["radio.loss"], runs["two-losses"]["radio.link_pdr"], ".")

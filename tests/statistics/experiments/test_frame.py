@@ -8,22 +8,20 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from docs.experiments.__main__ import app
-from docs.experiments.command import run_app
-from docs.experiments.digest import digest, digests
-from docs.experiments.drawing import draw
-from docs.experiments.experiment import find_experiment, names
-from docs.experiments.places import HERE
-from docs.experiments.running import run
+from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.making import digest, digests, draw, run, run_app
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.sweeping import Means
-from tests.support.deploy.campaign.small import InThisProcess
+from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from tests.support.deploy.campaign import InThisProcess
 
 
 def ran(places, seeds=None) -> tuple[str, str]:
     """The numbers, and what was said meanwhile."""
     said = io.StringIO()
     experiment = find_experiment("two-received", places)
-    return run(experiment, places, seeds, Means(executor=InThisProcess()), Console(file=said)), said.getvalue()
+    return run(
+        experiment, places, seeds, ExecutionOptions(executor=InThisProcess()), Console(file=said)
+    ), said.getvalue()
 
 
 def test_a_run_sweeps_digests_draws_and_tells(places):
@@ -104,7 +102,7 @@ def test_an_experiment_may_digest_by_itself(places):
         (
             'COLUMNS = ("radio.link_pdr",)',
             'COLUMNS = ("radio.link_pdf",)',
-            "radio.link_pdf: .*did you mean radio.link_pdr",
+            "radio.link_pdf: .*radio.link_pdr \\(did you mean this",
         ),
         ('COLUMNS = ("radio.link_pdr",)', "", "COLUMNS: is missing"),
     ],
@@ -124,7 +122,7 @@ def test_a_page_needs_one_place_for_the_numbers(places):
 
 def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
     assert names(places) == ("two-received",)
-    with pytest.raises(BadInput, match="did you mean two-received"):
+    with pytest.raises(BadInput, match="two-received \\(did you mean this"):
         find_experiment("two-receive", places)
     with pytest.raises(BadInput, match="expected a campaign's folder"):
         digest(find_experiment("two_received", places), places, [tmp_path / "two-losses"])

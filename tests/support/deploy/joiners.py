@@ -13,21 +13,21 @@ from typing import Any
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
-from swarmwire.deploy.listening import Listening
-from swarmwire.deploy.new_terms import KEPT
+from swarmwire.deploy.backends import KEPT
+from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.result import Result
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss, RunnerEvent
 from tests.support.agent.runners import EncodedRunner
-from tests.support.deploy.commands import LOSSY, ROOT
+from tests.support.deploy.runs import LOSSY, ROOT
 
 HERE = ("tcp/127.0.0.1:0",)
 WANDERER = ROOT / "tests/tools/soak/wanderer.py"  # a step that is lost or made twice shows in its run
@@ -43,26 +43,20 @@ def moving(truth: Truth) -> list[int]:
     return [row for row, command in enumerate(truth.command) if command.any()]
 
 
-class Watcher:
+class Watcher(Observer):
     """An observer that goes from one act to the next as soon as what it waits for is true."""
 
     def __init__(self, *steps: tuple[Callable[[Truth], bool], Callable[[], object]]) -> None:
         self.steps = list(steps)
         self.truths: list[Truth] = []
 
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
-
     def see(self, truth: Truth) -> None:
         self.truths.append(truth)
         if self.steps and self.steps[0][0](truth):
             self.steps.pop(0)[1]()
 
-    def end(self, last: PacketCounts | None) -> dict[str, object]:
-        return {}
 
-
-class Joiners:
+class Joiners(JoinObserver):
     """Told of runners that come and go; starts runners, and what the test wants to happen then."""
 
     def __init__(self, folder: Path) -> None:
@@ -132,7 +126,7 @@ class Joiners:
         simulation = Simulation(
             LOSSY,
             overrides=[*self.overrides, *overrides],
-            listening=Listening(HERE, start_with=start_with, told=self),
+            listening=Listening(HERE, start_with=start_with, observer=self),
             **more,
         )
         if watcher is not None:

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from tests.support.metrics.swarm.swarms import mixed, rolled
+from tests.support.metrics.swarms import mixed, rolled
 from tests.support.metrics.truths import static, tally, truth
 
 Array = np.ndarray[Any, Any]

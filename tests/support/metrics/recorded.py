@@ -1,13 +1,16 @@
-"""Recorders fed by hand."""
+"""Recorded runs and their summaries, and files as a power cut or a worn disk leaves them."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.record.recorders import record_summary, recorders
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import record_summary, recorders
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch
 
@@ -15,7 +18,7 @@ from tests.support.metrics.truths import truth, watch
 def record(folder: Path, of, ticks, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
-    observers = [metrics, *recorders(folder, metrics, StillClock(), **options)]
+    observers = [metrics, *recorders(RecordOptions(folder, metrics, StillClock(), **options))]
     watch(of, ticks, *observers)
     parts = {}
     for observer in observers:
@@ -54,3 +57,56 @@ def links(
     return ReceptionRecords(
         arena, sender, receiver, receivers, to, sequence, sent, on_air, final, fate, size, tag, rssi_dbm
     )
+
+
+def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: Any) -> dict[str, Any]:
+    """All that a summary holds, of a run that ended with its duration and measured nothing; `given` in place of it."""
+    sim_time_s = ticks / rate_hz
+    end = {"ended": "duration", "ticks": ticks, "sim_time_s": sim_time_s, "stop_time_s": None, "stopped_by": None}
+    return {
+        "format": 1,
+        "scenario": "made-up",
+        "arenas": arenas,
+        "engine": "discs",
+        "runners": 0,
+        "mode": "local",
+        "ended": "duration",
+        "error": None,
+        "ticks": ticks,
+        "sim_time_s": sim_time_s,
+        "wall_time_s": 0.5,
+        "realtime_factor": 2.0,
+        "stop": [],
+        "by_arena": [{**end, "counts": {}}] * arenas,
+        "trajectory_sha256": [f"{arena:064x}" for arena in range(arenas)],
+        "radio": None if arenas == 1 else [None] * arenas,
+        "metrics": {} if arenas == 1 else [{}] * arenas,
+        "events": [],
+        "global_sensors": {},
+        "counts": {},
+        "lost_runners": [],
+        "runner_events": [],
+        "record": {},
+        "cpu": "a CPU",
+        "versions": {"numpy": "2"},
+        "files": [],
+        "inputs": None,
+        "live_events": None,
+        **given,
+    }
+
+
+def damaged(parquet: bytes) -> st.SearchStrategy[bytes]:
+    """A Parquet file that is cut off, or in which a few bits are turned: as often in its footer as anywhere."""
+    last = len(parquet) - 1
+    footer = len(parquet) - 8 - int.from_bytes(parquet[-8:-4], "little")
+    place = st.integers(0, last) | st.integers(footer, last)
+    turned = st.lists(st.tuples(place, st.integers(0, 7)), min_size=1, max_size=8).map(lambda at: _turned(parquet, at))
+    return turned | turned | st.integers(0, last).map(lambda end: parquet[:end])
+
+
+def _turned(data: bytes, bits: list[tuple[int, int]]) -> bytes:
+    changed = bytearray(data)
+    for place, bit in bits:
+        changed[place] ^= 1 << bit
+    return bytes(changed)

@@ -17,8 +17,8 @@ from swarmwire.comms.truth import (
     TransmissionRecords,
     Truth,
 )
+from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
 
 
 def static(

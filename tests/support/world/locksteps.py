@@ -1,18 +1,21 @@
-"""Two runners and eight robots in lockstep, as tests play it; their hand-shake in real time, too."""
+"""Runners in lockstep without zenoh and processes: as tests play them, and with every frame encoded."""
 
+from functools import partial
 from typing import Any, TypeVar
 
 import msgpack
 import numpy as np
 
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.backends.allocation import split
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group, readings
+from tests.support.agent.runners import EncodedRunner
 
 R = TypeVar("R", Lockstep, RealTime)
 GROUPS = {"flock", "scouts", "lone"}
@@ -88,3 +91,41 @@ def state(roster: Lockstep | RealTime) -> Any:
 def sound(name: str = "a") -> bytes:
     rows = {"a": [0, 1, 2, 3], "b": [4, 5, 6, 7]}[name]
     return encode_actions(4, actions(rows))
+
+
+class EncodedBackend:
+    """A AgentBackend of `runners` runners in this process."""
+
+    def __init__(self, assignment: Assignment, runners: int = 3, *, backwards: bool = False) -> None:
+        """`backwards` gives the first runner the last robots."""
+        parts = split(assignment, runners)
+        self._lockstep = Lockstep(parts[::-1] if backwards else parts)
+        self._runners: dict[str, EncodedRunner] = {}
+        self._order = np.random.default_rng(1)
+        self._parts = len(parts)
+
+    def start(self) -> None:
+        """Let each runner join, decode its robots and make its agents."""
+        for number in range(self._parts):
+            name = f"r{number}"
+            runner = self._runners[name] = EncodedRunner(partial(self._lockstep.join, name))
+            self._lockstep.answer(name, runner.ready)
+
+    def act(
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
+        """One frame to every runner, one answer from each, in a random order."""
+        answered: list[tuple[str, bytes]] = []
+        for name, data in self._lockstep.open_tick(tick, readings, received, tx_status):
+            answered.append((name, self._runners[name].answer(data)))
+        for at in self._order.permutation(len(answered)):
+            self._lockstep.answer(*answered[at])
+        return self._lockstep.take()
+
+    def counts(self) -> dict[str, int]:
+        """Frames that were refused, by fault."""
+        return self._lockstep.counts()
+
+    def close(self) -> None:
+        """Forget the agents."""
+        self._runners.clear()

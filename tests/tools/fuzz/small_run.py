@@ -17,7 +17,7 @@ from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.deploy.new_medium import new_medium
+from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.world.backends.allocation import split, whole
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep

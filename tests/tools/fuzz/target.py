@@ -1,8 +1,16 @@
-"""Fuzzing targets: an entry point of the product, samples that it accepts, and the errors that it may refuse with."""
+"""Fuzzing targets: an entry point of the product, samples that it accepts, and the errors that it may refuse with.
 
+`run_case` runs one case within limits of time and memory.
+"""
+
+import gc
 import re
+import resource
+import signal
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -14,16 +22,17 @@ from tests.tools.fuzz.mutations import CODECS, MSGPACK, Codec, mutated_bytes, mu
 
 ACCEPTED = "accepted"
 MAX_LINE = 2000  # characters of a refusal
+MAX_CASE_MB = 300  # that the peak of the process may grow by in one case
 
 
 class Target(ABC):
     """An entry point. A case is one input; what it must not do raises AssertionError.
 
     Attributes:
-        name: as on the command line.
+        name: of its test.
         refusals: errors that refuse a case; any other error, and any warning, is a finding.
         quick: about how many cases in the test suite.
-        soak: at least how many in a soak.
+        soak: about how many in a soak.
         per_example: most cases of an example of Hypothesis, which by itself costs more than most cases.
         limit_s: of processor time for a case.
     """
@@ -142,6 +151,54 @@ def mutated_file(draw: DrawFn, file: File, files: Sequence[File], inner: Sequenc
     if suffix in CODECS:
         return mutated_document(draw, data, corpus, CODECS[suffix], inner)
     return mutated_bytes(draw, data, corpus)
+
+
+class TimeLimitExceeded(BaseException):
+    """A case over its limit: no handler of errors in the product may catch it."""
+
+
+def run_case(target: Target, case: Any) -> str:
+    """The kind of the refusal, or ACCEPTED; AssertionError or the error itself if it is a finding."""
+    before_mb = _peak_mb()
+    try:
+        with _limited(target.limit_s):
+            kind = target.feed(case) or ACCEPTED
+    except target.refusals as error:
+        kind = refusal_kind(error)
+    except TimeLimitExceeded as error:
+        raise AssertionError(f"over {target.limit_s:g} s of processor time") from error
+    except (Exception, KeyboardInterrupt):
+        raise
+    except BaseException as error:  # a panic of native code; Hypothesis would not take it for a failure
+        raise AssertionError(f"{type(error).__name__}: {error}") from error
+    grown_mb = _peak_mb() - before_mb
+    if grown_mb > MAX_CASE_MB:
+        gc.collect()
+        with suppress(OSError):  # Linux: the peak begins anew, so that Hypothesis finds the same again
+            Path("/proc/self/clear_refs").write_text("5")
+        raise AssertionError(f"{grown_mb} MB at its peak, over {MAX_CASE_MB} MB")
+    return kind
+
+
+@contextmanager
+def _limited(limit_s: float) -> Generator[None]:
+    """TimeLimitExceeded after so much processor time of this process: the load of others does not count."""
+
+    def stop(_signal: int, _frame: object) -> None:
+        raise TimeLimitExceeded
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+def _peak_mb() -> int:
+    """The most memory that this process has had."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak >> (20 if sys.platform == "darwin" else 10)
 
 
 def refusal_kind(error: Exception) -> str:

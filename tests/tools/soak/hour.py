@@ -14,9 +14,9 @@ import numpy as np
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.control.remote_control import controlling
-from tests.tools.soak.agenda import Agenda
-from tests.tools.soak.place import Kind, Place, environment
+from swarmwire.deploy.live.remote_control import controlling
+from tests.tools.soak.place import Kind, Place
+from tests.tools.soak.processes import Agenda, environment
 from tests.tools.soak.samples import Samples
 from tests.tools.soak.troubles import Troubles
 
@@ -32,7 +32,7 @@ REAL_TIME_SHARE = 5  # a runner of the world in real time for so many of that in
 
 def kinds(processes: int) -> list[Kind]:
     """The worlds: in lockstep nothing of what happens may matter; in real time robots coast meanwhile."""
-    in_real_time = ("--realtime", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
+    in_real_time = ("--realtime", "1", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
     return [
         Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=0.5),
         Kind("realtime", max(4, processes // REAL_TIME_SHARE), in_real_time),
@@ -57,8 +57,8 @@ class Hour:
         self.places = [Place(kind, folder.absolute() / kind.name, env) for kind in kinds(processes)]
         self._samples = Samples(folder / "samples.csv")
         self._log = (folder / "troubles.jsonl").open("w", buffering=1)
-        self.places[0].look_on(["observer-calm", "page-calm", "tab-calm", "observer", "page", "tab"])
-        self.places[1].look_on(["observer-calm", "observer"])
+        self.places[0].observe(["observer-calm", "page-calm", "tab-calm", "observer", "page", "tab"])
+        self.places[1].observe(["observer-calm", "observer"])
         rngs = np.random.default_rng(seed).spawn(len(self.places))
         self.troubles = [
             Troubles(place, rng, self._teller(place.kind.name), TIMEOUT_S)
@@ -140,11 +140,11 @@ class Hour:
             self._until(lambda world=world: world.pid is None, END_S, "the world to end")
             runners = place.runners
             self._until(lambda runners=runners: all(one.pid is None for one in runners), END_S, "runners to end")
-            for name, one in place.onlookers.items():
+            for name, one in place.observers.items():
                 if name.startswith("page"):
                     one.send(signal.SIGINT)
-            others = list(place.onlookers.values())
-            self._until(lambda others=others: all(one.pid is None for one in others), END_S, "onlookers to end")
+            others = list(place.observers.values())
+            self._until(lambda others=others: all(one.pid is None for one in others), END_S, "observers to end")
         self._tell("harness", "ended", "")
 
     def _step(self, now_ns: int) -> None:
@@ -182,10 +182,10 @@ class Hour:
                 continue
             whose = place.kind.name
             pids = {"world": place.world.pid, "runner": place.runners[0].pid, "runner 2": place.runners[1].pid}
-            for name, one in place.onlookers.items():
+            for name, one in place.observers.items():
                 if name.endswith("calm"):
                     pids[name.partition("-")[0]] = one.pid
-            if "page-calm" in place.onlookers:
+            if "page-calm" in place.observers:
                 pids["viewer"] = next(iter(place.viewers_of("page-calm")), None)
             named = {f"{whose} {who}": pid for who, pid in pids.items()}
             at_s = to_s(now_ns - self._started_ns)
@@ -225,7 +225,7 @@ def counts_of(hour: Hour) -> Mapping[str, Any]:
             "runner processes started": sum(one.starts for one in place.runners),
             "exit codes": {
                 "runners": _tallied([code for one in place.runners for code in one.codes]),
-                **{name: _tallied(one.codes) for name, one in place.onlookers.items()},
+                **{name: _tallied(one.codes) for name, one in place.observers.items()},
             },
             "world": place.world.codes,
         }

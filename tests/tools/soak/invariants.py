@@ -7,15 +7,14 @@ from typing import Any
 import psutil
 
 from swarmwire.deploy import repeat
-from swarmwire.deploy.record.live_events import read_live_events
-from swarmwire.deploy.record.origin import read_origin
-from swarmwire.deploy.replay import Replay
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
-from tests.tools.soak.supervised import family
+from swarmwire.deploy.config import Replay
+from swarmwire.deploy.record.provenance import read_facts
+from swarmwire.deploy.record.replay_logs import read_live_events
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.verify import verify
+from tests.tools.soak.processes import family
 
 COMES = ("joined", "returned")
 GOES = ("left", "lost")
@@ -84,7 +83,7 @@ def repeats(folder: Path) -> str:
 
 def undisturbed(folder: Path) -> str:
     """Where no fault matters, it is the run in which none happened: same orders, agents in one process."""
-    summary, origin = read_summary(folder), read_origin(folder)
+    summary, origin = read_summary(folder), read_facts(folder)
     live_events, _ = read_live_events(folder)
     replay = Replay(summary["ticks"], None, live_events)
     simulation = Simulation(folder / SCENARIO, seeds=origin.seeds, replay=replay)

@@ -1,6 +1,5 @@
 """A world of a soak with its runners, and those who look on: started as users start them, from the command line."""
 
-import os
 import re
 import signal
 from collections.abc import Mapping, Sequence
@@ -8,13 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from swarmwire.deploy.live.live_file import Live, read_live
-from tests.support.deploy.commands import ROOT
-from tests.support.deploy.watching import WATCHER
-from tests.tools.soak.supervised import PYTHON, Supervised, family
+from swarmwire.deploy.live.following import Live, read_live
+from tests.support.deploy.runs import WATCHER
+from tests.tools.soak.processes import PYTHON, SCENARIO, Supervised, family
 
-HERE = Path(__file__).parent
-SCENARIO = HERE / "soak.toml"
 AT_ONCE = 8  # runners that start at the same time
 
 
@@ -35,11 +31,11 @@ class Place:
         kind: of run.
         folder: of the run.
         runners: a process for each robot, in their order; the first are never touched.
-        onlookers: observers, pages and browser tabs, by name; those whose name ends with "calm" are never touched.
+        observers: observers, pages and browser tabs, by name; those whose name ends with "calm" are never touched.
     """
 
     def __init__(self, kind: Kind, folder: Path, env: Mapping[str, str]) -> None:
-        """`folder` is for all that this world, its runners and onlookers write."""
+        """`folder` is for all that this world, its runners and observers write."""
         folder.mkdir(parents=True)
         self.kind, self.folder, self._at, self.env = kind, folder / "run", folder, env
         self.world = Supervised("world", self._world_command, folder / "world.log", env)
@@ -47,7 +43,7 @@ class Place:
             Supervised(f"r{number}", partial(self._runner_command, number), folder / "runners.log", env)
             for number in range(kind.robots)
         ]
-        self.onlookers: dict[str, Supervised] = {}
+        self.observers: dict[str, Supervised] = {}
         self._started = 0
         self._endpoint: str | None = None
 
@@ -65,7 +61,7 @@ class Place:
     @property
     def all(self) -> list[Supervised]:
         """Every process but the world."""
-        return [*self.runners, *self.onlookers.values()]
+        return [*self.runners, *self.observers.values()]
 
     def tend(self, now_ns: int) -> None:
         """Start what is due. At first runners come a few at a time, as the world takes them in."""
@@ -77,15 +73,15 @@ class Place:
         for runner in self.runners[: self._started]:
             runner.tend(now_ns)
         if self.live is not None:
-            for one in self.onlookers.values():
+            for one in self.observers.values():
                 one.tend(now_ns)
 
-    def look_on(self, names: Sequence[str]) -> None:
+    def observe(self, names: Sequence[str]) -> None:
         """Have observers, pages and tabs come; a tab "tab-X" is of the page "page-X"."""
         for name in names:
             what = name.partition("-")[0]
             command = {"observer": self._observer, "page": self._page, "tab": self._tab}[what]
-            self.onlookers[name] = Supervised(name, partial(command, name), self.log(name), self.env, 1.0)
+            self.observers[name] = Supervised(name, partial(command, name), self.log(name), self.env, 1.0)
 
     def close(self) -> None:
         """Kill what is left."""
@@ -96,7 +92,7 @@ class Place:
 
     def viewers_of(self, name: str) -> list[int]:
         """The processes that a page has started: its viewer."""
-        pid = self.onlookers[name].pid
+        pid = self.observers[name].pid
         return [one.pid for one in family(pid)] if pid else []
 
     def log(self, name: str) -> Path:
@@ -126,16 +122,3 @@ class Place:
 
     def _tab(self, name: str) -> Sequence[str]:
         return (*PYTHON, "tests.tools.soak.tab", str(self.log(name.replace("tab", "page"))))
-
-
-def environment(temporary: Path) -> Mapping[str, str]:
-    """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
-    own = temporary / "own"
-    own.mkdir(parents=True, mode=0o700)
-    return {
-        **os.environ,
-        "TMPDIR": str(temporary),
-        "XDG_RUNTIME_DIR": str(own),
-        "PYTHONPATH": str(ROOT),
-        "OPENBLAS_NUM_THREADS": "1",
-    }

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from urllib.request import ProxyHandler, build_opener
 
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 OPEN = build_opener(ProxyHandler({}))  # what is on this machine needs no proxy
 

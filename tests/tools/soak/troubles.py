@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.errors import SwarmwireError
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
-from tests.tools.soak.agenda import Steps
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from tests.tools.soak.place import Place
-from tests.tools.soak.supervised import PYTHON, Supervised
+from tests.tools.soak.processes import PYTHON, Steps, Supervised
 
 UNTOUCHED = 2  # runners, the first
 PART = 0.1  # of all runners that die at once, as with their machine
@@ -46,10 +45,10 @@ class Troubles:
             self.refused: 1,
             self.paused: 1,
         }
-        if place.onlookers:
+        if place.observers:
             self._kinds |= {
-                self.onlooker_killed: 4,
-                self.onlooker_frozen: 2,
+                self.observer_killed: 4,
+                self.observer_frozen: 2,
             }
 
     def next(self) -> Steps:
@@ -96,14 +95,14 @@ class Troubles:
         """SIGSTOP at the world, for a moment."""
         yield from self._frozen(self._place.world, float(self._rng.uniform(0.2, 2.0)))
 
-    def onlooker_killed(self) -> Steps:
+    def observer_killed(self) -> Steps:
         """An observer, a page or a tab dies, and comes back."""
-        one = self._onlooker()
+        one = self._observer()
         yield from self._gone("killed", one, signal.SIGKILL)
 
-    def onlooker_frozen(self) -> Steps:
+    def observer_frozen(self) -> Steps:
         """An observer, a page or a tab hangs for a while: it reads nothing of what it is sent."""
-        yield from self._frozen(self._onlooker(), float(self._rng.uniform(1.0, 15.0)))
+        yield from self._frozen(self._observer(), float(self._rng.uniform(1.0, 15.0)))
 
     def stranger_refused(self) -> Steps:
         """Somebody of a new name wants robots that are taken, and gets none."""
@@ -170,9 +169,9 @@ class Troubles:
         touched = self._place.runners[UNTOUCHED:]
         return [touched[int(i)] for i in self._rng.choice(len(touched), count, replace=False)]
 
-    def _onlooker(self) -> Supervised:
-        names = sorted(name for name in self._place.onlookers if not name.endswith("calm"))
-        return self._place.onlookers[names[int(self._rng.integers(len(names)))]]
+    def _observer(self) -> Supervised:
+        names = sorted(name for name in self._place.observers if not name.endswith("calm"))
+        return self._place.observers[names[int(self._rng.integers(len(names)))]]
 
     def _order(self, table: Mapping[str, Any], *, may_refuse: bool = False) -> int | None:
         number = self._ask(f"order {table}", lambda run: run.event(table), may_refuse=may_refuse)

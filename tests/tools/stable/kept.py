@@ -1,16 +1,19 @@
-"""The lists that are kept beside the tests: what users rely on. Taking something away from one is a decision."""
+"""The lists of what users rely on, kept beside the tests. Taking something away from one is a decision.
+
+`python -m tests.tools.stable.kept` writes them anew.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.tools.stable import agent, frames, scenario, summary, tables
+from tests.tools.stable import agent, frames, records
 
 STABLE: dict[str, Callable[[], str]] = {
     "agent": agent.text,
-    "scenario": scenario.text,
-    "summary": summary.text,
+    "scenario": records.scenario_text,
+    "summary": records.summary_text,
     "frames": frames.text,
-    "tables": tables.text,
+    "tables": records.tables_text,
 }
 
 
@@ -36,3 +39,9 @@ def _entries(text: str) -> list[str]:
             heading = line
         found.append(line if line == heading else f"{heading}: {line.strip()}".removeprefix(": "))
     return found
+
+
+if __name__ == "__main__":
+    for _name, _text in STABLE.items():
+        place_of(_name).write_text(_text(), encoding="utf-8")
+        print(f"written: {place_of(_name)}")

@@ -1,13 +1,30 @@
-"""The behaviours that come with swarmwire do what their papers and sources say."""
+"""All behaviours: their parameters, what they need, and limits of their commands."""
+
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.behaviours import Avoidance, Diffusion, Flocking
+from swarmwire.agent import behaviours
+from swarmwire.agent.behaviours import (
+    Aggregation,
+    Avoidance,
+    BeaconAvoidance,
+    Coverage,
+    Diffusion,
+    Flocking,
+    LennardJonesFlocking,
+    MinimalistFlocking,
+    PsoModel,
+    RandomWalk,
+    SmoothedAvoidance,
+    SmoothedAvoidanceProximity,
+)
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.agent.host import agent_group
+from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray
@@ -19,6 +36,29 @@ from tests.support.agent.hosts import group
 FOOTBOT = load_body("footbot")
 TURN_RADPS = 0.05 / 0.14  # one wheel at 5 cm/s on a base of 14 cm
 ANGLES = np.deg2rad(7.5 + 15.0 * np.arange(24))
+NOTHING = np.zeros(24)
+STRAIGHT, LEFT, RIGHT = (0.05, 0.0), (0.025, TURN_RADPS), (0.025, -TURN_RADPS)
+ALONG = {"alignment": 0.0}
+neighbours_ = st.lists(
+    st.tuples(st.floats(0.05, 2.0), st.floats(-3.1, 3.1), st.floats(-3.0, 3.0, width=32)), min_size=1, max_size=4
+)
+AHEAD, AWAY_RADPS = (0.05, 0.0), 1.5
+ABOVE_ZERO: dict[type, tuple[str, ...]] = {
+    Aggregation: ("spell_m", "approach_m", "turn_radps", "detection_threshold"),
+    BeaconAvoidance: ("speed_mps", "clear_m", "horizon_s", "close_m"),
+    Coverage: ("spell_m", "nearest_m", "turn_radps", "detection_threshold"),
+    Flocking: ("separation_m",),
+    LennardJonesFlocking: ("speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad"),
+    PsoModel: ("update_every_ticks",),
+    RandomWalk: ("spell_m", "turn_radps", "detection_threshold"),
+    SmoothedAvoidance: ("reach_m",),
+}
+NOT_NEGATIVE: dict[type, tuple[str, ...]] = {
+    Aggregation: ("leave_per_s", "return_per_s"),
+    BeaconAvoidance: ("smooth_s",),
+    MinimalistFlocking: ("avoid_diameters", "separation_diameters", "lateral_diameters", "rear_diameters"),
+    SmoothedAvoidance: ("smooth_s",),
+}
 
 
 def rays_at_wall(gap_m: float, normal_rad: float) -> FloatArray:
@@ -49,10 +89,6 @@ def command(
     actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received)
     assert actions.drive.all()
     return float(actions.linear_mps[0]), float(actions.angular_radps[0])
-
-
-NOTHING = np.zeros(24)
-STRAIGHT, LEFT, RIGHT = (0.05, 0.0), (0.025, TURN_RADPS), (0.025, -TURN_RADPS)
 
 
 @pytest.mark.parametrize(
@@ -115,9 +151,6 @@ def turn_of(neighbours: list[tuple[float, float, float]], value: FloatArray = NO
     return command(Flocking, value, 0.0, neighbours, **params)[1]
 
 
-ALONG = {"alignment": 0.0}
-
-
 @pytest.mark.parametrize("bearing_rad", [0.3, 1.5, 3.0, -0.3, -1.5, -3.0])
 def test_flocking_turns_towards_a_far_neighbour_and_away_from_a_too_near_one(bearing_rad: float) -> None:
     side = np.sign(bearing_rad)
@@ -158,11 +191,6 @@ def test_flocking_stops_and_turns_in_front_of_a_wall_dead_ahead() -> None:
     assert abs(angular) > 1.0
 
 
-neighbours_ = st.lists(
-    st.tuples(st.floats(0.05, 2.0), st.floats(-3.1, 3.1), st.floats(-3.0, 3.0, width=32)), min_size=1, max_size=4
-)
-
-
 @given(neighbours_, st.floats(0.03, 0.1), st.floats(-1.2, 1.2))
 def test_flocking_is_the_same_in_a_mirror(neighbours: list[tuple[float, float, float]], gap: float, off: float) -> None:
     value = rays_at_wall(gap, off)
@@ -172,9 +200,6 @@ def test_flocking_is_the_same_in_a_mirror(neighbours: list[tuple[float, float, f
     assert got[0] == pytest.approx(linear, abs=1e-6)
     # Behind is both +pi and -pi: there a mirror image may turn either way.
     assert got[1] == pytest.approx(-angular, abs=1e-6) or abs(angular) > 2.0 * np.pi - 1e-3
-
-
-AHEAD, AWAY_RADPS = (0.05, 0.0), 1.5
 
 
 def one_ray(angle_deg: float, distance_m: float) -> FloatArray:
@@ -236,3 +261,55 @@ def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) ->
 @pytest.mark.parametrize("seed", [1, 2])
 def test_avoidance_decides_for_each_robot_alone(body: str, seed: int) -> None:
     assert_rows_independent(Avoidance, Trial(seed=seed, body=body))
+
+
+def pairs(of: dict[type, tuple[str, ...]]) -> list[Any]:
+    return [pytest.param(kind, name, id=f"{kind.__name__}.{name}") for kind, names in of.items() for name in names]
+
+
+def refused(kind: type, params: dict[str, Any], text: str) -> str:
+    with pytest.raises(BadParameter, match=text) as caught:
+        checked(kind, params)
+    return caught.value.key
+
+
+@pytest.mark.parametrize(("kind", "name"), pairs(ABOVE_ZERO))
+def test_what_is_divided_by_or_waited_for_is_above_zero(kind: type, name: str) -> None:
+    assert refused(kind, {name: 0}, "expected more than 0, got 0") == name
+    assert refused(kind, {name: -1}, "expected more than 0, got -1") == name
+
+
+@pytest.mark.parametrize(("kind", "name"), pairs(NOT_NEGATIVE))
+def test_zero_is_taken_where_only_less_makes_no_sense(kind: type, name: str) -> None:
+    assert checked(kind, {name: 0})[name] == 0
+    assert refused(kind, {name: -1}, "expected at least 0, got -1") == name
+
+
+@pytest.mark.parametrize(("kind", "name"), [(RandomWalk, "persistence"), (MinimalistFlocking, "random_turn")])
+def test_a_share_is_within_0_and_1(kind: type, name: str) -> None:
+    assert [checked(kind, {name: share})[name] for share in (0, 1)] == [0.0, 1.0]
+    assert refused(kind, {name: -0.1}, "expected 0 to 1, got -0.1") == name
+    assert refused(kind, {name: 1.1}, "expected 0 to 1, got 1.1") == name
+
+
+@pytest.mark.parametrize(
+    ("kind", "lower", "upper", "low", "high"),
+    [
+        (BeaconAvoidance, "relaxed", "alarm", 0.05, 0.2),
+        (LennardJonesFlocking, "soft_rad", "hard_rad", 1.2217, 1.5708),
+        (SmoothedAvoidance, "free_rad", "blocked_rad", 0.7854, 1.5708),
+    ],
+)
+def test_hysteresis_ends_no_later_than_it_begins_defaults_included(kind, lower, upper, low, high) -> None:
+    assert refused(kind, {lower: 2 * high}, f"expected at most {upper}, {high}; got {2 * high}") == lower
+    assert refused(kind, {upper: low / 2}, f"expected at most {upper}, {low / 2}; got {low}") == lower
+    checked(kind, {lower: 2 * high, upper: 2 * high})
+
+
+def test_a_subclass_keeps_the_limits_with_its_own_defaults() -> None:
+    assert refused(SmoothedAvoidanceProximity, {"smooth_s": -0.1}, "at least 0") == "smooth_s"
+
+
+@pytest.mark.parametrize("kind", [getattr(behaviours, name) for name in behaviours.__all__])
+def test_every_behaviour_takes_its_own_defaults(kind: type) -> None:
+    checked(kind, {name: parameter.default for name, parameter in parameters_of(kind).items()})

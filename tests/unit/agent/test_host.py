@@ -66,7 +66,7 @@ def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
     assert single.robots == "flock-2"
     assert vector.robots == "flock-2, flock-5"
     for error in (single, vector):
-        assert f"NotDeclared: reads '{sensor}', which its needs do not name" in error.traceback
+        assert f"NotDeclared: reads '{sensor}', which its needs do not list" in error.traceback
         assert re.search(r"test_host\.py.*in step", error.traceback)
 
 

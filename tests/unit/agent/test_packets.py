@@ -1,21 +1,31 @@
-"""What agents hear and learn: packets of one robot and columns of n, and what became of those that they sent."""
+"""Packets of agents: written, sent, received."""
 
+import math
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Packet, Robot, Robots, State, TxResult, TxStatus, VectorAgent
+from swarmwire.agent.host import AgentExecutor, _Single
+from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.agent.packet import Columns, Packets
+from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.errors import AgentFailed, BadFrame
 from swarmwire.comms.messages import DICT_TAG, encode_dict
-from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets, TxStatuses
-from tests.support.agent.hosts import host_of, received_from, step, words
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, SentPackets, TxStatuses
+from tests.support.agent.hosts import SILENCE, assignment, group, host_of, readings, received_from, spec, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
 said = {}
 DICTS = (b"", b"\xc1", b"\x81", b"\x01", b"\x93\x01\x02\x03", b"\x81\x91\x01\x01", b"\x80\x00", b"\x91" * 600)
+TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
+headers = st.builds(
+    PacketHeader, st.integers(-1, 2**15 - 1), st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1)
+)
 
 
 class Alone(Agent):
@@ -56,9 +66,6 @@ def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_received():
     sender = np.zeros(len(payloads), np.int64)
     step(host_of(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
     assert said["dicts"] == [{"x": 1}]
-
-
-TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
 
 
 class Keeps(Agent):
@@ -129,7 +136,7 @@ def test_who_does_not_declare_it_neither_asks_nor_reads():
             print(robot.radio.tx_status)
 
     assert step(host_of(Silent, [2]), 0, [2]).sent.tx_status_id is None
-    with pytest.raises(AgentFailed, match="reads 'radio.tx_status', which its needs do not name: radio.rssi"):
+    with pytest.raises(AgentFailed, match=r"reads 'radio.tx_status', which its needs do not list \(radio.rssi"):
         step(host_of(Reads, [2]), 0, [2])
 
 
@@ -171,3 +178,184 @@ def test_the_trial_tells_of_every_result_and_catches_who_takes_it_otherwise():
         assert_equivalent(Insisting, Credulous)
     with pytest.raises(AssertionError, match="rows of Peeking are not independent"):
         assert_rows_independent(Peeking)
+
+
+def numbers(sent: SentPackets) -> list[tuple[int, float]]:
+    """Who sent which number."""
+    told = [Word.decode(sent.payloads.row(i)).number for i in range(len(sent))]
+    return list(zip(sent.sender.tolist(), told, strict=True))
+
+
+def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
+    host = AgentExecutor(assignment(group(spec(agent), rows, name)))
+    host.act(tick, {name: readings(tick, rows)}, SILENCE)
+    return host
+
+
+@pytest.mark.parametrize("agent", ["Echo", "VectorEcho"])
+def test_a_packet_is_received_between_steps_or_in_the_next_and_never_in_both(agent: str) -> None:
+    host = stepped(agent, [0, 1])
+    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(host.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
+    assert numbers(host.on_receive(0, 20)) == []
+    host.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
+    assert numbers(host.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
+    assert numbers(host.on_receive(1, 30)) == []
+
+
+def test_packets_wait_for_the_step_of_those_that_hear_only_then() -> None:
+    host = stepped("Counter", [0, 1])
+    host.receive(received_from(words(7), [0]), NO_TX_STATUSES)
+    assert len(host.on_receive(0, 10)) == 0
+    assert host._waiting is not None
+    host.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
+    assert not host._waiting
+
+
+def test_whoever_has_not_stepped_yet_hears_in_its_first_step() -> None:
+    host = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
+    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert len(host.on_receive(0, 10)) == 0
+    assert numbers(host.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
+
+
+def test_the_dead_hear_nothing_and_what_waits_for_them_is_lost() -> None:
+    host = stepped("Echo", [0, 1])
+    host.act(1, {"flock": readings(1, [1])}, SILENCE)
+    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(host.on_receive(1, 10)) == [(1, 1.0)]
+    host.act(2, {"flock": readings(2, [1])}, SILENCE)
+    assert numbers(host.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
+
+
+def test_packets_of_a_group_that_does_not_act_now_wait_for_it() -> None:
+    host = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
+    host.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
+    host.act(0, {"often": readings(0, [0])}, SILENCE)
+    assert numbers(host.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
+
+
+def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() -> None:
+    told = list[tuple[int, int]]()
+
+    class Insistent(Agent):
+        needs = ("radio.tx_status", "compass")
+
+        def step(self, robot: Robot) -> None:
+            told.append((robot.radio.send(Word(number=1.0), to=9), -1))
+
+        def on_receive(self, robot: Robot) -> None:
+            assert robot.compass.heading_rad == float(readings(0, [3]).fields["compass.heading_rad"][0])
+            assert robot.time_s == 0.02
+            for tx_status in robot.radio.tx_status:
+                told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
+
+    host = stepped("Counter", [3])
+    host._groups["flock"] = _Single(group("", [3]), Insistent)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
+    for id_ in (0, 1):
+        host.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
+        assert len(host.on_receive(0, 20_000_000)) == 1
+    assert told == [(0, -1), (1, 0), (2, 1)]
+
+
+def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
+    drawn = list[float]()
+
+    class Drawing(Agent):
+        def step(self, robot: Robot) -> None:
+            drawn.append(robot.draw.uniform("x"))
+
+        def on_receive(self, robot: Robot) -> None:
+            drawn.append(robot.draw.uniform("x"))
+
+    host = stepped("Counter", [3])
+    host._groups["flock"] = _Single(group("", [3]), Drawing)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
+    for at_ns in (10, 20):
+        host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
+        host.on_receive(0, at_ns)
+    assert len(set(drawn)) == 3
+
+
+@pytest.mark.parametrize("deed", ["robot.drive(0.1, 0.0)", 'robot.note("x")', "robot.led(1.0, 0.0, 0.0)", "1 / 0"])
+def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str) -> None:
+    class Doing(Agent):
+        def step(self, robot: Robot) -> None:
+            """Nothing."""
+
+        def on_receive(self, robot: Robot) -> None:
+            exec(deed, {"robot": robot})
+
+    host = stepped("Counter", [3])
+    host._groups["flock"] = _Single(group("", [3]), Doing)
+    host.act(0, {"flock": readings(0, [3])}, SILENCE)
+    host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
+    with pytest.raises(AgentFailed, match="flock-3") as caught:
+        host.on_receive(0, 10)
+    assert ("ZeroDivisionError" if "/" in deed else "is for step") in caught.value.traceback
+
+
+def test_a_crew_in_this_process_hands_on_what_its_agents_may_not_write_to() -> None:
+    backend = LocalBackend(assignment(group(spec("Echo"), [0, 1])))
+    with pytest.raises(RuntimeError, match="has not been started"):
+        backend.on_receive(0, 0)
+    backend.start()
+    backend.act(0, {"flock": readings(0, [0, 1])}, SILENCE)
+    backend.receive(received_from(words(1), [0]), NO_TX_STATUSES)
+    assert numbers(backend.on_receive(0, 10)) == [(0, 1.0)]
+
+
+def link(*packets: tuple[int, int]) -> LinkStatistics:
+    """A link over which packets with these numbers and times of sending came."""
+    made = LinkStatistics()
+    for at, (sequence, sent_ns) in enumerate(packets):
+        made.add(sequence, sent_ns, at)
+    return made
+
+
+@given(st.sets(st.integers(0, 60), min_size=1))
+def test_what_lies_between_the_first_and_the_last_and_did_not_come_is_missed(numbers):
+    made = link(*((number, 10 * number + 1) for number in sorted(numbers)))
+    assert (made.received, made.missed) == (len(numbers), max(numbers) - min(numbers) + 1 - len(numbers))
+    assert made.delivery == len(numbers) / (max(numbers) - min(numbers) + 1)
+
+
+def test_a_packet_that_was_overtaken_fills_its_gap():
+    made = link((0, 1), (2, 3), (1, 2), (3, 4))
+    assert (made.received, made.missed) == (4, 0)
+
+
+def test_a_sender_that_began_anew_has_lost_nothing():
+    made = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
+    assert (made.received, made.missed) == (5, 2)
+
+
+def test_nobody_received_is_no_share():
+    assert math.isnan(LinkStatistics().delivery)
+
+
+@given(headers, st.binary(max_size=20))
+def test_what_was_packed_comes_back_whatever_follows(header, message):
+    assert PacketHeader.decode(header.encode() + message) == header
+    assert len(header.encode()) == HEADER_BYTES
+
+
+@given(st.binary(max_size=40))
+def test_any_bytes_are_a_header_or_malformed(data):
+    try:
+        header = PacketHeader.decode(data)
+    except BadFrame as error:
+        assert error.fault == "malformed"  # noqa: PT017 - most bytes are none
+    else:
+        assert header.encode() == data[:HEADER_BYTES]
+
+
+def test_another_version_is_malformed():
+    data = PacketHeader(-1, 0, 0).encode()
+    with pytest.raises(BadFrame):
+        PacketHeader.decode(b"\2" + data[1:])
+
+
+def test_after_the_last_number_comes_the_first():
+    assert PacketHeader.decode(PacketHeader(-1, 2**32, 0).encode()).sequence == 0

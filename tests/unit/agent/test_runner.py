@@ -1,16 +1,20 @@
-"""A runner at a made-up session: how it finds its world, joins, plays and leaves; and what its agents answer."""
+"""A runner, and its command."""
 
+import os
+import signal
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgpack
 import pytest
 import zenoh
 
-from swarmwire.agent import runner
+from swarmwire.agent import join_command, runner
+from swarmwire.agent.joining import JoinSettings
+from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
 from swarmwire.agent.runner_agents import RunnerAgents
-from swarmwire.agent.runner_protocol import Ended
+from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
@@ -207,3 +211,22 @@ def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool
     assert not isinstance(event, Ended)
     answer = frames.decode(agents.handle(event) or b"")
     assert ("memory/flock/rows" in answer.arrays) == keeps
+
+
+@pytest.mark.parametrize("interrupt", [signal.SIG_IGN, signal.default_int_handler], ids=["in background", "in front"])
+def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, capsys, interrupt: Any) -> None:
+    def killed(_settings: JoinSettings, arrivals: Arrivals, _say: Any) -> Ended:
+        os.kill(os.getpid(), signal.SIGTERM)
+        protocol = RunnerProtocol()
+        arrivals.pass_on(protocol, timeout_s=10.0)
+        return cast("Ended", protocol.next_event())
+
+    monkeypatch.setattr("swarmwire.agent.joining.join", killed)
+    before, ended_by = signal.signal(signal.SIGINT, interrupt), signal.getsignal(signal.SIGTERM)
+    try:
+        assert join_command.join_and_report(JoinSettings("tcp/127.0.0.1:1")) == INTERRUPTED
+        assert signal.getsignal(signal.SIGINT) is interrupt
+        assert signal.getsignal(signal.SIGTERM) is ended_by
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "left the run" in capsys.readouterr().err

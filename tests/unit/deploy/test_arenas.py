@@ -1,4 +1,4 @@
-"""Arenas end to end: from a picture, with a painted floor, on a torus; each runs, is recorded, drawn and repeated."""
+"""What a scenario's files bring, end to end: arenas from a picture, on a torus, and measured links."""
 
 import hashlib
 import json
@@ -6,12 +6,17 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.packets import Fate
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.metrics.record.static_file import read_static
-from tests.support.deploy.commands import ROOT
+from swarmwire.deploy.scenario_parts import read_link_traces
+from swarmwire.metrics.run_folder.tables import read_static
+from swarmwire.world.scenario_file import load_scenario
+from tests.support.deploy.runs import LOSSY, ROOT
 
 MAZE = ROOT / "scenarios" / "maze.toml"
 ROUND = """
@@ -111,3 +116,156 @@ def test_what_a_torus_cannot_have_is_refused_at_the_door(around: Path, setting: 
     with pytest.raises(BadInput) as caught:
         Simulation(around, overrides=[setting])
     assert caught.value.key == key
+
+
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
+REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
+
+
+def test_the_shipped_links_are_cut_between_the_halves_for_as_long_as_the_file_says():
+    """From 20 s to 40 s, between the first three and the last three."""
+    across: dict[bool, list[bool]] = {False: [], True: []}
+    beside: list[bool] = []
+    with Simulation(REPLAYED) as simulation:
+        while simulation.tick < 450:
+            finished = simulation.step().finished
+            assert finished is not None
+            is_across = (finished.sender < 3) != (finished.receiver < 3)
+            during = (finished.on_air_at_ns >= 20 * NS_PER_S) & (finished.on_air_at_ns < 40 * NS_PER_S)
+            is_received = finished.fate == Fate.RECEIVED
+            for cut in (False, True):
+                across[cut] += is_received[is_across & (during == cut)].tolist()
+            beside += is_received[~is_across].tolist()
+    assert not any(across[True])
+    assert len(across[True]) == 200 * 18
+    assert sum(across[False]) / len(across[False]) > 0.6
+    assert sum(beside) / len(beside) > 0.85
+
+
+def test_a_run_is_repeated_from_its_folder_alone(tmp_path: Path):
+    there = tmp_path / "there"
+    there.mkdir()
+    for file in (REPLAYED, REPLAYED.with_suffix(".csv")):
+        shutil.copy(file, there)
+    result = run(there / REPLAYED.name, overrides=["duration_s=3"], out=tmp_path / "run")
+    assert result.radio is not None
+    assert 0.7 < (result.radio.link_pdr or 0.0) < 0.99
+    shutil.rmtree(there)
+    copy = tmp_path / "run" / "files" / "replayed-links.csv"
+    assert copy.read_bytes() == REPLAYED.with_suffix(".csv").read_bytes()
+    [file] = [
+        file for file in json.loads((tmp_path / "run" / "run.json").read_text())["files"] if file["what"] == "trace"
+    ]
+    assert file == {
+        "path": "files/replayed-links.csv",
+        "sha256": hashlib.sha256(copy.read_bytes()).hexdigest(),
+        "what": "trace",
+    }
+    moved = (tmp_path / "run").rename(tmp_path / "moved")
+    repetition = repeat(moved)
+    assert (repetition.same, repetition.changes) == (True, ())
+    (moved / "files" / "replayed-links.csv").write_text("t_s,tx,rx,delivery_ratio\n0,flock-0,flock-1,1\n")
+    repetition = repeat(moved)
+    assert repetition.same is False
+    assert repetition.changes == ("files/replayed-links.csv is not as the run left it: its sha256 differs",)
+
+
+def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
+    """Of one link; the others are out of range, although the robots stand side by side."""
+    pl.DataFrame(
+        {"t_s": [0.0, 1.0], "tx": ["flock-1"] * 2, "rx": ["flock-4"] * 2, "rssi_dbm": [-70, -80]}
+    ).write_parquet(tmp_path / "links.parquet")
+    shutil.copy(WALLED, tmp_path / "walled.toml")
+    radio = ["radio.trace.file='links.parquet'", "radio.fading={distribution='rician', k=1e6}"]
+    strengths: dict[bool, set[int]] = {False: set(), True: set()}
+    with Simulation(tmp_path / "walled.toml", overrides=radio) as simulation:
+        while simulation.tick < 25:
+            finished = simulation.step().finished
+            assert finished is not None
+            assert finished.rssi_dbm is not None
+            assert set(zip(finished.sender.tolist(), finished.receiver.tolist(), strict=True)) <= {(1, 4)}
+            for on_air_ns, rssi_dbm in zip(finished.on_air_at_ns, finished.rssi_dbm, strict=True):
+                strengths[bool(on_air_ns >= NS_PER_S)].add(round(float(rssi_dbm)))
+    assert strengths == {False: {-70}, True: {-80}}
+
+
+def test_a_scenario_made_in_python_brings_its_links_too(tmp_path: Path):
+    scenario = load_scenario(REPLAYED, ["duration_s=1"])
+    renamed = scenario.model_copy(update={"name": "renamed"}).with_source(scenario.source)
+    run(renamed, out=tmp_path / "run")
+    assert repeat(tmp_path / "run").same
+
+
+def lossy_with(tmp_path: Path, text: str, *settings: str) -> tuple[str, str]:
+    """Where and by which key the lossy flock with links of this text is refused."""
+    (tmp_path / "links.csv").write_text(text)
+    shutil.copy(LOSSY, tmp_path / "lossy.toml")
+    with pytest.raises(BadInput) as error:
+        Simulation(tmp_path / "lossy.toml", overrides=["radio.trace.file='links.csv'", *settings])
+    return error.value.where.replace(f"{tmp_path}/", ""), error.value.key
+
+
+def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path):
+    head = "t_s,tx,rx,delivery_ratio"
+    strange, strength = f"{head}\n0,flock-0,flock-20,1\n", "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n"
+    nowhere, others = "radio.trace.file='nowhere.csv'", "radio.trace.others='all'"
+    assert lossy_with(tmp_path, strange) == ("links.csv", "row 1, rx")
+    assert lossy_with(tmp_path, strength) == ("links.csv", "rssi_dbm")
+    assert lossy_with(tmp_path, head, nowhere) == ("lossy.toml", "radio.trace.file")
+    assert lossy_with(tmp_path, head, others) == (f"--set {others}", "radio.trace.others")
+
+
+ROBOTS = ("flock-0", "flock-1", "flock-2")
+HEAD = "t_s,tx,rx,delivery_ratio"
+
+
+def test_csv_and_parquet_are_read_by_name(tmp_path):
+    file = tmp_path / "trace.csv"
+    file.write_text(f"{HEAD}\n0,flock-2,flock-0,0.25\n0.5,flock-2,flock-0,1\n")
+    pl.read_csv(file).write_parquet(tmp_path / "trace.parquet")
+    for path in (file, tmp_path / "trace.parquet"):
+        traces = read_link_traces(path, ROBOTS)
+        assert traces.rssi_dbm is None
+        assert traces.delay_s is None
+        trace = traces.delivery_ratio
+        assert trace is not None
+        found = trace.at(np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000]))
+        assert found == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
+
+
+def test_each_quantity_has_the_rows_that_give_it_a_value(tmp_path):
+    file = tmp_path / "trace.csv"
+    file.write_text("t_s,tx,rx,delay_s,rssi_dbm\n0,flock-0,flock-1,0.5,\n1,flock-0,flock-1,,-60\n")
+    traces = read_link_traces(file, ROBOTS)
+    assert traces.delivery_ratio is None
+    sender, receiver, at_ns = np.array([0, 0, 1]), np.array([1, 1, 0]), np.array([0, 10**9, 10**9])
+    for trace, expected in ((traces.delay_s, [0.5, 0.5, np.nan]), (traces.rssi_dbm, [np.nan, -60.0, np.nan])):
+        assert trace is not None
+        assert trace.at(sender, receiver, at_ns) == pytest.approx(expected, nan_ok=True)
+    assert traces.known(sender, receiver, at_ns).tolist() == [True, True, False]
+
+
+PAIR = "flock-0,flock-1"
+BOTH = "t_s,tx,rx,rssi_dbm,delay_s"
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("t_s,tx,delay_s\n0,flock-0,1\n", "rx"),
+        (f"t_s,tx,rx\n0,{PAIR}\n", ""),
+        (f"{BOTH}\n0,{PAIR},-50,\n1,{PAIR},,\n", "row 2, rssi_dbm or delay_s"),
+        (f"{BOTH}\n0,{PAIR},-50,\n0,{PAIR},,0.1\n1,{PAIR},,-1\n", "row 3, delay_s"),
+        (f"{HEAD}\n0,{PAIR},1\n0,flock-0,flock-9,1\n", "row 2, rx"),
+        (f"{HEAD}\n0,{PAIR},1.5\n", "row 1, delivery_ratio"),
+        (f"{HEAD}\n0,{PAIR},\n", "row 1, delivery_ratio"),
+        (f"{HEAD}\n,{PAIR},1\n", "row 1, t_s"),
+        (f"{HEAD}\n1,{PAIR},1\n0,{PAIR},1\n", "row 2, t_s"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_row_and_column(tmp_path, text, key):
+    file = tmp_path / "trace.csv"
+    file.write_text(text)
+    with pytest.raises(BadInput) as error:
+        read_link_traces(file, ROBOTS)
+    assert (error.value.where, error.value.key) == (str(file), key)

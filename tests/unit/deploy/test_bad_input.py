@@ -1,13 +1,16 @@
 """Bad input is refused before anything starts: one line with file and key, exit code 2, no traceback."""
 
 import socket
+from pathlib import Path
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
+from swarmwire.deploy.certificates.folder import begin_authority
 from swarmwire.world.scenario_file import load_scenario
-from tests.support.deploy.commands import LOSSY, called
+from tests.support.deploy.certificates import DatedFakeClock
+from tests.support.deploy.runs import LOSSY, called
 
 AGENTS = """
 import no_such_module_anywhere
@@ -229,3 +232,73 @@ def test_needs_that_are_no_names_are_refused(tmp_path):
         agent.write_text(f"{NEEDY}\nclass Odd(Needy):\n    needs = {needs}\n")
         error = refused(LOSSY, f"robots.flock.agent={agent}:Odd", "robots.flock.params={}")
         assert error.key == "robots.flock.agent"
+
+
+KINDS = (
+    "bodies, drives, body-keys, sensors, behaviours, fields, events, metrics, radio, presets, stages, fates, engines, "
+    "drivers, gateways, keys"
+)
+OF_SETTINGS = [
+    ("seed", "expected path=value, such as robots.flock.count=30"),
+    ("duration_s=inf", "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
+    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m), as the model unit disk has one"),
+    (
+        "events=[{at_s=1, do='kill', robots={group='flok'}}]",
+        "events.0.robots.group: expected one of flock (did you mean this?); got 'flok'",
+    ),
+]
+OF_FILES = [  # an override by which something else in the file becomes wrong
+    (
+        "radio.measures={}",
+        "robots.flock.agent: Flocking needs 'radio.range', which the radio does not measure: "
+        "[radio.measures] has nothing",
+    ),
+]
+OF_COMMANDS = [
+    ("run absent.toml", "absent.toml: expected a readable file: No such file or directory"),
+    (f"run {LOSSY} --runners all", '--runners: expected "none", "per-robot" or 1 to 20 (the robots), got \'all\''),
+    ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe NAME describes one thing"),
+    ("describe flokking", "flokking: nothing has this name; nearest: Flocking (swarmwire list names all)"),
+    ("export absent --to film.gif", "absent: expected a run folder: there is none"),
+    ("certs issue absent a", "absent: expected a CA's folder: swarmwire certs init absent"),
+    (
+        "certs issue ca a/b",
+        "NAME: expected 1 to 63 letters (a to z), digits, - and _ that start with a letter and do not end in -, "
+        "got 'a/b'",
+    ),
+    (
+        "radio probe unit-disk",
+        "--contention: expected nodes (2 or more), bytes and an interval of 0.001 to 1 s, such as 20,20,0.1",
+    ),
+    ("ctl pause", "expected a run that goes on: this machine has none of yours"),
+]
+
+
+@pytest.fixture
+def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """What a command prints that fails with exit code 2, in a folder with a CA."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    begin_authority(tmp_path / "ca", DatedFakeClock("2026-06-01T12:00:00Z"))
+
+    def call(*words: str) -> str:
+        code, out, errors = called(monkeypatch, capsys, *words)
+        assert (code, out) == (2, "")
+        return errors
+
+    return call
+
+
+@pytest.mark.parametrize(("setting", "line"), OF_SETTINGS)
+def test_a_setting_is_refused_with_its_option_its_key_and_what_was_expected(said, setting, line):
+    assert said("check", str(LOSSY), "--set", setting) == f"error: --set {setting}: {line}\n"
+
+
+@pytest.mark.parametrize(("setting", "line"), OF_FILES)
+def test_what_does_not_fit_a_setting_is_refused_with_its_file(said, setting, line):
+    assert said("check", str(LOSSY), "--set", setting) == f"error: {LOSSY}: {line}\n"
+
+
+@pytest.mark.parametrize(("words", "line"), OF_COMMANDS)
+def test_a_command_is_refused_with_what_to_type_instead(said, words, line):
+    assert said(*words.split()) == f"error: {line}\n"

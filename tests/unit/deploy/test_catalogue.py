@@ -21,17 +21,14 @@ from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.sensors import SENSOR_SPECS
-from swarmwire.deploy.catalogue.entry import Entry
-from swarmwire.deploy.catalogue.find import find
-from swarmwire.deploy.catalogue.kinds import KINDS
-from swarmwire.deploy.catalogue.text import print_entry, print_list
-from swarmwire.deploy.catalogue.units import unit_of
+from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
+from swarmwire.deploy.catalogue.schema import Entry, unit_of
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form
 from swarmwire.world.scenario_file import scenario_schema
-from tests.support.deploy.commands import LOSSY, ROOT, called
-from tests.support.metrics.packages import install
+from tests.support.custom_code import install
+from tests.support.deploy.runs import LOSSY, ROOT, called
 
 EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

@@ -1,22 +1,24 @@
 """What people ask of a run holds it up or ends it, at once, and never changes what it does."""
 
+import signal
 from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
+import typer
 
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.deploy import Result, run
-from swarmwire.deploy import simulation as simulation_module
-from swarmwire.deploy.controls import LOOK_NS, Controls
-from swarmwire.deploy.running import finished
-from swarmwire.deploy.simulation import Simulation
-from swarmwire.deploy.terminal.bindings import BINDINGS, press
+from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.deploy import Result, run, wiring
+from swarmwire.deploy.cli.options import leaving_when_hung_up
+from swarmwire.deploy.controls import LOOK_NS, Controls, Interrupt
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
-from tests.support.deploy.commands import LOSSY
+from tests.support.deploy.runs import LOSSY
 
 RATE_HZ = 10
 TICK_NS = NS_PER_S // RATE_HZ
@@ -199,7 +201,7 @@ def free() -> Result:
 
 
 def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
+    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
     pause, step = controls.toggle_pause, controls.step
@@ -215,14 +217,11 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatc
     assert (result.radio, result.metrics) == (free.radio, free.metrics)
 
 
-class Asker:
+class Asker(Observer):
     """An observer that asks for one thing after each tick, and while the run is held."""
 
     def __init__(self, plan: list[Callable[[], None]]) -> None:
         self.plan = plan
-
-    def begin(self, static: Static) -> None:
-        """Nothing yet."""
 
     def see(self, truth: Truth) -> None:
         self.ask()
@@ -230,9 +229,6 @@ class Asker:
     def ask(self) -> None:
         if self.plan:
             self.plan.pop(0)()
-
-    def end(self, last: PacketCounts | None) -> dict[str, object]:
-        return {}
 
 
 def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
@@ -297,3 +293,57 @@ def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
     fixed = Controls(clock, RATE_HZ, speed_fixed=True)
     with pytest.raises(BadInput, match="programs elsewhere"):
         fixed.set_speed(2.0)
+
+
+ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+
+def handlers() -> list[object]:
+    return [signal.getsignal(number) for number in ASKING]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_asks_and_the_second_ends_at_once(number):
+    with Interrupt() as interrupt:
+        assert not interrupt.asked
+        signal.raise_signal(number)
+        assert (interrupt.asked, interrupt.hung_up) == (True, False)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+
+def test_a_terminal_that_is_gone_asks_however_often_it_says_so():
+    with Interrupt() as interrupt:
+        for _ in range(3):
+            signal.raise_signal(signal.SIGHUP)
+        assert (interrupt.asked, interrupt.hung_up) == (True, True)
+
+
+def test_whoever_handled_signals_before_does_so_again():
+    before = handlers()
+    with Interrupt():
+        assert all(one != other for one, other in zip(handlers(), before, strict=True))
+    assert handlers() == before
+
+
+def test_a_hang_up_that_is_ignored_stays_so():
+    """As nohup starts a program."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert not interrupt.asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_hang_up_before_the_first_tick_has_its_own_exit_code():
+    interrupt = Interrupt()
+    with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    interrupt.hung_up = True
+    with pytest.raises(typer.Exit) as left, leaving_when_hung_up(interrupt):
+        raise Interrupted("interrupted while it waited for its runners")
+    assert left.value.exit_code == 129

@@ -1,13 +1,18 @@
-"""Law 2: the same scenario and seed give the same run bit for bit, however robots are split, over encoded frames."""
+"""Law 2: the same scenario and seed give the same run bit for bit, however robots and arenas are split."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from swarmwire.deploy import Result, backends, run
-from tests.support.deploy.commands import LOSSY, ROOT
-from tests.support.encoded_backend import EncodedBackend
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.deploy import Result, Simulation, backends, run
+from tests.support.agent.hosts import PLAYERS
+from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
+from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=1.5"]
 SCENARIOS = sorted(
@@ -67,3 +72,219 @@ def test_an_arena_is_the_same_alone_and_as_one_of_eight(monkeypatch, local, thro
 def test_another_seed_or_another_loss_is_another_run(local):
     assert run(LOSSY, overrides=SHORT, seed=2).trajectory_sha256 != local.trajectory_sha256
     assert run(LOSSY, overrides=[*SHORT, "radio.loss=0.31"]).trajectory_sha256 != local.trajectory_sha256
+
+
+PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
+
+
+class StatesSeen(Observer):
+    """Observer that keeps the states of all ticks."""
+
+    def __init__(self) -> None:
+        self.ticks: list[list[str]] = []
+
+    def see(self, truth: Truth) -> None:
+        self.ticks.append([truth.states[code] for code in truth.state])
+
+
+def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
+    seen = StatesSeen()
+    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=15"], observers=[seen])
+    return seen.ticks
+
+
+@pytest.fixture(scope="module")
+def alone() -> list[list[str]]:
+    return states(None, [2])
+
+
+def test_states_are_the_same_however_the_agents_are_spread(alone: list[list[str]]) -> None:
+    assert states(3, [2]) == alone
+    assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
+
+
+def test_states_of_an_arena_are_the_same_beside_others(alone: list[list[str]]) -> None:
+    assert [tick[-10:] for tick in states(None, [5, 2])] == alone
+
+
+MIXED = """
+format = 1
+name = "two rates"
+duration_s = 6.0
+arena = {{ size_m = [4.0, 4.0] }}
+
+[robots.scouts]
+body = "epuck"
+count = 5
+agent = "swarmwire.agent.behaviours:Flocking"
+act_every_ticks = {scouts}
+params = {{ separation_m = 0.8 }}
+
+[robots.carriers]
+body = "footbot"
+count = 4
+agent = "{carriers}"
+act_every_ticks = {every}
+
+[radio]
+range_m = 3.0
+loss = 0.2
+latency_s = 0.05
+measures = {{ range = {{ noise_m = 0.02 }}, bearing = {{ noise_rad = 0.05 }} }}
+"""
+COUNTING = """
+from swarmwire.agent import Agent, Message, f4
+
+class Word(Message):
+    number: f4
+
+class Counting(Agent):
+    needs = ("odometry",)
+
+    def __init__(self):
+        self.steps = self.words = 0
+
+    def step(self, robot):
+        assert round(robot.time_s / robot.period_s, 6) == self.steps
+        times = [packet.received_at_ns for packet in robot.radio.received(Word)]
+        assert times == sorted(times)
+        assert all(robot.time_s - robot.period_s - 1e-9 < at / 1e9 <= robot.time_s for at in times)
+        self.steps += 1
+        self.words += len(times)
+        robot.drive(0.01 * (self.words % 7), robot.odometry.left_m - robot.odometry.right_m + 0.2)
+        robot.radio.send(Word(number=self.steps))
+"""
+
+
+SLOW = "robots.flock.act_every_ticks=4"
+
+
+def radio_of(scenario, *overrides):
+    radio = run(scenario, overrides=overrides).radio
+    assert radio is not None
+    return radio
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    (tmp_path / "counting.py").write_text(COUNTING)
+
+    def written(scouts=1, every=3, carriers="counting.py:Counting"):
+        path = tmp_path / f"mixed-{scouts}-{every}.toml"
+        path.write_text(MIXED.format(scouts=scouts, every=every, carriers=carriers))
+        return path
+
+    return written
+
+
+@pytest.mark.parametrize(("scouts", "every"), [(1, 3), (2, 5)])
+def test_two_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
+    path = mixed(scouts, every)
+    short = ["duration_s=3"]
+    local = run(path, seeds=[1, 2], overrides=short)
+    for runners in (1, 3, PER_ROBOT):
+        other = run_spread(path, runners, seeds=[1, 2], overrides=short)
+        assert other.trajectory_sha256 == local.trajectory_sha256
+        assert [arena.radio for arena in other.arenas] == [arena.radio for arena in local.arenas]
+    assert run(path, seed=2, overrides=short).trajectory_sha256[0] == local.trajectory_sha256[1]
+
+
+def test_a_group_sends_as_often_as_it_acts(mixed):
+    radio = radio_of(mixed(1, 3))
+    assert radio.sent == 5 * 60 + 4 * 20
+    assert sum(radio.fates.values()) == radio.intended == 8 * radio.sent
+
+
+def test_packets_reach_a_slow_agent_at_the_tick_at_which_it_acts():
+    every = ["duration_s=20", "radio.loss=0", "radio.jitter_s=0", "radio.send_offset='tick'", "radio.latency_s=0.05"]
+    fast = radio_of(LOSSY, *every)
+    slow = radio_of(LOSSY, *every, SLOW)
+    assert fast.latency_agent_s.p50 == pytest.approx(0.1, rel=0.005)
+    assert slow.latency_agent_s.p50 == pytest.approx(0.4, rel=0.005)
+    assert slow.latency_air_s == fast.latency_air_s
+
+
+@pytest.mark.parametrize("value", ["0", "1.5", "'2'"])
+def test_a_rate_that_is_none_is_refused(value):
+    with pytest.raises(BadInput, match="robots.flock.act_every_ticks"):
+        run(LOSSY, overrides=[f"robots.flock.act_every_ticks={value}"])
+
+
+# One group acts in every third tick only, and some of the other are dead for a while.
+SCENARIO = f"""
+format = 1
+name = "insisting"
+duration_s = 3.0
+arena = {{ size_m = [4.0, 4.0] }}
+
+[robots]
+often = {{ body = "epuck", count = 5, agent = "{PLAYERS}:Insisting" }}
+seldom = {{ body = "epuck", count = 3, agent = "{PLAYERS}:Insisting", act_every_ticks = 3 }}
+
+[radio]
+preset = "ieee802154"
+loss = 0.4
+access = {{ method = "csma-802154", max_retries = 1 }}
+
+[[events]]
+at_s = 1.0
+do = "kill"
+robots = {{ group = "often", count = 2 }}
+for_s = 0.5
+"""
+
+
+@pytest.fixture(scope="module")
+def insisting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("tx_status") / "insisting.toml"
+    path.write_text(SCENARIO)
+    return path
+
+
+@pytest.fixture(scope="module")
+def insisting_alone(insisting: Path) -> Result:
+    return run(insisting, seeds=[1, 2])
+
+
+@pytest.mark.parametrize("runners", [1, 3, PER_ROBOT])
+def test_agents_that_send_again_do_so_alike_in_one_process_and_in_many(
+    insisting: Path, insisting_alone: Result, runners
+):
+    found = run_spread(insisting, runners, seeds=[1, 2])
+    assert found.trajectory_sha256 == insisting_alone.trajectory_sha256
+
+
+@pytest.mark.parametrize("runners", [None, 2])
+def test_both_kinds_of_agent_do_the_same(insisting: Path, insisting_alone: Result, runners):
+    vector = [f"robots.{name}.agent={PLAYERS}:VectorInsisting" for name in ("often", "seldom")]
+    found = run_spread(insisting, runners, seeds=[1, 2], overrides=vector)
+    assert found.trajectory_sha256 == insisting_alone.trajectory_sha256
+
+
+def test_each_robot_is_told_of_packets_also_one_that_sends_to_itself(insisting: Path):
+    """Or the tests above would say nothing: robots drive as fast as they were told of, and else stand."""
+    with Simulation(insisting) as simulation:
+        last = [simulation.step() for _ in range(30)][-1]
+    assert (last.command[:, 0] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "radio",
+    [
+        "{ range_m = 2.0 }",
+        "{ preset = 'ieee802154', access = { method = 'none' } }",
+        "{ preset = 'ieee802154', access = { method = 'aloha' } }",
+        "{ preset = 'ieee802154', access = { acknowledged = false } }",
+        None,
+    ],
+)
+def test_an_agent_that_asks_is_refused_where_nothing_is_acknowledged(
+    insisting: Path, tmp_path: Path, radio: str | None
+):
+    path = tmp_path / "refused.toml"
+    before, after = SCENARIO.split("[radio]")
+    path.write_text(f"{before}\n[[events]]{after.split('[[events]]')[1]}")
+    with pytest.raises(BadInput) as caught:
+        run(path, overrides=[f"radio={radio}"] if radio else [])
+    assert (caught.value.where, caught.value.key) == (str(path), "robots.often.agent")
+    assert "'radio.tx_status'" in caught.value.expected

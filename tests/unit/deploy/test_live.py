@@ -9,10 +9,10 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
-from swarmwire.deploy.commands.view import view_command
-from swarmwire.deploy.live import viewer_program
-from swarmwire.deploy.live.evened import Evened
-from swarmwire.deploy.live.sampling import Sampling, Since
+from swarmwire.deploy.cli.view import view_command
+from swarmwire.deploy.live import viewer
+from swarmwire.deploy.live.published import Sampling, Since
+from swarmwire.deploy.live.viewer import Evened
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 
 
@@ -71,9 +71,9 @@ def test_a_window_is_opened_only_where_there_is_a_screen(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert not viewer_program.has_screen()
+    assert not viewer.has_screen()
     monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
-    assert viewer_program.has_screen()
+    assert viewer.has_screen()
 
 
 def test_tallies_of_several_ticks_are_evened_to_single_ones_without_a_loss():

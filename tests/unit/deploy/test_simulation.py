@@ -1,15 +1,20 @@
-"""A simulation stepped by hand is the run that `run` makes."""
+"""A simulation stepped by hand, in real time, or with what is asked of an execution: seeds, runners and pace."""
 
 import json
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.deploy import Simulation, run
-from swarmwire.metrics.verify.verify import verify
-from tests.support.deploy.commands import LOSSY
-from tests.support.deploy.layouts import run_spread
+from swarmwire.deploy import Simulation, run, wiring
+from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
+from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.world.scenario_file import scenario_from
+from tests.support.clocks import MS, FakeClock, GoingClock
+from tests.support.deploy.runs import LOSSY, called, run_spread
+from tests.support.world.scenes import changed
 
 SHORT = ["duration_s=2"]
 
@@ -85,3 +90,126 @@ def test_the_folder_of_a_run_that_ended_before_its_first_tick_is_whole(tmp_path)
         pass
     assert simulation.result.ticks == 0
     assert [finding for finding in verify(tmp_path / "run") if not finding.good] == []
+
+
+@pytest.fixture
+def _moved(monkeypatch):
+    monkeypatch.setattr(wiring, "WallClock", FakeClock)
+
+
+@pytest.mark.usefixtures("_moved")
+def test_agents_in_this_process_are_paced_and_do_the_same():
+    short = ["duration_s=2"]
+    result = run(LOSSY, overrides=short, realtime=10)
+    assert (result.mode, result.wall_time_s) == ("realtime", 0.2)
+    assert result.realtime is not None
+    assert (result.realtime.factor, result.realtime.missed_ticks) == (10, 0)
+    assert result.trajectory_sha256 == run(LOSSY, overrides=short).trajectory_sha256
+
+
+def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkeypatch, capfd):
+    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
+    result = run(LOSSY, overrides=["duration_s=2"], realtime=1e6)
+    assert result.realtime is not None
+    assert result.realtime.missed_ticks == 20
+    assert result.realtime.worst_lag_s > 0
+    assert "does not keep up with 1e+06 x real time" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key", "expected"),
+    [
+        *(({"realtime": factor}, "--realtime", "a factor above 0") for factor in (0, -1, float("nan"), "fast")),
+        ({"realtime": 1, "overrides": ["run.watchdog_s=0"]}, "run.watchdog_s", "a number above 0"),
+        ({"subtick": 0.001}, "--subtick", "--realtime with it"),
+        ({"subtick": 0.0009, "realtime": 1}, "--subtick", "0.001 s to a tick's 0.1 s"),
+        ({"subtick": float("nan"), "realtime": 1}, "--subtick", "0.001 s"),
+        ({"subtick": 0.06, "realtime": 2}, "--subtick", "to a tick's 0.05 s"),
+    ],
+)
+def test_what_cannot_be_is_refused(arguments, key, expected):
+    with pytest.raises(BadInput, match=expected) as refused:
+        run(LOSSY, **arguments)
+    assert key in (refused.value.where, refused.value.key)
+
+
+def test_without_a_radio_there_is_nothing_between_ticks(tmp_path):
+    bare = LOSSY.read_text().partition("[radio]")[0].replace("behaviours:Flocking", "behaviours:Diffusion")
+    (tmp_path / "bare.toml").write_text(bare.replace("params = { separation_m = 0.8 }", ""))
+    with pytest.raises(BadInput, match="a scenario with a radio"):
+        run(tmp_path / "bare.toml", realtime=1, subtick=0.01)
+
+
+@pytest.mark.usefixtures("_moved")
+@pytest.mark.parametrize("arguments", [["--realtime", "1"], ["--realtime=20"]])
+def test_the_command_keeps_to_the_factor(arguments, monkeypatch, capsys, tmp_path):
+    command = ("run", *arguments, LOSSY, "--set", "duration_s=0.3", "--out", tmp_path / "run")
+    code, out, _ = called(monkeypatch, capsys, *command)
+    assert code == 0
+    assert f"x {20 if '20' in arguments[-1] else 1}; " in out
+
+
+@pytest.mark.parametrize("arguments", [["--realtime", "0"], ["--realtime", "-2"], ["--realtime=fast"]])
+def test_the_command_refuses_a_factor_in_one_line(arguments, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
+    assert (code, out, errors.count("\n")) == (2, "", 1)
+    assert "--realtime: " in errors
+
+
+SCENARIO = scenario_from(changed("seed", 5), "mine.toml")
+
+
+def test_seeds_are_how_many_a_range_without_its_end_or_a_list():
+    assert seed_list("3") == seed_list(3) == seed_list(" 3 ") == (1, 2, 3)
+    assert seed_list("4:7") == (4, 5, 6)
+    assert seed_list("7,1,5") == seed_list([7, 1, 5]) == (7, 1, 5)
+    assert seed_list("9,") == seed_list("9:10") == seed_list([9]) == (9,)
+
+
+@given(st.lists(st.integers(0, 2**63 - 1), min_size=1, max_size=9, unique=True))
+def test_any_seeds_can_be_written_as_a_list(seeds):
+    assert seed_list(",".join(map(str, seeds)) + ",") == seed_list(seeds) == tuple(seeds)
+
+
+@pytest.mark.parametrize(
+    "of",
+    ["0", "", "x", "0.5", "5:5", "9:1", "1,1", "-1,2", "1:99999999999999999999", "9" * 30, [], [1.5], [-1], [2**63]],
+)
+def test_what_gives_no_seeds_is_refused_by_its_name(of):
+    with pytest.raises(BadInput) as told:
+        seed_list(of, "--record-seeds")
+    assert told.value.where == "--record-seeds"
+
+
+@pytest.mark.parametrize(
+    ("seed", "seeds", "chosen"),
+    [(None, None, (5,)), (0, None, (0,)), (7, None, (7,)), (None, [3, 0], (3, 0)), (None, "3", (1, 2, 3))],
+)
+def test_the_seeds_are_those_asked_for_or_the_scenarios_own(seed, seeds, chosen):
+    assert choose_seeds(SCENARIO, seed, seeds) == chosen
+
+
+@pytest.mark.parametrize(("seed", "seeds", "where"), [(1, "2", "--seed"), (-1, None, "--seed"), (None, [], "--seeds")])
+def test_seeds_that_are_no_good_are_refused_by_their_option(seed, seeds, where):
+    with pytest.raises(BadInput) as told:
+        choose_seeds(SCENARIO, seed, seeds)
+    assert told.value.where == where
+
+
+def test_so_many_arenas_as_no_machine_has_room_for_are_refused():
+    assert len(choose_seeds(SCENARIO, None, MAX_ARENAS)) == MAX_ARENAS
+    with pytest.raises(BadInput, match="sweep takes more"):
+        choose_seeds(SCENARIO, None, MAX_ARENAS + 1)
+
+
+@pytest.mark.parametrize(
+    ("runners", "count"), [(None, 0), ("none", 0), ("per-robot", 6), (1, 1), (6, 6), ("1", 1), ("6", 6)]
+)
+def test_runners_are_a_number_or_a_word(runners, count):
+    assert runner_count(runners, 6) == count
+
+
+@pytest.mark.parametrize(("asked", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
+def test_a_pace_may_be_written_as_text(asked, factor):
+    assert real_time_factor(asked) == factor

@@ -1,4 +1,4 @@
-"""What a run leaves behind: a summary that adds up, a recording, and the same numbers from Python."""
+"""What a run leaves behind: a summary that adds up, the same numbers from Python, and every metric that there is."""
 
 import json
 
@@ -6,8 +6,8 @@ import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
-from tests.support.deploy.commands import LOSSY, called
-from tests.support.deploy.layouts import run_spread
+from swarmwire.metrics.registry import METRICS, standard
+from tests.support.deploy.runs import LOSSY, called, run_spread
 
 MEASURED = {"wall_time_s", "start_time_s", "realtime_factor"}
 REQUIRED = MEASURED | {
@@ -64,7 +64,7 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
 def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path, monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
     assert code == 0
-    for text in ("tick 20/20", "(link_pdr ", "order", "swarmwire view", "--gif"):
+    for text in ("tick 20/20", "(link_pdr ", "order", "swarmwire view", "--to film.gif"):
         assert text in out
 
 
@@ -78,7 +78,7 @@ def test_help_teaches(call, monkeypatch, capsys):
 def test_check_says_what_is_in_a_good_scenario(monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "check", LOSSY)
     assert code == 0
-    for text in ("20 epuck", "flock", "120 s", "10 Hz"):
+    for text in ("20 x epuck", "flock", "120 s", "10 Hz"):
         assert text in out
 
 
@@ -139,3 +139,21 @@ def test_groups_of_one_body_whose_sheets_the_scenario_changes_do_not_hide_each_o
     (tmp_path / "stones.toml").write_text(LIT[: LIT.index("[robots.moths]")] + placed + heavy)
     result = run(tmp_path / "stones.toml", overrides=["duration_s=0.1"])
     assert result.global_sensors == {"kilobot of placed": ["positioning"]}
+
+
+NAMES = sorted(METRICS.keys() - set(standard()))
+SETTING = [
+    "duration_s=6",
+    f"metrics={json.dumps(NAMES)}",
+    'arena.lights=[{intensity=4.6, count=1, place="random"}]',
+    'events=[{at_s=2.0, do="kill", robots={group="flock", share=0.3}, for_s=2.0}]',
+]
+
+
+def test_it_is_the_same_alone_and_beside_other_arenas():
+    alone = run(LOSSY, seeds=[2], overrides=SETTING).arenas[0].metrics
+    assert alone.keys() == METRICS.keys()
+    beside = run(LOSSY, seeds=[5, 2, 3], overrides=SETTING).arenas[1].metrics
+    assert beside == alone
+    # What has no value is the same everywhere: nobody tells a number here, and some things do not happen.
+    assert sum(found.mean is not None for found in alone.values()) > 0.7 * len(METRICS)

@@ -1,18 +1,20 @@
-"""Metrics as they are measured in a run: values and statistics, what a tick offers them, and those that are sampled."""
+"""Metrics as they are measured in a run, and the conditions on them that end arenas."""
 
 import json
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.moment import Components, Moment, agreement
-from swarmwire.metrics.registry import METRICS, register
-from swarmwire.metrics.sampled import Sampled
+from swarmwire.metrics.measure import Condition, Metrics, StopConditions
+from swarmwire.metrics.metric import Components, Metric, Sampled, TickView, agreement
 from swarmwire.metrics.swarm.order import Order
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
 
@@ -28,7 +30,7 @@ class Turned(Metric):
     bounds = (0.0, None)
 
     def begin(self, static):
-        return lambda moment: np.count_nonzero(moment.heading_rad > self.above_rad, axis=1).astype(np.float64)
+        return lambda view: np.count_nonzero(view.heading_rad > self.above_rad, axis=1).astype(np.float64)
 
 
 def seen(metrics, of, *ticks):
@@ -87,21 +89,6 @@ def test_a_metric_with_parameters_is_given_as_an_object():
     assert found["turned"]["final"] == 2.0
 
 
-def test_a_registered_metric_is_measured_by_name(monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.registry.METRICS", dict(METRICS))
-    register(Turned)
-    assert [metric.name for metric in Metrics(["turned"]).metrics] == ["turned"]
-
-
-@pytest.mark.parametrize("taken", ["order", "link_pdr"])
-def test_a_name_that_is_taken_is_refused(taken):
-    class Other(Turned):
-        name = taken
-
-    with pytest.raises(BadInput, check=lambda error: error.key == f"metrics.{taken}"):
-        register(Other)
-
-
 @pytest.mark.parametrize(
     ("names", "hint"), [(["ordre"], "'ordre'"), (["order", "order"], "'order'"), (["order", Order()], "'order'")]
 )
@@ -114,18 +101,18 @@ def test_rows_are_folded_by_arena():
     of = static(3, arenas=2)
     pose, velocity = np.arange(36.0).reshape(2, 6, 3)
     alive = np.array([True, True, False, True, False, False])
-    moment = Moment(of, truth(of, pose=pose, velocity=velocity, alive=alive))
-    assert (moment.position_m[1, 2] == pose[5, :2]).all()
-    assert (moment.velocity[1, 2, :2] == velocity[5, :2]).all()
-    assert moment.heading_rad[0, 1] == pose[1, 2]
-    assert moment.robots_alive.tolist() == moment.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
-    assert moment.components is None
+    view = TickView(of, truth(of, pose=pose, velocity=velocity, alive=alive))
+    assert (view.position_m[1, 2] == pose[5, :2]).all()
+    assert (view.velocity[1, 2, :2] == velocity[5, :2]).all()
+    assert view.heading_rad[0, 1] == pose[1, 2]
+    assert view.robots_alive.tolist() == view.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
+    assert view.components is None
 
 
 def test_components_are_those_of_the_robots_alive():
     of = static(3, arenas=2)
     alive = np.array([True, True, True, True, True, False])
-    found = Moment(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
+    found = TickView(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
     assert isinstance(found, Components)
     assert found.pieces.tolist() == [1, 2]
     assert found.largest.tolist() == [3, 1]
@@ -142,9 +129,9 @@ def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
 
 def test_directions_are_the_cosines_and_sines_of_headings():
     of = static(3, arenas=2)
-    moment = Moment(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
-    np.testing.assert_allclose(moment.direction[0], np.cos(moment.heading_rad))
-    np.testing.assert_allclose(moment.direction[1], np.sin(moment.heading_rad))
+    view = TickView(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
+    np.testing.assert_allclose(view.direction[0], np.cos(view.heading_rad))
+    np.testing.assert_allclose(view.direction[1], np.sin(view.heading_rad))
 
 
 @dataclass(frozen=True)
@@ -156,7 +143,7 @@ class Ticks(Sampled):
     bounds = (0.0, None)
 
     def sample(self, static):
-        return lambda moment: np.full(static.arenas, float(moment.truth.tick))
+        return lambda view: np.full(static.arenas, float(view.truth.tick))
 
 
 def sampled_in(every_s, ticks=12):
@@ -185,3 +172,134 @@ def test_one_sampled_metric_serves_many_runs():
         metrics.begin(of)
         metrics.see(truth(of, tick))
         assert metrics.latest["ticks_sampled"].tolist() == [tick]
+
+
+NONE = math.nan
+COMPARED = {
+    "at_least": lambda value, limit: value >= limit,
+    "at_most": lambda value, limit: value <= limit,
+    "above": lambda value, limit: value > limit,
+    "below": lambda value, limit: value < limit,
+}
+
+
+@dataclass(frozen=True)
+class Script(Metric):
+    """What a test says, a row of arenas per tick."""
+
+    values: tuple[tuple[float, ...], ...] = ()
+
+    name = "script"
+    help = "what a test says"
+    bounds = (-1e9, None)
+
+    def begin(self, static: Any) -> Any:
+        return lambda moment: np.array(self.values[moment.truth.tick])
+
+
+@dataclass(frozen=True)
+class Tallied(Script):
+    """The same, as a count."""
+
+    name = "tallied"
+    kind = "count"
+
+
+def judged(values, *conditions, kind=Script):
+    """The judge after these values (ticks, arenas) at 10 Hz, and in which tick each arena was found over (None)."""
+    of = static(1, arenas=len(values[0]))
+    metrics = Metrics([kind(values=tuple(map(tuple, values)))])
+    stop_conditions = StopConditions(metrics, conditions)
+    metrics.begin(of)
+    stop_conditions.begin(of)
+    found = [None] * of.arenas
+    for tick in range(len(values)):
+        for observer in (metrics, stop_conditions):
+            observer.see(truth(of, tick))
+        over = stop_conditions.done()
+        for arena in range(of.arenas):
+            if over is not None and over[arena] and found[arena] is None:
+                found[arena] = tick
+    return stop_conditions.end(None)["stops"], found
+
+
+def one(series, *conditions, **options):
+    stops, found = judged([[value] for value in series], *conditions, **options)
+    return stops[0]["stop_time_s"], stops[0]["stopped_by"], found[0]
+
+
+def script(comparison="at_least", limit=1.0, hold_s=0.0):
+    return Condition("script", comparison, limit, hold_s)
+
+
+@pytest.mark.parametrize(
+    ("series", "condition", "stop"),
+    [
+        ([0, 0.5, 1, 0, 1], script(), (0.2, 2)),
+        ([1, 0, 0, 1], script(), (0.0, 0)),
+        ([1, 0, 1, 1, 1, 1], script(hold_s=0.3), (0.2, 5)),
+        ([0, 1, 1, 1], script(hold_s=0.3), None),
+        ([1, 1, NONE, 1, 1, 1], script(hold_s=0.2), (pytest.approx(0.3), 5)),
+        ([NONE] * 3, script("below", 5.0), None),
+        ([1.0], script("at_most"), (0.0, 0)),
+        ([1.0], script("above"), None),
+        ([1.0], script("below"), None),
+    ],
+)
+def test_the_stop_time_is_where_the_first_stretch_that_held_began(series, condition, stop):
+    stop_time_s, over = stop or (None, None)
+    assert one(series, condition) == (stop_time_s, str(condition) if stop else None, over)
+
+
+def test_a_condition_is_told_in_words():
+    assert str(script()) == "script at least 1"
+    assert str(script("above", 0.0, 0.2)) == "script above 0 for 0.2 s"
+
+
+def test_of_several_conditions_any_is_enough_and_the_first_is_named():
+    first, second = script("at_least", 2.0), script("above", 0.0, 0.2)
+    assert one([0, 2, 2], first, second)[:2] == (0.1, str(first))
+    assert one([1, 1, 2], first, second)[:2] == (0.2, str(first))
+    assert one([1, 1, 1], first, second)[:2] == (0.0, str(second))
+
+
+def test_a_count_is_compared_by_its_total():
+    assert one([1, 2, 0, 3], Condition("tallied", "at_least", 6.0), kind=Tallied)[2] == 3
+
+
+@given(
+    values=st.lists(st.lists(st.sampled_from([0.0, 0.5, 1.0, NONE]), min_size=3, max_size=3), min_size=1, max_size=25),
+    conditions=st.lists(
+        st.builds(
+            Condition,
+            st.just("script"),
+            st.sampled_from(list(COMPARED)),
+            st.sampled_from([0.0, 0.5, 1.0]),
+            st.sampled_from([0.0, 0.05, 0.1, 0.3, 0.7]),
+        ),
+        min_size=1,
+        max_size=3,
+    ),
+)
+def test_each_arena_ends_as_the_definition_reads(values, conditions):
+    stops, found = judged(values, *conditions)
+    for arena, series in enumerate(zip(*values, strict=True)):
+        stop = by_definition(series, conditions)
+        assert stops[arena] == {"stop_time_s": stop[1], "stopped_by": stop[2]}
+        assert found[arena] == stop[0]
+
+
+def by_definition(series, conditions):
+    """The tick in which it is over, the start of the held stretch, and the condition, each looked for from scratch."""
+    for now in range(len(series)):
+        for of in conditions:
+            true = [COMPARED[of.comparison](value, of.limit) for value in series]
+            stretches = [start for start in range(now + 1) if all(true[start : now + 1])]
+            long_enough = [t0 for t0 in stretches if time_ns(now) - time_ns(t0) >= to_ns(of.hold_s)]
+            if long_enough:
+                return now, to_s(time_ns(min(stretches))), str(of)
+    return None, None, None
+
+
+def time_ns(tick):
+    return tick_start_ns(tick, 10)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays
-from swarmwire.metrics.drawing.radio_range import in_range
-from swarmwire.metrics.network.distance_counts import Places
+from swarmwire.metrics.drawing.swarm import in_range
+from swarmwire.metrics.run_folder.distances import Places
 from swarmwire.metrics.torus import link_lines, shortest, whole_path
 from tests.support.metrics.films import OBSTACLES
 from tests.support.metrics.truths import static

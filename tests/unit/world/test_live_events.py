@@ -11,7 +11,7 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import changed, posed
+from tests.support.world.scenes import changed, posed
 from tests.unit.world.test_event_scheduler import Ahead, Watch
 
 RATE_HZ = 10
@@ -48,7 +48,7 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
         ({"do": "burn"}, "do: expected one of blackout"),
         ({"do": "kill"}, "robots: is missing; expected a table"),
         ({"do": "kill", "robots": {"names": ["flock-99"]}}, "robots.names: expected names of robots, such as flock-0;"),
-        ({"do": "kill", "robots": {"group": "flok"}}, "robots.group: expected one of flock, big (did you mean flock?)"),
+        ({"do": "kill", "robots": {"group": "flok"}}, "robots.group: expected one of flock (did you mean this?), big"),
         ({**KILL, "for_s": -1.0}, "for_s: expected a number above 0"),
         ({**KILL, "at_s": 3.0}, "at_s: expected no time"),
         ({**SET, "to": 2.0}, "to: expected at most 1"),

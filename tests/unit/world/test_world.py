@@ -1,14 +1,29 @@
-"""The world keeps to its contract: rows, needs, commands, and the same bits alone or beside other arenas."""
+"""The world."""
+
+import hashlib
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.packets import ReceivedPackets
+from swarmwire.comms.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
+from swarmwire.deploy import run
+from swarmwire.world import trajectory_hash
+from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
-from tests.support.world.samples import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
+from tests.support.world.scenes import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
+
+POSES = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+ALIVE = np.ones(6, np.bool_)
+ALL_FOUR = np.ones(4, np.bool_)
+ARENAS, ROBOTS, TICKS = 3, 2, 9
+ROWS = ARENAS * ROBOTS
 
 
 def sample_world(*seeds: int) -> World:
@@ -124,3 +139,228 @@ def test_arrays_of_a_tick_are_not_written_to_later() -> None:
 def test_a_world_has_an_arena() -> None:
     with pytest.raises(BadInput, match="expected at least one seed"):
         World(scenario_from(SAMPLE, "f"), [], {})
+
+
+def moved(failed: dict[str, np.ndarray], ticks: int = 20) -> World:
+    world = World(posed(POSES), [1], {"a": ("proximity", "compass")})
+    world.fail(failed)
+    for _ in range(ticks):
+        world.move(commanded(world, 0.1, 0.0))
+    return world
+
+
+def test_failed_motors_brake_and_the_others_go_on():
+    world = moved({"motors": np.array([True, False])})
+    assert np.abs(world.pose[0] - POSES[0]).max() < 1e-9
+    assert world.pose[1, 0] > POSES[1][0] + 0.15
+
+
+@pytest.mark.parametrize(("part", "sign"), [("left_wheel", 1.0), ("right_wheel", -1.0)])
+def test_a_robot_turns_around_the_wheel_that_failed(part: str, sign: float):
+    world = moved({part: np.array([True, False])})
+    base_m = world.static.groups[0].body.wheels.wheel_base_m
+    assert world.velocity[0, 2] == pytest.approx(sign * 0.1 / base_m, rel=1e-3)
+    # The wheel that stands still is the centre of the circle.
+    assert np.hypot(*(world.pose[0, :2] - [-1.0, sign * base_m / 2])) == pytest.approx(base_m / 2, rel=0.05)
+
+
+def test_a_sense_that_failed_reads_blank_until_it_is_mended():
+    world = moved({"compass": np.array([True, False])}, ticks=1)
+    heading = world.sense(1)["a"].fields["compass.heading_rad"]
+    assert np.isnan(heading[0])
+    assert np.isfinite(heading[1])
+    world.fail({})
+    assert np.isfinite(world.sense(2)["a"].fields["compass.heading_rad"]).all()
+
+
+def event(**keys: Any) -> dict[str, Any]:
+    return {"at_s": 1.0, "do": "fail", "robots": {"group": "flock"}, **keys}
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        (event(), "events.0.part: is missing"),
+        (event(part="nose"), "events.0.part: expected one of battery, motors, left_wheel, right_wheel, proximity, "),
+        (event(part="motors", per_hour=0.0), "events.0.per_hour: expected a number above 0"),
+    ],
+)
+def test_what_cannot_fail_is_refused(table: dict[str, Any], told: str):
+    with pytest.raises(BadInput, match=rf"sample\.toml: {told}"):
+        scenario_from(changed("events", [table]), "sample.toml")
+
+
+def test_failures_are_told_and_equal_for_an_arena_alone_and_beside_others():
+    table = event(part="motors", per_hour=2000.0, for_s=1.0)
+    del table["robots"]["group"]
+    table["robots"]["share"] = 0.5
+    mapping = {**changed("events", [table]), "duration_s": 4.0}
+    for group in mapping["robots"].values():
+        group["agent"] = "swarmwire.agent.behaviours:Diffusion"
+    scenario = scenario_from(mapping, "sample.toml")
+    alone = [run(scenario, seed=seed).trajectory_sha256[0] for seed in (3, 4)]
+    assert run(scenario, seeds=[3, 4]).trajectory_sha256 == alone
+    without = scenario_from({**mapping, "events": []}, "sample.toml")
+    assert run(without, seed=3).trajectory_sha256[0] != alone[0], "something must have failed"
+
+
+def notes(*named: tuple[int, str]) -> SparseTable:
+    names = tuple(dict.fromkeys(state for _, state in named))
+    rows = np.array([row for row, _ in named], np.int64)
+    return SparseTable(rows, np.zeros_like(rows), np.array([names.index(state) for _, state in named], float), names)
+
+
+def shown(states: States) -> list[str]:
+    return [states.names[code] for code in states.code]
+
+
+def test_a_state_holds_until_the_next_is_named():
+    states = States(1, 6)
+    states.take(notes((1, "search"), (4, "wait")), ALIVE)
+    states.take(notes((4, "search")), ALIVE)
+    assert shown(states) == ["", "search", "", "", "search", ""]
+
+
+def test_new_states_are_numbered_by_row_whatever_the_order_and_division_of_the_notes():
+    together, joined = States(1, 6), States(1, 6)
+    together.take(notes((5, "c"), (0, "b"), (3, "a")), ALIVE)
+    joined.take(SparseTable.joined([notes((3, "a")), notes((5, "c"), (0, "b"))]), ALIVE)
+    assert together.names == joined.names == ("", "b", "a", "c")
+    assert together.code.tolist() == joined.code.tolist()
+
+
+def test_the_dead_name_nothing_and_the_revived_start_afresh():
+    states, dead = States(1, 6), ALIVE.copy()
+    dead[2] = False
+    states.take(notes((2, "search"), (3, "search")), dead)
+    assert shown(states) == ["", "", "", "search", "", ""]
+    states.forget(np.arange(6) == 3)
+    assert shown(states) == [""] * 6
+
+
+def test_too_many_states_are_counted_and_leave_the_last_one():
+    states = States(1, 1)
+    for i in range(MAX_STATES + 3):
+        states.take(notes((0, f"s{i}")), ALIVE[:1])
+    assert (states.dropped.tolist(), shown(states)) == ([3], [f"s{MAX_STATES - 1}"])
+
+
+def test_what_was_shown_is_not_written_to():
+    states = States(1, 6)
+    before = states.code
+    states.take(notes((1, "search")), ALIVE)
+    assert before.tolist() == [0] * 6
+
+
+def test_each_arena_has_its_own_limit_so_that_it_is_beside_others_as_alone():
+    states = States(2, 3)
+    for i in range(MAX_STATES + 2):
+        states.take(notes((0, f"a{i}"), (4, f"b{i % 3}")), ALIVE)
+    states.take(notes((1, "b0"), (5, "a0"), (3, "new")), ALIVE)
+    assert states.dropped.tolist() == [3, 0]
+    assert shown(states)[1] == ""
+    assert shown(states)[3:] == ["new", f"b{(MAX_STATES + 1) % 3}", "a0"]
+    assert len(set(states.names)) == len(states.names)
+
+
+def told(*numbers: tuple[int, float]) -> SparseTable:
+    rows, value = zip(*numbers, strict=True)
+    return SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(value, np.float64))
+
+
+def shown_values(values: LatestValues) -> list[float | None]:
+    assert values.value is not None
+    return [None if np.isnan(value) else float(value) for value in values.value]
+
+
+def test_a_number_holds_until_the_next_is_told() -> None:
+    values = LatestValues()
+    values.take(NOTHING_SET, ALL_FOUR)
+    assert values.value is None
+    values.take(told((1, 2.5), (3, -1.0)), ALL_FOUR)
+    values.take(told((3, 0.0)), ALL_FOUR)
+    values.take(NOTHING_SET, ALL_FOUR)
+    assert shown_values(values) == [None, 2.5, None, 0.0]
+
+
+def test_of_two_numbers_of_a_robot_the_later_counts() -> None:
+    values = LatestValues()
+    values.take(SparseTable.joined([told((2, 1.0)), NOTHING_SET, told((0, 5.0), (2, 2.0))]), ALL_FOUR)
+    assert shown_values(values) == [5.0, None, 2.0, None]
+
+
+def test_the_dead_tell_nothing_and_the_revived_start_afresh() -> None:
+    values, dead = LatestValues(), ALL_FOUR.copy()
+    dead[2] = False
+    values.forget(~dead)
+    values.take(told((2, 1.0)), dead)
+    assert values.value is None
+    values.take(told((2, 1.0), (3, 1.0)), dead)
+    assert shown_values(values) == [None, None, None, 1.0]
+    values.forget(np.arange(4) == 3)
+    assert shown_values(values) == [None] * 4
+
+
+def test_what_was_shown_is_not_written_to_by_values() -> None:
+    values = LatestValues()
+    values.take(told((1, 1.0)), ALL_FOUR)
+    before = values.value
+    values.take(told((1, 2.0)), ALL_FOUR)
+    assert before is not None
+    assert before[1] == 1.0
+
+
+def moved_at(tick: int) -> list[np.ndarray]:
+    return [np.arange(ROWS * 3.0).reshape(ROWS, 3) + 100.0 * tick + kind for kind in (0.1, 0.2, 0.3)]
+
+
+def received(tick: int, open_arenas: list[int]) -> ReceivedPackets:
+    """In every third tick a robot of each open arena hears one packet."""
+    if tick % 3:
+        return ReceivedPackets.none()
+    receiver = np.array([arena * ROBOTS + 1 for arena in open_arenas], np.int64)
+    zeros = np.zeros(len(receiver), np.int64)
+    return replace(
+        ReceivedPackets.none(),
+        receiver=receiver,
+        sender=zeros,
+        sequence=zeros + tick,
+        received_at_ns=zeros + 7,
+        payload=zeros,
+    )
+
+
+def expected(closed_after: dict[int, int]) -> list[str]:
+    digests = [hashlib.sha256() for _ in range(ARENAS)]
+    for tick in range(TICKS):
+        for arena in range(ARENAS):
+            if tick > closed_after.get(arena, TICKS):
+                continue
+            rows = slice(arena * ROBOTS, (arena + 1) * ROBOTS)
+            digests[arena].update(np.concatenate(moved_at(tick), axis=1)[rows].tobytes())
+            if tick % 3 == 0:
+                digests[arena].update(np.array([1, 0, tick, 7], np.int64).tobytes())
+    return [digest.hexdigest() for digest in digests]
+
+
+@pytest.mark.parametrize("waiting_bytes", [1, 1000, 2**20])
+@pytest.mark.parametrize("closed_after", [{}, {1: 3}, {0: 0, 2: 4}, {0: 2, 1: 2, 2: 7}])
+def test_it_does_not_depend_on_how_many_ticks_are_hashed_at_once(waiting_bytes, closed_after, monkeypatch):
+    monkeypatch.setattr(trajectory_hash, "WAITING_BYTES", waiting_bytes)
+    of, running = TrajectoryHash(ARENAS, ROBOTS), list(range(ARENAS))
+    for tick in range(TICKS):
+        of.add(*moved_at(tick), received(tick, running))
+        over = [arena for arena in running if closed_after.get(arena, TICKS) == tick]
+        if over:
+            of.close(np.isin(np.arange(ARENAS), over))
+            running = [arena for arena in running if arena not in over]
+    assert of.hexdigests() == expected(closed_after)
+
+
+def test_asking_for_it_changes_nothing():
+    asked, left = TrajectoryHash(ARENAS, ROBOTS), TrajectoryHash(ARENAS, ROBOTS)
+    for tick in range(TICKS):
+        for of in (asked, left):
+            of.add(*moved_at(tick), received(tick, list(range(ARENAS))))
+        asked.hexdigests()
+    assert asked.hexdigests() == left.hexdigests() == expected({})

@@ -82,7 +82,7 @@ def _follow(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, 
         elif node.get("type") == "object":
             holder, names = node, [*names, str(part)]
             named, patterned = _table(node, "properties"), _table(node, "patternProperties")
-            node = _table(named, str(part)) or next(iter(patterned.values()), Node())
+            node = _table(named, str(part)) or next(iter(patterned.values()), _table(node, "additionalProperties"))
         elif node.get("type") == "array":
             holder, names = node, [*names, str(part)]
             places = node.get("prefixItems", [])
@@ -91,7 +91,8 @@ def _follow(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, 
 
 
 def _table(node: Node, name: str) -> Node:
-    return node.get(name) or Node()
+    value = node.get(name)
+    return cast("Node", value) if isinstance(value, dict) else Node()
 
 
 def _format(value: object) -> str:

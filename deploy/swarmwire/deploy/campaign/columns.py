@@ -1,16 +1,36 @@
-"""The columns of `summary.parquet`: their order and their types, whichever run came first."""
+"""The columns of `summary.parquet`: one run as a row, the types of columns, and which of them are responses."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.deploy.campaign.responses import STOP_TIME
-from swarmwire.deploy.campaign.task import Row
-from swarmwire.metrics.campaign.formats import FAILED
+from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
+from swarmwire.deploy.scenario_parts import conditions, measuring
+from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response
+from swarmwire.world.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import polars as pl
 
+STOP_TIME = "stop_time_s"
+STOPPED = "when this began to hold: {}"
+RADIO = "radio."  # how columns of packets begin
+RADIO_HELP = {
+    "sent": ("", "packets sent"),
+    "intended": ("", "receivers that packets were meant for"),
+    "in_range": ("", "of these, receivers in range"),
+    "pdr": ("", "packet delivery ratio: received / intended"),
+    "link_pdr": ("", "delivery ratio of links: received / in range"),
+}
+PERCENTILES = ("p50", "p90", "p99")
+LATENCY_HELP = {
+    "latency_air_s": "from sending to hearing",
+    "latency_agent_s": "from sending to the tick at which the receiver could act",
+}
+STATISTICS = ("final", "mean", "min", "max")
+LATENCIES = ("latency_air_s", "latency_agent_s")
 KEYS = ("run", "point", "seed")
 ENDS = ("ended", "error", "ticks", "sim_time_s", "trajectory_sha256")
 STOPPED_BY = "stopped_by"
@@ -19,14 +39,97 @@ FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, *MACHINE}
 COUNTS, FATES = "counts.", "radio.fates."
 WHOLE = {*KEYS, "ticks", "radio.sent", "radio.intended", "radio.in_range"}
 TEXTS = {"ended", "error", "trajectory_sha256", STOPPED_BY, "machine_cpu", "machine_host", "machine_worker"}
-Values = Mapping[str, Sequence[Any]]  # by varied path: all the values that it takes
+Row = dict[str, Any]  # one run, by column
+
+
+def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
+    """What came of one arena, by column; of metrics that are `times` their last value alone."""
+    row: Row = {
+        "ended": arena.ended,
+        "error": None,
+        "ticks": arena.ticks,
+        "sim_time_s": arena.sim_time_s,
+        "trajectory_sha256": arena.trajectory_sha256,
+        "stop_time_s": arena.stop_time_s,
+        "stopped_by": arena.stopped_by,
+    }
+    for name, value in arena.metrics.items():
+        if name in times:
+            row[name] = value.final
+        else:
+            row.update({f"{name}.{statistic}": of for statistic, of in vars(value).items()})
+    if arena.radio is not None:
+        row.update(_radio_columns(arena.radio))
+    row.update({f"counts.{name}": count for name, count in arena.counts.items()})
+    return row
+
+
+def failed_row(error: str) -> Row:
+    """A run that came to nothing: all else in its row is null."""
+    return {"ended": FAILED, "error": error}
+
+
+def _radio_columns(radio: RadioResult) -> dict[str, Any]:
+    latencies: dict[str, Any] = {}
+    for of in LATENCIES:
+        percentiles: Percentiles = getattr(radio, of)
+        latencies |= {f"radio.{of}.{percentile}": value for percentile, value in vars(percentiles).items()}
+    fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
+    return {**{f"radio.{name}": getattr(radio, name) for name in RADIO_HELP}, **latencies, **fates}
+
+
+def responses_of(scenarios: Iterable[Scenario]) -> tuple[Response, ...]:
+    """The responses of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric.
+
+    Times come first, then what the scenarios list, then what is measured in every run, and what became of packets.
+    """
+    found: dict[str, Response] = {}
+    for scenario in scenarios:
+        for response in _responses(scenario):
+            before = found.setdefault(response.column, response)
+            if before.hold_s < response.hold_s:  # it is varied: what all runs can tell of
+                found[response.column] = before = replace(before, hold_s=response.hold_s)
+            if before.column == STOP_TIME and before.help != response.help:
+                found[STOP_TIME] = replace(before, help=STOPPED.format("what is to stop the run"))
+    return tuple(sorted(found.values(), key=_rank))
+
+
+def _rank(response: Response) -> tuple[bool, bool, bool]:
+    return response.kind != "time", response.column.startswith(RADIO), not response.listed
+
+
+def _responses(scenario: Scenario) -> Iterator[Response]:
+    if stops := conditions(scenario):
+        hold_s = max(stop.hold_s for stop in stops)
+        yield Response(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))), hold_s=hold_s)
+    for metric in measuring(scenario).metrics:
+        if metric.kind == "time":
+            hold_s = float(getattr(metric, "hold_s", 0.0))
+            yield Response(metric.name, metric.unit, "time", metric.help, not metric.standard, hold_s)
+            continue
+        for statistic in STATISTICS:
+            yield Response(f"{metric.name}.{statistic}", metric.unit, "number", metric.help, not metric.standard)
+    if scenario.radio is not None:
+        yield from _radio_responses()
+
+
+def _radio_responses() -> Iterator[Response]:
+    for name, (unit, text) in RADIO_HELP.items():
+        yield Response(f"{RADIO}{name}", unit, "number", text)
+    for name in LATENCIES:
+        for percentile in PERCENTILES:
+            yield Response(f"{RADIO}{name}.{percentile}", "s", "number", LATENCY_HELP[name])
+    for fate in FATE_NAMES:
+        yield Response(f"{RADIO}fates.{fate}", "", "number", f"receivers whose packet's fate was {fate}")
 
 
 class Columns:
     """The columns of one campaign's rows."""
 
-    def __init__(self, varied: Values, responses: Sequence[str]) -> None:
-        """`responses` in order; a time of stopping among them brings its cause along."""
+    def __init__(self, campaign: Campaign) -> None:
+        """In the campaign's order; a time of stopping among the responses brings its cause along."""
+        varied = {path: [point[path] for point in campaign.points] for path in campaign.vary}
+        responses = [response.column for response in campaign.responses]
         self._varied = {path: _type_of(values) for path, values in varied.items()}
         after = [name for name in responses if name != STOP_TIME]
         stop = [STOP_TIME, STOPPED_BY] if STOP_TIME in responses else []

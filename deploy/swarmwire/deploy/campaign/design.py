@@ -1,23 +1,182 @@
-"""The points of a design: at which values of the varied paths a scenario is run."""
+"""What a campaign varies, and the points of its design: paths of the scenario, their values, and how values combine."""
 
-from collections.abc import Callable, Sequence
+import json
+import math
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import floor, prod
-from typing import Any
+from math import floor, isinf, prod
+from typing import Any, cast
 
 import numpy as np
 
+from swarmwire.agent.agent import load_agent
+from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.config import did_you_mean, from_toml
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.campaign.vary import Range, Vary
+from swarmwire.deploy.scenario_parts import agent_specs
+from swarmwire.world.scenario.scenario import Scenario, mapping_of
+from swarmwire.world.scenario.schema import Node, plain
+from swarmwire.world.scenario_file import scenario_schema
 
+EXPECTED = (
+    "expected PATH=FIRST:LAST:COUNT, such as radio.loss=0:0.8:9, or PATH=5,10,20; "
+    "for random and latin designs PATH=FIRST:LAST; a range may end in :log"
+)
+LOG = "log"
+MAX_VALUES = 100_000
+RANGE_KEYS = ("from", "to", "count", "scale")
 Point = dict[str, Any]  # by path: the value
 GRID, LIST, RANDOM, LATIN = KINDS = ("grid", "list", "random", "latin")
 DRAWN = (RANDOM, LATIN)
 MAX_POINTS = 100_000
+
+
+@dataclass(frozen=True)
+class Range:
+    """Numbers from one to another, evenly or in equal ratios."""
+
+    first: Fraction
+    last: Fraction
+    count: int | None  # None: a design draws them
+    log: bool = False
+
+    def at(self, share: Fraction) -> float:
+        """The number at a share of the way, from 0 to 1."""
+        if not self.log or share in (0, 1):
+            return float(self.first + (self.last - self.first) * share)
+        first, last, part = float(self.first), float(self.last), float(share)
+        return float(f"{first ** (1.0 - part) * last**part:.12g}")  # 10.0, not 9.999999999999998
+
+    def values(self) -> list[float]:
+        """All of them, with a count; the first and the last among them."""
+        count = self.count or 1
+        return [self.at(Fraction(place, max(count - 1, 1))) for place in range(count)]
+
+
+@dataclass(frozen=True)
+class Vary:
+    """One path of the scenario that is varied."""
+
+    path: str
+    values: tuple[Any, ...] | Range
+    where: str  # for messages: the option, or file and key, that varies it
+
+    def refused(self, expected: str) -> BadInput:
+        """The error that says what was expected of it."""
+        return BadInput(self.where, "", expected)
+
+
+def vary_of(text: str) -> Vary:
+    """What `--vary PATH=…` says; BadInput if it is none of the forms."""
+    where = f"--vary {text}"
+    path, equals, values = text.partition("=")
+    path = ".".join(key.strip() for key in path.split("."))
+    if not equals or not all(path.split(".")) or not values.strip():
+        raise BadInput(where, "", EXPECTED)
+    return _checked(Vary(path, _range_of(values, where) or tuple(_list_of(values)), where))
+
+
+def vary_from(path: str, given: object, where: str) -> Vary:
+    """What a campaign's file or a mapping says: a list, a table with from, to, count and scale, or a text as above."""
+    if isinstance(given, str):
+        return vary_of(f"{path}={given}")
+    if isinstance(given, Mapping):
+        return _checked(Vary(path, _range_from(cast("Mapping[str, Any]", given), where), where))
+    if isinstance(given, list | tuple):
+        return _checked(Vary(path, tuple(cast("list[Any]", given)), where))
+    raise BadInput(where, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {given!r}")
+
+
+def _range_of(text: str, where: str) -> Range | None:
+    """The range that a text describes; None if it is a list of values."""
+    parts = [part.strip() for part in text.split(":")]
+    first = _number(parts[0])
+    if len(parts) == 1 or first is None:
+        return None
+    log = parts[-1] == LOG
+    parts = parts[: len(parts) - log]
+    last = _number(parts[1]) if len(parts) in (2, 3) else None
+    if last is None or (len(parts) == 3 and not parts[2].isdecimal()):
+        raise BadInput(where, "", EXPECTED)
+    return Range(first, last, int(parts[2]) if len(parts) == 3 else None, log)
+
+
+def _range_from(table: Mapping[str, Any], where: str) -> Range:
+    ends = [_number(str(table.get(key))) for key in ("from", "to")]
+    count, scale = table.get("count"), table.get("scale", "linear")
+    known = set(table) <= set(RANGE_KEYS) and scale in ("linear", LOG)
+    if not known or None in ends or not (count is None or type(count) is int):
+        expected = 'expected { from = 0.0, to = 0.8, count = 9 }, with scale = "log" for equal ratios'
+        raise BadInput(where, "", f"{expected}; got {dict(table)}")
+    first, last = (cast("Fraction", end) for end in ends)
+    return Range(first, last, count, scale == LOG)
+
+
+def _list_of(text: str) -> list[Any]:
+    """TOML values between commas; what is none is a text."""
+    with suppress(tomllib.TOMLDecodeError):  # not all of them are TOML
+        found = from_toml(f"value = [{text}]")
+        if len(found) == 1:
+            return cast("list[Any]", found["value"])
+    return [_value(part.strip()) for part in text.split(",") if part.strip()]
+
+
+def _value(text: str) -> Any:
+    try:
+        found = from_toml(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return found["value"] if len(found) == 1 else text
+
+
+def _number(text: str) -> Fraction | None:
+    """As it stands there, so that a step of 0.1 is a tenth; None for what no float can be, such as 1e400."""
+    try:
+        near = float(text)  # first: as a fraction 1e999999999 would fill the memory
+        return None if isinf(near) else Fraction(text) if near else Fraction(0)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _checked(vary: Vary) -> Vary:
+    if isinstance(vary.values, Range):
+        _check_range(vary, vary.values)
+    elif not 0 < len(vary.values) <= MAX_VALUES:
+        raise vary.refused(f"expected 1 to {MAX_VALUES} values, got {len(vary.values)}")
+    elif any(value in vary.values[:place] for place, value in enumerate(vary.values)):
+        raise vary.refused("expected different values: one is there twice")
+    return vary
+
+
+def _check_range(vary: Vary, of: Range) -> None:
+    if of.count is not None and not 0 < of.count <= MAX_VALUES:
+        raise vary.refused(f"expected a COUNT from 1 to {MAX_VALUES}, got {of.count}")
+    if of.first == of.last and of.count != 1:
+        raise vary.refused("expected FIRST and LAST to differ")
+    if of.log and not (of.first > 0 and of.last > 0):
+        raise vary.refused("expected FIRST and LAST above 0 for equal ratios (log)")
+
+
+def toml_value(value: object) -> str:
+    """The text that TOML reads as this value: a text, a number, true or false, a list or a table of such.
+
+    >>> toml_value([1, 0.5, "a", True])
+    '[1, 0.5, "a", true]'
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # inf, -inf, nan
+    if isinstance(value, Mapping):
+        table = cast("Mapping[str, object]", value)
+        return "{" + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in table.items()) + "}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "[" + ", ".join(toml_value(item) for item in cast("Sequence[object]", value)) + "]"
+    return json.dumps(value)
 
 
 def points_of(
@@ -87,7 +246,7 @@ def _drawn(
 
 
 def _random(varied: Sequence[Vary], count: int, seed: int) -> FloatArray:
-    """Shares in [0, 1), (points, paths): each path has draws of its own, whatever else is varied."""
+    """Shares in [0, 1), (points, paths): each path has draws of its own, independent of what else is varied."""
     columns = [uniform(derive_key("design", seed, vary.path), np.arange(count), 0, 0, 0) for vary in varied]
     return np.stack(columns, axis=1)
 
@@ -116,3 +275,57 @@ def _at(vary: Vary, share: float, whole: bool) -> Any:
 
 def _point(varied: Sequence[Vary], values: Sequence[Any]) -> Point:
     return {vary.path: value for vary, value in zip(varied, values, strict=True)}
+
+
+def whole_numbers(scenario: Scenario) -> Callable[[str], bool]:
+    """A function of a path: whether its value must be a whole number; False for unknown paths."""
+    schema, mapping = scenario_schema(), mapping_of(scenario)
+
+    def is_whole(path: str) -> bool:
+        keys = path.split(".")
+        if len(keys) == 4 and keys[0] == "robots" and keys[2] == "params":
+            return _is_whole_parameter(scenario, keys[1], keys[3])
+        return _node_at(keys, mapping, schema).get("type") == "integer"
+
+    return is_whole
+
+
+def _is_whole_parameter(scenario: Scenario, group: str, name: str) -> bool:
+    """Of an agent's parameter, which its class declares."""
+    if group not in scenario.robots:
+        return False
+    found = parameters_of(load_agent(agent_specs(scenario)[group])).get(name)
+    return found is not None and found.type is int
+
+
+def _node_at(keys: list[str], mapping: object, schema: Node) -> Node:
+    """The schema's node at a path; where one of several tables may stand, of that which the scenario's mapping has."""
+    node, at = schema, mapping
+    for key in keys:
+        node = _chosen(plain(node, schema), at, schema)
+        if key.isdecimal():
+            places: list[Node] = node.get("prefixItems", [])
+            node = places[int(key)] if int(key) < len(places) else node.get("items") or Node()
+        else:
+            named: Node = node.get("properties", {})
+            patterned: Node = node.get("patternProperties", {})
+            node = named.get(key) or next(iter(patterned.values()), Node())
+        at = _item(at, key)
+    return plain(node, schema)
+
+
+def _chosen(node: Node, at: object, schema: Node) -> Node:
+    if "discriminator" not in node or not isinstance(at, dict):
+        return node
+    tables: dict[str, str] = node["discriminator"]["mapping"]
+    tag = cast("dict[str, Any]", at).get(node["discriminator"]["propertyName"])
+    return plain({"$ref": tables[tag]}, schema) if tag in tables else node
+
+
+def _item(at: object, key: str) -> object:
+    if isinstance(at, dict):
+        return cast("dict[str, object]", at).get(key)
+    if isinstance(at, list) and key.isdecimal():
+        items = cast("list[object]", at)
+        return items[int(key)] if int(key) < len(items) else None
+    return None

@@ -1,4 +1,4 @@
 """What a scenario, an agent or a command may name, taken from where each thing is declared.
 
-`kinds` is the table of all kinds; a new one is a file like `metrics.py` here and its line there. Nothing here prints.
+`kinds` is the table of all kinds; a new one is a function that lists its entries, and its line there.
 """

@@ -1,6 +1,11 @@
-"""A certificate authority: an EC key on P-256 and a certificate of its own, with which it signs those of others."""
+"""A certificate authority (CA): an EC key on P-256 and its own certificate; it signs the certificates of others.
+
+The key files are readable by their owner alone.
+"""
 
 import ipaddress
+import os
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -13,8 +18,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.certificates.dates import DAY, text_of
-from swarmwire.deploy.certificates.files import AUTHORITY, certificate_path, key_path, read_key
+from swarmwire.deploy.certificates.register import AUTHORITY, DAY, certificate_path, key_path, no_authority, text_of
 
 AUTHORITY_DAYS = 3652  # ten years
 EARLIER = DAY  # a certificate holds from then: robots without a battery for their clock lag behind
@@ -43,7 +47,7 @@ class Authority:
         """The CA in a folder; BadInput unless its files are there, private, belong together, and hold at that date."""
         path = certificate_path(folder, AUTHORITY)
         if not path.is_file():
-            raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}")
+            raise no_authority(folder)
         pem = read_key(key_path(folder, AUTHORITY))
         try:
             certificate = x509.load_pem_x509_certificate(path.read_bytes())
@@ -94,6 +98,30 @@ def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
     return key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
+
+
+def write_key(path: Path, pem: bytes) -> None:
+    """Write a key that none but its owner may read at any time; FileExistsError rather than replace another."""
+    aside = path.with_name(f".aside-{path.name}")
+    aside.unlink(missing_ok=True)  # of a process that was killed
+    descriptor = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(pem)
+        os.link(aside, path)  # unlike a rename it takes nobody's place
+    finally:
+        aside.unlink()
+
+
+def read_key(path: Path) -> bytes:
+    """A key as it was written; BadInput if it cannot be read, or others than its owner may."""
+    try:
+        others = stat.S_IMODE(path.stat().st_mode) & 0o077
+        if others:
+            raise BadInput(str(path), "", f"expected a key that its owner alone may read: chmod 600 {path}")
+        return path.read_bytes()
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a readable key: {error.strerror}") from None
 
 
 def _begun(

@@ -1,15 +1,26 @@
-"""One end of a run's network as it is told on the command line: what it shows of itself, and whom it lets in."""
+"""One end of a run's network: its own certificate, and the rights of others.
+
+Both come from options of the command line, or from a folder of certificates. The folder may be that of the CA, or a
+copy on another machine of ca.pem, the register certs.json, and the certificates and keys that belong to that machine.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.wire.access_control import WORLD, RunAccess
+from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.files import REGISTER
-from swarmwire.deploy.certificates.folder_access import access_in, network_in
-from swarmwire.deploy.certificates.purposes import ROUTER
+from swarmwire.deploy.certificates.register import (
+    AUTHORITY,
+    OBSERVER,
+    REGISTER,
+    ROUTER,
+    RUNNER,
+    Register,
+    certificate_path,
+    key_path,
+)
 
 WARNING = "insecure: whoever is in the network can take part in the run, overhear it and end it"
 
@@ -68,3 +79,45 @@ def member(
     named = replace(named, revoked=tuple(revoked))
     named.check()
     return Member(network, named)
+
+
+def access_in(folder: Path) -> RunAccess:
+    """Everybody who has a certificate, by what the last one of the name is for; BadInput without a register."""
+    register = Register.read(folder)
+    purpose_of = {issued.name: issued.purpose for issued in register.certificates}
+
+    def named(purpose: str) -> tuple[str, ...]:
+        return tuple(name for name, of in purpose_of.items() if of == purpose)
+
+    return RunAccess(
+        runners=named(RUNNER),
+        observers=named(OBSERVER),
+        operators=named(OPERATOR),
+        routers=named(ROUTER),
+        revoked=tuple(register.revoked()),
+        worlds=named(WORLD),
+    )
+
+
+def network_in(folder: Path, purpose: str, name: str | None = None) -> Network:
+    """Settings with the CA, and with the certificate and key of that name, or of the only one for that purpose.
+
+    BadInput if the files are not there, or if it is not clear whose they should be.
+    """
+    held = name or _only(folder, purpose)
+    network = Network(
+        ca=certificate_path(folder, AUTHORITY), certificate=certificate_path(folder, held), key=key_path(folder, held)
+    )
+    network.check_files(str(folder), held)
+    return network
+
+
+def _only(folder: Path, purpose: str) -> str:
+    keys = sorted(path.stem for path in folder.glob("*.key") if path.stem != AUTHORITY)
+    if (folder / REGISTER).exists():
+        purpose_of = {issued.name: issued.purpose for issued in Register.read(folder).certificates}
+        keys = [name for name in keys if purpose_of.get(name) == purpose]
+    if len(keys) == 1:
+        return keys[0]
+    found = f"{', '.join(keys)} are there: name one" if keys else "there is none"
+    raise BadInput(str(folder), "", f"expected a certificate with its key for a {purpose}; {found}")

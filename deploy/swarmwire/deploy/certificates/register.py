@@ -1,44 +1,91 @@
-"""`certs.json`: which certificates a CA has issued, and which names are revoked; read without `cryptography`."""
+"""The folder of a certificate authority (CA) as others see it: its files, its register, and requests for certificates.
 
+The register `certs.json` names the certificates that the CA has issued, and which of them are revoked. Nothing here
+needs `cryptography`.
+"""
+
+import ipaddress
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from datetime import datetime
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Self
 
-from swarmwire.comms.config import check_format, from_json
+from msgspec import Meta, to_builtins
+
+from swarmwire.comms.clock import NS_PER_S, SCALED_FROM_NS, DatedClock
+from swarmwire.comms.config import check_format, converted, did_you_mean, from_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.certificates.dates import DAY, date_of, text_of
-from swarmwire.deploy.certificates.files import REGISTER
-from swarmwire.metrics.whole_file import write_whole
+from swarmwire.comms.wire.access_control import OPERATOR, TRACKER, WORLD
+from swarmwire.comms.wire.keys import fault_of_name
+from swarmwire.metrics.atomic import write_text
 
 FORMAT = 1
-SOON = 30 * DAY  # before its end a certificate is renewed, at most a third of its life
+AUTHORITY = "ca"  # no certificate but the CA's own has this name
+REGISTER, REVOKED = "certs.json", "revoked.crl"
+ROBOT, RUNNER, OBSERVER, ROUTER = "robot", "runner", "observer", "router"
+PURPOSES = (ROBOT, TRACKER, OPERATOR, RUNNER, OBSERVER, ROUTER, WORLD)  # of certificates; the register alone keeps them
+DAY = timedelta(days=1)
+RENEWAL_PERIOD = 30 * DAY  # before its end a certificate is renewed, at most a third of its life
+_CODE_IS_OF = datetime.fromtimestamp(SCALED_FROM_NS // NS_PER_S, UTC)
+
+_LABEL = "[A-Za-z0-9_](?:[A-Za-z0-9_-]{0,61}[A-Za-z0-9_])?"
+_HOST = re.compile(rf"(?=.{{1,253}}$){_LABEL}(?:\.{_LABEL})*")
+
+Date = Annotated[datetime, Meta(tz=True)]  # in UTC, to the second
+
+
+def certificate_path(folder: Path, name: str) -> Path:
+    """The certificate of a name, PEM; anybody may read it."""
+    return folder / f"{name}.pem"
+
+
+def key_path(folder: Path, name: str) -> Path:
+    """The key of a name, PKCS#8 PEM without a password; only its owner may read it."""
+    return folder / f"{name}.key"
+
+
+def no_authority(folder: Path) -> BadInput:
+    """The error of a folder that is no CA's, with the command that makes one."""
+    return BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}")
+
+
+def date_now(clock: DatedClock) -> datetime:
+    """The date that the clock shows; BadInput if it was never set: certificates would have a wrong date."""
+    now = datetime.fromtimestamp(clock.utc_ns() // NS_PER_S, UTC)
+    if now < _CODE_IS_OF:
+        raise BadInput("the clock of this machine", "", f"shows {text_of(now)}: set it first")
+    return now
+
+
+def text_of(date: datetime) -> str:
+    """A date as 2026-11-21T03:04:05Z."""
+    return date.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 @dataclass(frozen=True)
 class Issued:
-    """One certificate: dates as texts, `serial` in hexadecimal digits, `hosts` as in the certificate."""
+    """One certificate: `serial` in hexadecimal digits, `hosts` as in the certificate."""
 
     name: str
     purpose: str
-    serial: str
-    hosts: Sequence[str]
-    valid_from: str
-    valid_until: str
-    revoked: str | None = None
+    serial: Annotated[str, Meta(pattern="^[0-9a-f]+$")]
+    hosts: tuple[str, ...]
+    valid_from: Date
+    valid_until: Date
+    revoked: Date | None = None
 
     def ends_soon(self, now: datetime) -> bool:
         """Whether it has ended, or is about to."""
-        until = date_of(self.valid_until)
-        return until - now < min(SOON, (until - date_of(self.valid_from)) / 3)
+        return self.valid_until - now < min(RENEWAL_PERIOD, (self.valid_until - self.valid_from) / 3)
 
     def state(self, now: datetime) -> str:
-        """What holds at that date: "revoked", "ended", "ends soon" or "valid"."""
+        """Its state at that date: "revoked", "ended", "ends soon" or "valid"."""
         if self.revoked is not None:
             return "revoked"
-        if date_of(self.valid_until) <= now:
+        if self.valid_until <= now:
             return "ended"
         return "ends soon" if self.ends_soon(now) else "valid"
 
@@ -55,54 +102,94 @@ class Register:
         """The register in a CA's folder; BadInput if there is none that can be read."""
         path = folder / REGISTER
         try:
-            content: Any = from_json(path.read_text(encoding="utf-8"))
+            content = from_json(path.read_text(encoding="utf-8"))
             check_format(content, FORMAT, str(path))
-            register = cls(Issued(**content["authority"]), tuple(Issued(**of) for of in content["certificates"]))
-            for of in (register.authority, *register.certificates):
-                _ = date_of(of.valid_from), date_of(of.valid_until), int(of.serial, 16)
-                _ = "".join((of.name, of.purpose, *of.hosts))  # TypeError if one is no text
+            return converted(cls, content, str(path))
         except FileNotFoundError:
-            raise BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}") from None
+            raise no_authority(folder) from None
         except OSError as error:
             raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
-        except (ValueError, KeyError, TypeError):
+        except ValueError:
             raise BadInput(str(path), "", "expected the register that `swarmwire certs` keeps") from None
-        return register
 
     def write(self, folder: Path) -> None:
-        """Put it into a CA's folder, in place of the one before."""
-        content = {
-            "format": FORMAT,
-            "authority": asdict(self.authority),
-            "certificates": [asdict(issued) for issued in self.certificates],
-        }
-        write_whole(folder / REGISTER, json.dumps(content, indent=2) + "\n")
+        """Write it into a CA's folder, in place of the one before."""
+        write_text(folder / REGISTER, json.dumps({"format": FORMAT, **to_builtins(self)}, indent=2) + "\n")
 
     def last(self, name: str) -> Issued | None:
-        """The last certificate of that name, which took the place of those before."""
+        """The last certificate of that name, which replaced those before."""
         return next((issued for issued in reversed(self.certificates) if issued.name == name), None)
 
-    def state_of(self, issued: Issued, now: datetime) -> str:
-        """As its own state, but "replaced" if it would still hold, and there is a later one of its name."""
-        state = issued.state(now)
-        replaced = issued is not self.authority and issued is not self.last(issued.name)
-        return "replaced" if replaced and state != "revoked" else state
+    def states(self, now: datetime) -> Iterator[tuple[Issued, str]]:
+        """The CA's certificate and all others, each with its state.
+
+        A certificate that would still be valid is "replaced" if there is a later one of its name.
+        """
+        yield self.authority, self.authority.state(now)
+        for issued in self.certificates:
+            state = issued.state(now)
+            yield issued, state if state == "revoked" or issued is self.last(issued.name) else "replaced"
 
     def revoked(self) -> list[str]:
-        """The names that may do nothing any more: what a peer takes as `revoked`."""
+        """The names that may do nothing any more: the `revoked` of a peer's network."""
         return sorted({issued.name for issued in self.certificates if issued.revoked is not None})
 
     def with_issued(self, issued: Issued) -> "Register":
-        """This, and one more."""
+        """This register, and one more certificate."""
         return replace(self, certificates=(*self.certificates, issued))
 
     def with_revoked(self, name: str, now: datetime) -> "Register":
-        """This, where all certificates of that name are revoked since that date or since earlier."""
-        since = text_of(now)
+        """This register, with all certificates of that name revoked since that date or since earlier."""
         return replace(
             self,
             certificates=tuple(
-                replace(issued, revoked=issued.revoked or since) if issued.name == name else issued
+                replace(issued, revoked=issued.revoked or now) if issued.name == name else issued
                 for issued in self.certificates
             ),
         )
+
+
+def revoked_in(folder: Path) -> list[str]:
+    """The revoked names of a CA's folder; none without a register, BadInput for one that cannot be read."""
+    return Register.read(folder).revoked() if (folder / REGISTER).exists() else []
+
+
+@dataclass(frozen=True)
+class CertificateRequest:
+    """The owner of a certificate, its purpose, and the hosts at which its owner listens: IP addresses or host names.
+
+    Without purpose or hosts it has those of the name's certificate before.
+    """
+
+    name: str
+    purpose: str | None = None
+    hosts: tuple[str, ...] = ()
+
+    @property
+    def usual_purpose(self) -> str:
+        """What a first certificate of the name is for, unless the request names it."""
+        return self.name if self.name in PURPOSES else ROBOT
+
+
+def certificate_request(name: str, hosts: Sequence[str] = (), purpose: str | None = None) -> CertificateRequest:
+    """A checked request; BadInput for a name, host or purpose that is none, and for the name of the CA's own files."""
+    fault = fault_of_name(name)
+    if fault is None and name.lower() == AUTHORITY:
+        fault = f"expected another name: {AUTHORITY}.pem is the CA's own"
+    if fault is not None:
+        raise BadInput("NAME", "", fault)
+    for host in hosts:
+        if not _is_host(host):
+            raise BadInput("--host", "", f"expected an IP address or the name of a host, got {host!r}")
+    if purpose is not None and purpose not in PURPOSES:
+        raise BadInput("--for", "", f"expected {did_you_mean(PURPOSES, purpose)}, got {purpose!r}")
+    return CertificateRequest(name, purpose, tuple(dict.fromkeys(host for host in hosts if host != name)))
+
+
+def _is_host(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        # A last label of digits only would be a mistyped address.
+        return _HOST.fullmatch(host) is not None and not host.rsplit(".", 1)[-1].isdigit()
+    return True

@@ -1,10 +1,15 @@
-"""A host that serves us: requests and answers, one after the other, over one connection."""
+"""Sessions with hosts that `host_side` serves: requests and answers, one after the other, over one connection.
+
+`on_hosts` does the same work on many hosts at the same time.
+"""
 
 import asyncio
 import json
 import re
-from collections.abc import AsyncGenerator, Callable
+import shlex
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,12 +17,12 @@ import asyncssh
 
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import from_json
-from swarmwire.deploy.fleet.archive import Archive
+from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
-from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.deploy.fleet.host_failed import HostFailed
-from swarmwire.deploy.fleet.host_side.facts import NO_SYSTEMD
-from swarmwire.deploy.fleet.sent_along import OLDEST, program, start_command
+from swarmwire.deploy.fleet.fleet import Host, Robot, hosts_of
+from swarmwire.deploy.fleet.host_side.system import NO_SYSTEMD
+from swarmwire.deploy.fleet.release import Archive
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
 
 BLOCK = 1 << 18  # bytes handed to the connection at a time
 CLOCK_QUESTIONS = 5
@@ -32,6 +37,25 @@ CURES = {
 NO_PYTHON = (126, 127)  # what shells say of a program that is not there, or none
 NO_MODULE = re.compile(r"No module named '(\w+)")
 Told = Callable[[int], None]  # bytes that were sent so far
+PACKAGE = "swarmwire.deploy.fleet.host_side"
+MODULES = ("files", "system", "serving")  # each after those it imports
+OLDEST = (3, 11)
+START = f"""import sys, json
+if sys.version_info < {OLDEST}:
+    print(json.dumps({{"refused": "python", "text": "%d.%d.%d" % sys.version_info[:3]}}))
+    sys.exit()
+sys.path[:] = [path for path in sys.path if path]
+exec(sys.stdin.buffer.read(int(sys.stdin.buffer.readline())))"""
+LOADER = """import sys, types
+package = sys.modules[{package!r}] = types.ModuleType({package!r})
+package.__path__ = []
+for name, text in {sources}:
+    whole = {package!r} + "." + name
+    module = sys.modules[whole] = types.ModuleType(whole)
+    exec(compile(text, whole, "exec"), module.__dict__)
+    setattr(package, name, module)
+package.serving.main()"""
+MOST = 64  # hosts at the same time
 
 
 class HostSession:
@@ -42,7 +66,7 @@ class HostSession:
     ) -> None:
         """Over a process that has just been started."""
         self.host, self.connection, self._process = host, connection, process
-        self.facts: dict[str, Any] = {}  # what `host_side.facts` tells
+        self.facts: dict[str, Any] = {}  # what `host_side.system.facts` returns
 
     async def begin(self) -> None:
         """Send the program along, and read what the host says of itself."""
@@ -163,3 +187,66 @@ async def host_session(host: Host, known_hosts: Path) -> AsyncGenerator[HostSess
             await session.begin()
             yield session
             process.stdin.write_eof()
+
+
+def start_command(python: str) -> str:
+    """The command for the host's shell; its Python, however old, tells its version, and reads on if it will do."""
+    return f"exec {shlex.quote(python)} -c {shlex.quote(START)}"
+
+
+@cache
+def program() -> bytes:
+    """What the started Python reads first: a length, and so many bytes of a program."""
+    folder = Path(__file__).parent / "host_side"
+    sources = [(name, (folder / f"{name}.py").read_text(encoding="utf-8")) for name in MODULES]
+    text = LOADER.format(package=PACKAGE, sources=json.dumps(sources)).encode()
+    return b"%d\n" % len(text) + text
+
+
+Work = Callable[[HostSession, Robot], Awaitable[Result]]  # of one robot; HostFailed: it is told, and others go on
+Before = Callable[[HostSession, list[Robot]], Awaitable[None]]  # of a host; HostFailed: for all its robots
+
+
+async def nothing_before(session: HostSession, robots: list[Robot]) -> None:
+    """A host of which nothing is needed before its robots' turns."""
+
+
+async def on_hosts(
+    robots: Iterable[Robot],
+    known_hosts: Path,
+    work: Work,
+    before: Before = nothing_before,
+    after: Before = nothing_before,
+    watcher: Watcher = SILENT,
+) -> list[Result]:
+    """The results of all robots, in their order; hosts work at the same time, robots of a host one by one."""
+    chosen, gate = list(robots), asyncio.Semaphore(MOST)
+
+    async def on_host(mine: list[Robot]) -> list[Result]:
+        results: dict[str, Result] = {}
+        try:
+            async with gate, host_session(mine[0].host, known_hosts) as session:
+                await before(session, mine)
+                for robot in mine:
+                    results[robot.name] = await _guarded(work, session, robot)
+                    watcher.end(results[robot.name])
+                await after(session, mine)
+        except HostFailed as error:
+            for robot in mine:
+                if robot.name not in results:
+                    results[robot.name] = Result.failed(robot.name, error)
+                    watcher.end(results[robot.name])
+        return list(results.values())
+
+    done = await asyncio.gather(*map(on_host, hosts_of(chosen).values()))
+    found = {result.robot: result for results in done for result in results}
+    return [found[robot.name] for robot in chosen]
+
+
+async def _guarded(work: Work, session: HostSession, robot: Robot) -> Result:
+    try:
+        return await work(session, robot)
+    except HostFailed as error:
+        return Result.failed(robot.name, error)
+    except SwarmwireError as error:  # of what was to be sent; what others get may be good
+        return Result(robot.name, False, str(error))

@@ -12,11 +12,9 @@ import asyncssh
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.fleet.connecting import connected
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot, hosts_of
-from swarmwire.deploy.fleet.host_failed import HostFailed
-from swarmwire.deploy.fleet.host_side.refusal import Refusal
-from swarmwire.deploy.fleet.host_side.units import unit_of
-from swarmwire.deploy.fleet.host_side.unpacking import NO_ARCHIVE, part_of, unpack
-from swarmwire.deploy.fleet.result import Result
+from swarmwire.deploy.fleet.host_side.files import NO_ARCHIVE, Refusal, part_of, unpack
+from swarmwire.deploy.fleet.host_side.system import unit_of
+from swarmwire.deploy.fleet.result import HostFailed, Result
 
 BLOCK = 1 << 18
 MAX_BYTES = 4 << 30  # of a log, packed as unpacked: a robot that was taken over must not fill this disk

@@ -1,17 +1,106 @@
-"""A release: all that one robot's folder holds, under a name that only the same content has."""
+"""A release: the files of one robot's folder, under a name that only the same content has.
 
-from collections.abc import Sequence
+It holds `robot.toml` with the robot's settings and its place in the swarm's network, the agent, the body's sheet, the
+robot's certificate, and its systemd unit, which runs the current release, watches it, and stops the motors after it.
+"""
+
+import gzip
+import hashlib
+import io
+import tarfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.fleet.archive import Archive, Entry, name_of, write_archive
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
-from swarmwire.deploy.fleet.robot_settings import CA, SETTINGS_FILE, robot_settings
-from swarmwire.deploy.fleet.unit_file import unit_file
+from swarmwire.deploy.fleet.host_side.system import unit_of
+from swarmwire.metrics.atomic import atomic_write
+
+LEVEL = 6  # of compression: the next ones cost twice the time for a hundredth of the size
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file, or a link, of an archive."""
+
+    name: str  # with "/"
+    data: bytes = b""
+    mode: int = 0o644
+    link: str = ""  # where it leads; "": it is a file
+
+
+@dataclass(frozen=True)
+class Archive:
+    """An archive on this machine's disk, under a name that only the same content has."""
+
+    name: str
+    path: Path
+    sha256: str
+    size: int
+    unpacked: int  # bytes
+
+
+def name_of(entries: Iterable[Entry]) -> str:
+    """The name of a content: the same entries in any order give the same."""
+    digest = hashlib.sha256()
+    for entry in sorted(entries, key=lambda entry: entry.name):
+        data = hashlib.sha256(entry.data).hexdigest()
+        digest.update(f"{entry.name}\0{entry.mode:o}\0{entry.link}\0{data}\n".encode())
+    return digest.hexdigest()[:12]
+
+
+def write_archive(entries: Iterable[Entry], path: Path, name: str | None = None) -> Archive:
+    """The archive of these entries at a path, which is there whole or not at all; named after them if not given."""
+    ordered = sorted(entries, key=lambda entry: entry.name)
+    made = io.BytesIO()
+    with (
+        gzip.GzipFile(fileobj=made, mode="wb", compresslevel=LEVEL, mtime=0) as packed,
+        tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as tar,
+    ):
+        for entry in ordered:
+            member = tarfile.TarInfo(entry.name)
+            member.mode, member.size = entry.mode, len(entry.data)
+            if entry.link:
+                member.type, member.linkname = tarfile.SYMTYPE, entry.link
+            tar.addfile(member, io.BytesIO(entry.data))
+    data = made.getvalue()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as aside:
+        aside.chmod(0o600)  # it may hold keys
+        aside.write_bytes(data)
+    unpacked = sum(len(entry.data) for entry in ordered)
+    return Archive(name or name_of(ordered), path, hashlib.sha256(data).hexdigest(), len(data), unpacked)
+
 
 PRIVATE = 0o600
+LOG = "../../log"  # beside the folder of releases: logs outlive them
+CA, SETTINGS_FILE = "ca.pem", "robot.toml"
+ROBOT_PROGRAM = ("-P", "-m", "swarmwire.agent.cli")  # of Python: it needs no scripts to be installed
+UNIT = """\
+[Unit]
+Description=swarmwire robot {robot}
+StartLimitIntervalSec=60
+StartLimitBurst=5
+
+[Service]
+Type=notify
+NotifyAccess=all
+WorkingDirectory={current}
+Environment="PYTHONPATH={paths}" PYTHONUNBUFFERED=1
+ExecStart="{python}" {program} run --config {current}/robot.toml
+ExecStopPost="{python}" {program} stop-motors --config {current}/robot.toml
+WatchdogSec=10
+TimeoutStartSec=30
+TimeoutStopSec=5
+KillMode=mixed
+Restart=on-failure
+RestartSec=2
+NoNewPrivileges=yes
+"""
 
 
 def package_links(environments: Sequence[Archive]) -> dict[str, str]:
@@ -63,3 +152,66 @@ def _read(path: Path, fleet: Fleet, key: str, cure: str = "") -> bytes:
     except OSError as error:
         told = f"expected a readable file: {path}: {error.strerror}" + (f"; {cure}" if cure else "")
         raise BadInput(str(fleet.file), key, told) from None
+
+
+def robot_settings(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[str, Any]:
+    """The content of a robot's `robot.toml`; files are beside it."""
+    return {
+        "format": 1,
+        "name": robot.name,
+        "swarm": fleet.swarm,
+        "robots": [other.name for other in fleet.robots],
+        **robot.settings,
+        "agent": _beside(robot.settings["agent"]),
+        **({"body": _beside(robot.settings["body"])} if "body" in robot.settings else {}),
+        "network": _network(fleet, robot, revoked),
+        "log": LOG,
+    }
+
+
+def operator_network(fleet: Fleet, revoked: Sequence[str], robots: Sequence[Robot]) -> dict[str, Any]:
+    """The network of whoever asks these robots from here; its files are in the fleet's folder of certificates."""
+    connect = [robot.endpoint for robot in robots]
+    if fleet.certificates is None:
+        return {"connect": connect, "insecure": True}
+    return {"connect": connect, **_proof(fleet, fleet.operator, revoked)}
+
+
+def _network(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[str, Any]:
+    protocol, _, address = robot.endpoint.partition("/")
+    network: dict[str, Any] = {
+        "listen": [f"{protocol}/0.0.0.0:{address.rpartition(':')[2]}"],
+        # One of each two calls: both would have them meet twice, and one link be closed again.
+        "connect": [other.endpoint for other in fleet.robots[: fleet.robots.index(robot)]],
+    }
+    if not network["connect"]:
+        del network["connect"]
+    if fleet.certificates is None:
+        return {**network, "insecure": True}
+    return {**network, **_proof(fleet, robot.name, revoked)}
+
+
+def _proof(fleet: Fleet, name: str, revoked: Sequence[str]) -> dict[str, Any]:
+    proof: dict[str, Any] = {"ca": CA, "certificate": f"{name}.pem", "key": f"{name}.key", "operator": fleet.operator}
+    return {**proof, "revoked": list(revoked)} if revoked else proof
+
+
+def _beside(name: str) -> str:
+    """A file's name in the folder of the settings, to which it is copied; what is no file stays as it is."""
+    place, colon, inner = name.rpartition(":")
+    if colon and place.endswith(".py"):
+        return f"{Path(place).name}:{inner}"
+    return Path(name).name if name.endswith(".toml") else name
+
+
+def unit_file(robot: str, python: str, packages: Sequence[str]) -> tuple[str, str]:
+    """Name and content; `packages` are the links within a release to what its Python has on its path.
+
+    It is not started with the machine: no robot moves because it was switched on.
+    """
+    current = f"%h/swarmwire/{robot}/current"
+    # The agent, which tells systemd that it lives, is a child of its guard: hence NotifyAccess, and KillMode, with
+    # which the guard alone is told to end: it passes that on.
+    paths = ":".join(f"{current}/{name}" for name in packages)
+    text = UNIT.format(robot=robot, current=current, paths=paths, python=python, program=" ".join(ROBOT_PROGRAM))
+    return unit_of(robot), text

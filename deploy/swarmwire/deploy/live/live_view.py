@@ -11,12 +11,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from rich.console import Console
+
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import PacketCounts, Static
+from swarmwire.deploy.simulation import Simulation
 
 LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
 
 
-class LiveView:
+class LiveView(Observer):
     """Observer that opens a view of the run in this folder, which must be published before it begins.
 
     As a context manager it ends the viewing process and all that this started. Nothing here raises into a run: a view
@@ -84,13 +88,6 @@ class LiveView:
         if self._closed:
             self._closed()
 
-    def see(self, truth: Truth) -> None:
-        """Nothing: what is seen is published."""
-
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Leave the view open; it adds nothing to the summary."""
-        return {}
-
     def wait(self) -> None:
         """Return when the person has closed the view, at once if there is none; Ctrl-C ends the wait and the view."""
         if self._process is None:
@@ -112,3 +109,41 @@ class LiveView:
         with suppress(ProcessLookupError, PermissionError):  # also a viewer whose parent was killed
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+
+
+SPEED = 1.0  # simulated s per s of wall time at which a run that need not keep to the wall clock begins
+
+
+class PageBeside(LiveView):
+    """Observer that opens the page of a run, and has the run begin paused, at a speed that people can follow."""
+
+    def __init__(self, simulation: Simulation, folder: Path, console: Console) -> None:
+        """What the page says, above all its address, goes above the terminal's panel."""
+        say = None if console.quiet else self._print
+        super().__init__(folder, page=True, say=say, closed=self._gone)
+        self._simulation, self._console = simulation, console
+        self._over = False
+
+    def begin(self, static: Static) -> None:
+        """Pause the run before its first tick, and start the page's process."""
+        controls = self._simulation.controls
+        controls.pause()
+        if not controls.real_time:
+            controls.set_speed(SPEED)
+        super().begin(static)
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """The run is over; the page stays."""
+        self._over = True
+        return super().end(last)
+
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+    def _gone(self) -> None:
+        controls = self._simulation.controls
+        if self._simulation.tick <= 1:  # it never came to be used, so nobody will press play
+            controls.resume()
+        elif not self._over:
+            held = "paused: swarmwire ctl resume lets it go on" if controls.paused else "going on"
+            self._print(f"the page has ended, the run is {held}; swarmwire ui opens another page")

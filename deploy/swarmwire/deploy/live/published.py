@@ -1,13 +1,18 @@
-"""A run published for observers: whoever wants looks on from a process of its own, and the run does not notice."""
+"""A run published for observers: whoever wants looks on from a process of its own, and the run does not notice.
 
-# zenoh's stubs leave out the return types of put, reply and close.
+What adds up from tick to tick (counts of packets, contacts, events) is published in full with the next tick that is; of
+the links that ended, those of that tick alone.
+"""
+
 # pyright: reportUnknownMemberType=false
+# zenoh's stubs leave out the return types of put, reply and close.
 
 import os
 import queue
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from math import isinf
 from pathlib import Path
 from typing import Any
@@ -15,24 +20,97 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, readings_within, static_of, truth_of
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
-from swarmwire.deploy.endpoint import local_endpoint
-from swarmwire.deploy.live.live_file import Live, forget_live
-from swarmwire.deploy.live.sampling import FRAMES_PER_S, Rate, Sampling, Since
-from swarmwire.metrics.viewer.plotted import Measured
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.deploy.live.following import Live, forget_live
+from swarmwire.deploy.runners import local_endpoint
+from swarmwire.metrics.measure import Measured
+from swarmwire.metrics.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
+
+FRAMES_PER_S = 30
+LINKS_PER_S = 5  # in large swarms, where links are most of a frame
+FEW = 200  # robots: up to so many, links come with every frame
+SMALL = 50  # robots: up to so many, everybody's sensors are shown; of more, those of one
+MAX_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of more none
+
+
+@dataclass(slots=True)
+class Rate:
+    """Something that may be done so many times a second."""
+
+    per_s: int
+    next_ns: int = 0
+
+    def due(self, now_ns: int) -> bool:
+        """Whether it may be done now; if so, the next time is counted from now."""
+        if now_ns < self.next_ns:
+            return False
+        self.next_ns = now_ns + NS_PER_S // self.per_s
+        return True
+
+
+class Since:
+    """The ticks since the one that was shown last."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self._together: Truth | None = None
+
+    def add(self, truth: Truth) -> None:
+        """One more."""
+        self.ticks += 1
+        before = self._together
+        if before is None:
+            self._together = truth
+            return
+        tally = before.tally and truth.tally and before.tally + truth.tally
+        onsets, events = before.contact_onsets + truth.contact_onsets, before.events + truth.events
+        self._together = replace(truth, tally=tally, contact_onsets=onsets, events=events)
+
+    def take(self) -> tuple[Truth, int]:
+        """The last of them with what adds up over all, and how many; from here on it is the next ones."""
+        together, ticks = self._together, self.ticks
+        if together is None:
+            raise ValueError("expected a tick")
+        self.ticks, self._together = 0, None
+        return together, ticks
+
+
+class Sampling:
+    """Glimpses of one arena, out of the ticks of all."""
+
+    def __init__(self, static: Static, arena: int, selected: str) -> None:
+        """Show this arena, and of a large swarm the sensors of the robot `selected`."""
+        self._static, self._arena = static, arena
+        self._serial = 0
+        self._links = Rate(LINKS_PER_S)
+        self._selected = static.robot_names.index(selected)
+
+    def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> ObservedTick:
+        """What is shown of a tick; `values` (series, arenas) were measured in it."""
+        static = self._static
+        links = static.robots <= FEW or self._links.due(now_ns)
+        shown = truth_of(truth, static, self._arena)
+        few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
+        shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
+        if static.robots > SMALL:
+            shown = replace(shown, readings=readings_within(shown.readings, slice(self._selected, self._selected + 1)))
+        self._serial += 1
+        return ObservedTick(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
+
 
 LEAVE_S = 2.0  # how long the last frame may take
 
 
-class Published:
+class Published(Observer):
     """Observer that publishes one arena of a run on an endpoint of its own, as `live.json` in the run folder tells.
 
     At most 30 ticks per second of wall time are published; nothing is encoded, nor even counted, while nobody looks on.

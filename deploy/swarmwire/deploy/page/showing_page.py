@@ -8,44 +8,40 @@ from typing import Any
 
 from swarmwire.comms.run_views import ObservedRun
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.control.remote_control import RemoteControl, controlling
-from swarmwire.deploy.live.following import following
-from swarmwire.deploy.live.live_file import Live
-from swarmwire.deploy.live.showing import Drawer, RadioModel
-from swarmwire.deploy.live.viewer_program import has_screen
-from swarmwire.deploy.page.app import Shown, page_app
-from swarmwire.deploy.page.news import NewsThread
-from swarmwire.deploy.page.seen import Seen
-from swarmwire.deploy.page.serving import serving
+from swarmwire.deploy.live.following import Live, following
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
+from swarmwire.deploy.live.viewer import Drawer, ViewOptions, has_screen
+from swarmwire.deploy.page.news import NewsThread, Seen
+from swarmwire.deploy.page.server import Shown, page_app, serving
 
 
-def show_page(live: Live, way: RadioModel, network: Network | None = None, *, begin: bool = False) -> None:
-    """Show the run until `way.stopped()` or its viewer is gone; afterwards it can still be looked at. RunGone if it is.
+def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
+    """Show the run until `options.stopped()` or its viewer is gone; RunGone if the run does not answer.
 
     `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that
     waits for the page is asked for: without it there would be nothing to see.
     """
-    clock = way.clock
-    viewing = replace(way, web=True, port=None).viewer(None)
+    clock = options.clock
+    viewing = replace(options, web=True, port=None).viewer(None)
     with following(live, network) as run, viewing as shown, controlling(live.endpoint, live.run, network) as control:
         assert shown.web is not None, "a viewer with pages was asked for"
         seen = Seen(run.scene.static)
-        drawer = Drawer(run, shown.url, way, seen.see)
+        drawer = Drawer(run, shown.url, options, seen.see)
         drawer.start()
         told = Shown(shown.web, shown.url, facts(run.scene))
         news = NewsThread(control, lambda: seen.numbers, clock, lambda: run.over)
         with (
-            serving(lambda token, port: page_app(control, news, told, token, port), clock, way.port) as address,
+            serving(lambda token, port: page_app(control, news, told, token, port), clock, options.port) as address,
             closing(news),  # first, so that no page waits for more
         ):
             news.start()
-            way.say(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
+            options.say(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
             if has_screen():
                 webbrowser.open(address)
             if begin:
                 _first_tick(control)
-            while shown.alive and not way.stopped() and drawer.fault is None:
-                way.pause()
+            while shown.alive and not options.stopped() and drawer.fault is None:
+                options.pause()
     if drawer.fault is not None:
         raise drawer.fault
 

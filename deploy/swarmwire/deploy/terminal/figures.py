@@ -9,8 +9,9 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
-from swarmwire.metrics.event_log import names
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.text import some
 
 SHOWN = ("order", "largest_component", "components")  # of the metrics
 HISTORY_S = 60  # simulated; one value a second
@@ -119,11 +120,7 @@ class Figures:
 
 def _words(event: EventRecord, time_ns: int, static: Static) -> str:
     robots = [name for own in names(event, static) for name in own]
-    if static.arenas > 1:
-        who = f"{len(robots)} robots"
-    else:
-        more = len(robots) - NAMED
-        who = ", ".join(robots[:NAMED]) + (f" and {more} more" if more > 0 else "") or "no robot"
+    who = f"{len(robots)} robots" if static.arenas > 1 else some(robots, NAMED) or "no robot"
     return f"{to_s(time_ns):.1f} s  {event.words}: {who}"
 
 

@@ -1,19 +1,41 @@
-"""The progress of a run in plain lines, for what is no terminal."""
+"""What a terminal shows until a run has ended: a panel or lines, runners that are missing, addresses of gateways."""
 
 import math
-from typing import Any
+from shlex import quote
+from types import TracebackType
+from typing import Self
 
 from rich.console import Console
+from rich.markup import escape
+from rich.status import Status
 
-from swarmwire.comms.clock import Clock, to_s
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.assignment import robots_text
+from swarmwire.comms.clock import Clock, WallClock, to_s
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.wire.network import Network, is_local
+from swarmwire.deploy.config import JoinObserver
+from swarmwire.deploy.gateways.serving import ServedRobot
+from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.deploy.terminal.panel import Panel
+from swarmwire.deploy.terminal.tables import aligned
+from swarmwire.metrics.measure import Metrics
+from swarmwire.world.backends.registry import RunnerEvent
+
+
+def run_progress(simulation: Simulation, console: Console) -> Observer:
+    """A panel with keys in a terminal, else a line now and then."""
+    metrics, clock = simulation.metrics, WallClock()
+    if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
+        return Panel(simulation.ticks, metrics, simulation.controls, simulation.health, clock, console)
+    return ProgressLines(simulation.ticks, metrics, clock, console)
+
 
 SHARE = 0.25  # a line each time that so much more is done
 
 
-class ProgressLines:
+class ProgressLines(Observer):
     """Observer that prints a few lines: how far a run is, how fast, and how the swarm and its radio are doing."""
 
     def __init__(self, ticks: int, metrics: Metrics, clock: Clock, console: Console) -> None:
@@ -43,9 +65,93 @@ class ProgressLines:
                 f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"
             )
 
-    def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Nothing is left to say."""
-        return {}
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+
+class Gathering(Observer, JoinObserver):
+    """Told of runners that come and go, and an observer, since the waiting is over when a run begins.
+
+    Who came or went and who was refused is said by the run itself; here it is what is still missing.
+    """
+
+    def __init__(self, robots: tuple[str, ...], start_with: int | None, network: Network, console: Console) -> None:
+        self._robots, self._network, self._console = robots, network, console
+        self._start_with = start_with
+        self._status: Status | None = None
+        if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
+            self._status = console.status("")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._stop()
+
+    def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
+        """Say what to type elsewhere."""
+        self._print(f"run {run_id} listens at {', '.join(endpoints)}; agents join it by")
+        self._print(f"  swarmwire join {endpoints[0]} --robots {len(self._robots)}{self._proof(endpoints[0])}")
+        if self._status is not None:
+            self._status.start()
+        self._tell(self._robots)
+
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
+        """Say who is missing."""
+        if change.tick < 0:
+            self._tell(free)
+
+    def begin(self, static: Static) -> None:
+        """Nobody is waited for any more."""
+        self._stop()
+
+    def _tell(self, free: tuple[str, ...]) -> None:
+        played = len(self._robots) - len(free)
+        text = f"{played} of {len(self._robots)} robots have agents"
+        if self._start_with is not None:
+            text += f", and the run begins with {self._start_with}"
+        if free:
+            text += f"; without: {robots_text(list(free))}"
+        if self._status is not None:
+            self._status.update(escape(text))
+        else:
+            self._print(text)
+
+    def _proof(self, endpoint: str) -> str:
+        if self._network.proves:
+            return " --certs DIR"
+        return "" if is_local(endpoint) else " --insecure"
+
+    def _stop(self) -> None:
+        if self._status is not None:
+            self._status.stop()
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)
+
+
+class RobotsTold(Observer):
+    """Observer that prints a line for each such robot, to be copied into a shell; nothing where there are none."""
+
+    def __init__(self, simulation: Simulation, console: Console) -> None:
+        self._simulation, self._console = simulation, console
+
+    def begin(self, static: Static) -> None:
+        """Print them."""
+        served = self._simulation.served
+        if served is None:
+            return
+        rows = [("robot", "gateway", "address", "driven by"), *(_row(robot) for robot in served.robots)]
+        for line in aligned(rows):
+            self._print(line)
+        self._print(f"network of swarm {served.swarm!r}: {' '.join(served.endpoints)}")
+
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+
+def _row(robot: ServedRobot) -> tuple[str, str, str, str]:
+    command = (
+        f"swarmwire-agent run --config {quote(str(robot.file))}" if robot.file else "(without a run folder no settings)"
+    )
+    return robot.name, robot.kind, robot.address, command

@@ -1,21 +1,120 @@
-"""Figures without pyplot: made, turned into pixels, and saved."""
+"""What all pictures share: colours, sizes of letters, figures without pyplot, plain axes, the layout of an arena."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
+
+import numpy as np
 
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
-from swarmwire.metrics.drawing.looks import LONG_SIDE_IN, PAPER
-from swarmwire.metrics.whole_file import check_path, chosen_file
+from swarmwire.metrics.atomic import check_output_path, output_file
 
+Color = tuple[int, int, int]  # red, green, blue, 0 to 255
+
+ROBOT_COLORS: tuple[Color, ...] = (
+    (86, 180, 233),
+    (240, 160, 50),
+    (0, 200, 140),
+    (230, 110, 180),
+    (160, 140, 250),
+    (150, 210, 60),
+    (235, 125, 100),
+    (90, 210, 220),
+    (200, 165, 125),
+    (240, 185, 225),
+)
+Look = dict[str, Any]  # matplotlib's keyword arguments for colours, widths and the like
+
+LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels only scale them
+TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5
+
+INK, SOFT, FAINT, GRID = "#20242b", "#69707d", "#b9bfc9", "#e6e9ee"
+PAPER, FLOOR = "#ffffff", "#f4f6f9"  # so far apart that a GIF's palette keeps both
+WALL, OBSTACLE, OBSTACLE_EDGE = "#5c6370", "#d3d8df", "#8f97a3"
+MOVABLE, MOVABLE_EDGE = "#ead9bd", "#94743c"  # obstacles that robots push
+LIGHT, LIGHT_EDGE = "#ffd23f", "#c98f00"
+LINK = "#7d8aa5"
+MOVABLE_DASHES = (0, (2.5, 1.5))
+DEAD: Color = (176, 180, 188)
+CURVE = "#2f6fae"
+ACCENT = "#c2502e"  # highlights; distinct from the curves' blue also for colour-blind readers
+STATE_COLORS: tuple[Color, ...] = (
+    (76, 120, 168),
+    (245, 133, 24),
+    (84, 162, 75),
+    (228, 87, 86),
+    (178, 121, 162),
+    (238, 202, 59),
+    (114, 183, 178),
+    (157, 117, 93),
+)
+OTHER_STATE: Color = (205, 208, 214)  # of robots in none of the states that have a colour
+
+_SHADE = 0.58  # how dark a colour's outline is beside it
+ROW_IN = 0.185
 MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
+PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
+_EDGE_IN, _GAP_IN = 0.14, 0.2
+_TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
+_PANEL_BESIDE_IN = 1.95
+_FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
+_MIN_WIDTH_IN = 3.9
+_BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
+
+
+def robot_color(index: int) -> Color:
+    """The colour of the group, or of the state, that comes at this place; they come round again after the last."""
+    return ROBOT_COLORS[index % len(ROBOT_COLORS)]
+
+
+def rgb(color: Color) -> tuple[float, float, float]:
+    """A colour as matplotlib has it, 0 to 1."""
+    red, green, blue = color
+    return red / 255, green / 255, blue / 255
+
+
+def shade(color: Color) -> tuple[float, float, float]:
+    """The darker colour of the same hue, for outlines and thin lines on light ground."""
+    red, green, blue = rgb(color)
+    return red * _SHADE, green * _SHADE, blue * _SHADE
+
+
+def plain_axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
+    """Axes at left, low, width and height, in shares of the figure."""
+    axes = figure.add_axes(place)
+    axes.set_facecolor("none")
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
+    axes.grid(axis="y", color=GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(which="both", labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
+    axes.set_title(title, loc="left", fontsize=TEXT_PT, color=SOFT, pad=4)
+    return axes
+
+
+def add_facts(
+    figure: Any, facts: Sequence[tuple[str, str]], left: float, top: float, height_in: float, across: float
+) -> float:
+    """Write name and value in rows from these shares of the figure down; returns the share below the last row.
+
+    `across` is the share of the figure's width from a name to its value; a fact without a name goes on with the one
+    above it.
+    """
+    step = ROW_IN / height_in
+    for name, value in facts:
+        figure.text(left, top, name, fontsize=TEXT_PT, color=SOFT, va="top")
+        figure.text(left + across, top, value, fontsize=TEXT_PT, color=INK, va="top")
+        top -= step
+    return top
 
 
 def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     """An empty figure whose longer side has this many pixels; both sides are even, as films need them.
 
-    BadInput without matplotlib, or for a size that nobody could look at.
+    BadInput without matplotlib, or for a size out of bounds.
     """
     REPORT.need("pictures")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -24,7 +123,7 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
     if not MIN_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
         raise BadInput("--size", "", f"expected {MIN_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
     dpi = size_px / max(width_in, height_in, LONG_SIDE_IN)
-    # A hundredth more, since the canvas cuts off what is after the point.
+    # A hundredth more, since the canvas rounds down.
     even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]
     figure = Figure(figsize=(even[0], even[1]), dpi=dpi, facecolor=PAPER)
     FigureCanvasAgg(figure)
@@ -32,15 +131,13 @@ def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
 
 
 def pixels(figure: Any) -> ByteArray:
-    """What the canvas shows, (height, width, 3); a view that the next drawing overwrites."""
-    import numpy as np
-
+    """The pixels of the canvas, (height, width, 3); a view that the next drawing overwrites."""
     return np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
 
 
 def check_picture(to: Path) -> None:
-    """Return if a picture may be written there, of the kind that the file's name says; else BadInput."""
-    check_path(to, (".png", ".svg", ".pdf"))
+    """Return if a picture of the suffix's kind can be written there; else BadInput."""
+    check_output_path(to, (".png", ".svg", ".pdf"))
 
 
 def save(figure: Any, to: Path) -> None:
@@ -52,5 +149,72 @@ def save(figure: Any, to: Path) -> None:
     check_picture(to)
     # Equal pictures are equal bytes: no date, and names within an SVG that do not change.
     undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
-    with chosen_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
+    with output_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
         figure.savefig(part, dpi=figure.dpi, metadata=undated)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Rectangles (left, bottom, width, height) as shares of a figure of this size."""
+
+    width_in: float
+    height_in: float
+    arena: tuple[float, float, float, float]
+    panel: tuple[float, float, float, float] | None
+    beside: bool  # the panel stands right of the arena, not below
+
+    @property
+    def left(self) -> float:
+        """Where titles start."""
+        return _EDGE_IN / self.width_in
+
+    @property
+    def right(self) -> float:
+        """Where they end at the latest."""
+        return 1.0 - _EDGE_IN / self.width_in
+
+    def below_top(self, inches: float) -> float:
+        """The height, as a share, at this distance below the upper edge."""
+        return 1.0 - inches / self.height_in
+
+
+def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> Layout:
+    """The layout for an arena of this size, with room for its axes left and below.
+
+    `panel_in` is the height of a panel below the arena; 0: no panel.
+    """
+    pad_m = 2.0 * PAD * max(size_m)
+    across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
+    beside = panel_in > 0.0 and up_m / across_m >= _BESIDE_FROM
+    head_in = _TITLE_IN + legend_rows * _LEGEND_ROW_IN
+    left_in = _EDGE_IN + axes_in
+    beside_in = _GAP_IN + _PANEL_BESIDE_IN if beside else 0.0
+    below_in = 0.0 if beside or not panel_in else _GAP_IN + panel_in
+    low_in = _FOOT_IN + axes_in / 2 + below_in
+    in_per_m = min((LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m)
+    arena_in = across_m * in_per_m, up_m * in_per_m
+    width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _MIN_WIDTH_IN)
+    height_in = head_in + arena_in[1] + low_in
+    place = left_in, low_in, *arena_in
+    panel = None
+    if beside:  # a narrow arena leaves it more room
+        from_left = left_in + arena_in[0] + _GAP_IN
+        panel = from_left, low_in, width_in - _EDGE_IN - from_left, arena_in[1]
+    elif panel_in:
+        panel = _EDGE_IN, _EDGE_IN, width_in - 2 * _EDGE_IN, panel_in
+
+    def shares(rectangle: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        x, y, width, height = rectangle
+        return x / width_in, y / height_in, width / width_in, height / height_in
+
+    return Layout(width_in, height_in, shares(place), shares(panel) if panel else None, beside)
+
+
+def add_arena_axes(figure: Any, layout: Layout, size_m: tuple[float, float]) -> Any:
+    """Axes in m of the arena, to scale, without lines."""
+    axes = figure.add_axes(layout.arena)
+    pad_m = PAD * max(size_m)
+    half_x, half_y = size_m[0] / 2 + pad_m, size_m[1] / 2 + pad_m
+    axes.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), aspect="equal")
+    axes.set_axis_off()
+    return axes

@@ -11,8 +11,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
-from swarmwire.metrics.metric import Measure, Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1
@@ -39,17 +38,18 @@ class AgeOfInformation(Metric):
     )
     unit = "s"
     standard = True
+    needs = ()
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
         """A fresh measure, which keeps when the newest packet of each pair was sent."""
         newest = Newest(static)
 
-        def measure(moment: Moment) -> FloatArray | float:
-            if moment.truth.finished is None:
+        def measure(view: TickView) -> FloatArray | float:
+            if view.truth.finished is None:
                 return np.nan
-            newest.see(moment.truth.finished, moment.alive)
-            return newest.mean_age_s(moment.truth.time_ns)
+            newest.see(view.truth.finished, view.alive)
+            return newest.mean_age_s(view.truth.time_ns)
 
         return measure
 

@@ -11,17 +11,17 @@ nothing changes, and without a radio there are no events at all.
 
 # pyright: basic, reportUnknownMemberType=false
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.moment import Moment
+from swarmwire.metrics.metric import Measure, Metric, TickView
 
 NEVER = -1
 
@@ -30,7 +30,23 @@ NEVER = -1
 class OfFragmentation(Metric):
     """A metric of fragmentation events."""
 
+    needs = ("graph",)
+
     hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
+
+    @abstractmethod
+    def value(self, events: "Fragmentation", counted: IntArray) -> FloatArray:
+        """The metric (arenas,) by the events so far, and those that are `counted` in this tick, (arenas,)."""
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which is NaN without a radio."""
+        events = Fragmentation(static, self.hold_s)
+
+        def measure(view: TickView) -> FloatArray | float:
+            counted = events.see(view)
+            return np.nan if counted is None else self.value(events, counted)
+
+        return measure
 
 
 class Fragmentation:
@@ -41,6 +57,7 @@ class Fragmentation:
         rejoined: (arenas,) of these, that are over.
         rejoined_s: by arena, how long each event lasted that is over, in order.
         rejoined_now: the arenas of which an event was over in the last tick.
+        statistic_s: (arenas,) what a metric last made of `rejoined_s`; NaN before.
     """
 
     def __init__(self, static: Static, hold_s: float) -> None:
@@ -50,18 +67,19 @@ class Fragmentation:
         self.rejoined: IntArray = np.zeros(arenas, np.int64)
         self.rejoined_s: list[list[float]] = [[] for _ in range(arenas)]
         self.rejoined_now: list[int] = []
+        self.statistic_s: FloatArray = np.full(arenas, np.nan)
         self._was_whole: BoolArray = np.zeros(arenas, np.bool_)
         self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
         self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
 
-    def see(self, moment: Moment) -> IntArray | None:
+    def see(self, view: TickView) -> IntArray | None:
         """How many events, 0 or 1, are counted in this tick, (arenas,); None without a radio."""
-        self.rejoined_now, found = [], moment.components
+        self.rejoined_now, found = [], view.components
         if found is None:
             return None
         counted, lasted_ns = np.zeros_like(self.started), np.full_like(self.started, NEVER)
         state = self._was_whole, self._since_ns, self._event
-        if _follow(found.pieces, moment.truth.time_ns, self._hold_ns, *state, counted, lasted_ns):
+        if _follow(found.pieces, view.truth.time_ns, self._hold_ns, *state, counted, lasted_ns):
             self.rejoined_now = np.flatnonzero(lasted_ns != NEVER).tolist()
             self.rejoined[self.rejoined_now] += 1
             for arena in self.rejoined_now:
@@ -86,3 +104,103 @@ def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted
             if not event[arena] and now_ns - since_ns[arena] >= hold_ns:
                 event[arena], counted[arena] = True, 1
     return any_over
+
+
+@dataclass(frozen=True)
+class Fragmentations(OfFragmentation):
+    """Times that the radio graph's components rose above 1 and stayed there for at least `hold_s`.
+
+    Counted at the end of that hold. NaN without a radio.
+    """
+
+    name = "fragmentations"
+    help = "times that the radio graph fell apart for at least hold_s"
+    kind = "count"
+    standard = True
+    bounds = (0.0, None)
+
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Those of this tick."""
+        return counted.astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Fragmented(OfFragmentation):
+    """1 while a fragmentation event lasts, 0 else: its mean is the share of the time.
+
+    It is 1 from the tick in which the event is counted, as
+    nobody knows before that the split will last: the share of the time from falling apart to being whole again is this
+    mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
+    """
+
+    name = "fragmented"
+    help = "1 while the radio graph has fallen apart for at least hold_s, 0 else"
+    bounds = (0.0, 1.0)
+
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Whether one is open."""
+        return (events.started - events.rejoined).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Unrejoined(OfFragmentation):
+    """Fragmentation events that have not re-joined / events so far: its `final` is the share censored by the end.
+
+    An arena has at most one that is open. NaN before the first event.
+    """
+
+    name = "unrejoined"
+    help = "share of the fragmentations so far that have not re-joined"
+    standard = True
+    bounds = (0.0, 1.0)
+
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Those that are open over all."""
+        return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
+
+
+class _Rejoin(OfFragmentation):
+    """A statistic of the times in s from falling apart to one component, over the events re-joined so far.
+
+    Each is at least `hold_s`; `final` is that of the run. Events that have not re-joined are left out, so a
+    run that ends early looks quicker: read it with `unrejoined`. NaN until the first has re-joined.
+    """
+
+    unit = "s"
+    bounds = (0.0, None)
+
+    @abstractmethod
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The statistic of the lengths of the events that are over: at least one."""
+
+    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+        """Worked out anew where an event was over in this tick."""
+        for arena in events.rejoined_now:
+            events.statistic_s[arena] = self.statistic(events.rejoined_s[arena])
+        return events.statistic_s
+
+
+@dataclass(frozen=True)
+class RejoinMedian(_Rejoin):
+    """Median time to re-join."""
+
+    name = "rejoin_median"
+    help = "median time to re-join over the fragmentations re-joined so far, in s"
+    standard = True
+
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The middle one, or the mean of the two in the middle."""
+        return float(np.median(lengths_s))
+
+
+@dataclass(frozen=True)
+class RejoinWorst(_Rejoin):
+    """Longest time to re-join."""
+
+    name = "rejoin_worst"
+    help = "longest time to re-join over the fragmentations re-joined so far, in s"
+    standard = True
+
+    def statistic(self, lengths_s: list[float]) -> float:
+        """The longest."""
+        return max(lengths_s)

@@ -1,16 +1,25 @@
-"""The log of one robot: what it did in each step, and what its radio sent and received."""
+"""The log of one robot: the robot, its steps, and the packets that its radio sent and received."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from io import BytesIO
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.config import from_json
-from swarmwire.metrics.real_log.about import ROBOT, AboutRobot, read_about_robot
-from swarmwire.metrics.real_log.log_table import LogTable
+from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.config import from_json, read_json
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
+LOG_FORMAT = 1
+ROBOT = "robot.json"
+LATEST_S = 9e9  # whose nanoseconds fit an integer
 TICKS, RECEIVED, SENT, SUMMARY = "ticks.csv", "received.csv", "sent.csv", "summary.json"
 POSE = ("x_m", "y_m", "heading_rad")
 COMMAND = ("linear_mps", "angular_radps")
@@ -18,6 +27,29 @@ TICK_COLUMNS = ("t_s", *POSE, *COMMAND, "state", "value")
 RECEIVED_COLUMNS = ("t_s", "tx", "rx", "seq", "to", "size_bytes", "tag", "latency_s", "distance_m")
 SENT_COLUMNS = ("t_s", "seq", "to", "size_bytes", "tag", "fate")
 TOO_LARGE = "too_large"
+
+
+@dataclass(frozen=True)
+class RobotRadio:
+    """The radio in robot.json."""
+
+    kind: str  # "world": the packets went over a run's radio
+
+
+@dataclass(frozen=True)
+class AboutRobot:
+    """robot.json, as far as it is read."""
+
+    name: str
+    swarm: str
+    robots: tuple[str, ...]  # all of the swarm, in the order of their index
+    agent: str  # as the robot's settings have it
+    agent_sha256: str
+    params: dict[str, Any]
+    body: dict[str, Any]  # its data sheet
+    rate_hz: float
+    started_utc_ns: int
+    radio: RobotRadio
 
 
 @dataclass(frozen=True)
@@ -78,6 +110,7 @@ class RobotLog:
     """A robot's folder, read."""
 
     about: AboutRobot
+    body: Body
     where: str
     steps: Steps
     received: ReceivedPackets
@@ -99,7 +132,66 @@ def read_robot_log(folder: Path) -> RobotLog:
         for name, columns in ((TICKS, TICK_COLUMNS), (RECEIVED, RECEIVED_COLUMNS), (SENT, SENT_COLUMNS))
     )
     halves = tuple(name for name, of in ((TICKS, ticks), (RECEIVED, received), (SENT, sent)) if of.half_line)
-    return RobotLog(about, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves)
+    body = body_from_mapping(about.body, str(folder / ROBOT))
+    return RobotLog(
+        about, body, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves
+    )
+
+
+def read_about_robot(path: Path) -> AboutRobot:
+    """The robot of a log; BadInput if the file is missing, damaged, or of another format."""
+    about = read_json(AboutRobot, path, LOG_FORMAT)
+    if len(set(about.robots)) < len(about.robots):
+        raise BadInput(str(path), "robots", "expected a list of names, each once")
+    if about.name not in about.robots:
+        raise BadInput(str(path), "name", f"expected one of robots, got {about.name!r}")
+    if not (isfinite(about.rate_hz) and about.rate_hz > 0.0):
+        raise BadInput(str(path), "rate_hz", f"expected more than 0 Hz, got {about.rate_hz:g}")
+    return about
+
+
+class LogTable(MeasuredTable):
+    """The whole lines of a file, of which there may be none.
+
+    Attributes:
+        half_line: whether the file ended in half a line, which was dropped.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        """Read the file, all columns as texts; BadInput unless it has these columns, or if a line has others."""
+        self.where = str(path)
+        whole, half = _whole_lines(path)
+        self.half_line = half
+        try:
+            self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
+        except corruption_errors() as error:
+            raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
+        self.need(columns)
+
+    def __len__(self) -> int:
+        return len(self._frame)
+
+    def known(self, column: str, expected: str) -> FloatArray:
+        """A column (rows,) without empty fields; BadInput where there is one."""
+        values = self.numbers(column)
+        self.refuse_where(np.isnan(values), column, f"expected {expected}")
+        return values
+
+    def times_s(self) -> FloatArray:
+        """The column t_s (rows,), UTC since 1970; BadInput for what is no time."""
+        values = self.known("t_s", "a time in s")
+        self.refuse_where(np.abs(values) >= LATEST_S, "t_s", "expected a time in s since 1970")
+        return values
+
+    def whole_numbers(self, column: str) -> IntArray:
+        """A column (rows,) of whole numbers; BadInput for others."""
+        values = self.known(column, "a whole number")
+        self.refuse_where((np.abs(values) >= 2.0**53) | (values % 1 != 0), column, "expected a whole number")
+        return values.astype(np.int64)
+
+    def words(self, column: str) -> list[str]:
+        """A column (rows,) of texts, of which some may be empty."""
+        return self._frame[column].fill_null("").to_list()
 
 
 def received_packets(table: LogTable) -> ReceivedPackets:
@@ -119,6 +211,19 @@ def received_packets(table: LogTable) -> ReceivedPackets:
         latency_s,
         distance_m,
     )
+
+
+def _whole_lines(path: Path) -> tuple[bytes, bool]:
+    """The lines that were written to their end, and whether there was half of one more."""
+    try:
+        whole, end, half = path.read_bytes().rpartition(b"\n")
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a table of a robot's log: {error.strerror}") from None
+    return whole + end, bool(half)
+
+
+def _empty(columns: Sequence[str]) -> pl.DataFrame:
+    return pl.DataFrame(schema=dict.fromkeys(columns, pl.String))
 
 
 def _steps(table: LogTable) -> Steps:

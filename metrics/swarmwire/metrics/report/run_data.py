@@ -1,29 +1,103 @@
-"""What is known of a run that is to be reported: its folder read, as far as there is something."""
+"""The data of a run's report: its folder, film, events by kind, and tables."""
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
+import numpy as np
+import polars as pl
+
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.damage import damage
 from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.record.names import SCENARIO
-from swarmwire.metrics.report.lanes import Lane, lanes_of
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.sound_table import sound_table
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.table_file import corruption_errors
+from swarmwire.metrics.text import counted
 
-if TYPE_CHECKING:
-    import polars as pl
-
+MAX_POINTS = 800  # of a curve: about the width of a figure in dots
 ARENA = 0  # whose pictures are drawn
 
 
 @dataclass(frozen=True)
+class Span:
+    """Something that happened; where its end is not recorded, it was of a moment, or lasted to the run's end."""
+
+    from_s: float
+    until_s: float | None
+
+
+@dataclass
+class Lane:
+    """All that happened of one kind, in order."""
+
+    words: str  # the action, with its part if it has one
+    spans: list[Span] = field(default_factory=list[Span])
+    robots: set[str] = field(default_factory=set[str])  # names of all that it changed
+
+    @property
+    def title(self) -> str:
+        """The kind, how often it happened, and to how many robots."""
+        times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
+        return f"{self.words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{self.words}{times}"
+
+
+def lanes_of(events: pl.DataFrame) -> list[Lane]:
+    """The lanes of one arena's rows of `events`, by first occurrence.
+
+    Rows of ends do not name their beginning: an end belongs to the first open one with the same robots, else to the
+    first open one.
+    """
+    lanes: dict[str, Lane] = {}
+    opened: dict[str, list[tuple[int, list[str]]]] = {}
+    for row in events.iter_rows(named=True):
+        words = f"{row['do']} {row['part']}".strip()
+        lane, still_open = lanes.setdefault(words, Lane(words)), opened.setdefault(words, [])
+        lane.robots.update(row["robots"])
+        if row["ended"]:
+            _end(lane, still_open, row)
+        else:
+            still_open.append((len(lane.spans), row["robots"]))
+            lane.spans.append(Span(row["time_s"], None))
+    return [lane for lane in lanes.values() if lane.spans]
+
+
+def _end(lane: Lane, still_open: list[tuple[int, list[str]]], row: dict[str, Any]) -> None:
+    if not still_open:
+        return
+    same = [item for item in still_open if item[1] == row["robots"]]
+    ended = (same or still_open)[0]
+    still_open.remove(ended)
+    place, _ = ended
+    lane.spans[place] = Span(lane.spans[place].from_s, row["time_s"])
+
+
+def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
+    """The places to draw of a curve (T,), rising: all, or of each stretch the least and the greatest value.
+
+    A stretch without any value keeps its first place, so that a gap stays one.
+    """
+    if len(value) <= most:
+        return np.arange(len(value))
+    kept: set[int] = {0, len(value) - 1}
+    bounds = np.linspace(0, len(value), most // 2 + 1).astype(int).tolist()
+    for first, after in pairwise(bounds):
+        stretch = value[first:after]
+        known = np.flatnonzero(np.isfinite(stretch))
+        if not len(known):
+            kept.add(first)
+            continue
+        kept |= {first + int(known[stretch[known].argmin()]), first + int(known[stretch[known].argmax()])}
+    return np.array(sorted(kept))
+
+
+@dataclass(frozen=True)
 class RunData:
-    """A run folder, and what most sections read of it."""
+    """A run folder, and the data that most sections use."""
 
     folder: RunFolder
     static: Static
@@ -32,7 +106,7 @@ class RunData:
     scenario: str  # its text; empty: not there
     film: Film | str  # of the first arena, or why there is none
     lanes: list[Lane]  # its events
-    events: "pl.DataFrame | None"
+    events: pl.DataFrame | None
 
     @property
     def shown_name(self) -> str:
@@ -45,46 +119,39 @@ class RunData:
         return self.static.range_m is not None
 
     def record(self, name: str) -> dict[str, Any]:
-        """What the summary says of a table that was recorded; empty without one."""
+        """The summary's entry of a recorded table; empty without one."""
         return {} if self.summary is None else dict(self.summary["record"].get(name, {}))
 
     def of_arena(self, part: str, arena: int = ARENA) -> Any:
-        """What the summary says of an arena: its `radio` or `metrics`; None without a summary."""
+        """The summary's `radio` or `metrics` of an arena; None without a summary."""
         found: Any = None if self.summary is None else self.summary[part]
         return cast("list[Any]", found)[arena] if isinstance(found, list) else found
 
-    def table(self, name: str, arena: int | None = ARENA) -> "pl.DataFrame | str":
+    def table(self, name: str, arena: int | None = ARENA) -> pl.DataFrame | str:
         """`events`, `radio_distances` or `radio_links`, or why it cannot be had: not recorded, or damaged."""
         if not self.folder.files(name) and not (self.folder.path / name).is_dir():
             return f"`{name}` was not recorded."
-        read = {
-            "events": self.folder.events,
-            "radio_distances": self.folder.radio_distances,
-            "radio_links": self.folder.radio_links,
-        }[name]
         try:
-            return sound_table(self.folder, name, read(arena))
+            return self.folder.validated(name, arena)
         except BadInput as error:
             return f"{error}."
 
-    def packets(self, columns: Sequence[str]) -> "pl.DataFrame | str":
+    def packets(self, columns: Sequence[str]) -> pl.DataFrame | str:
         """These columns of the packets of the first arena that reached or missed a receiver, or why there are none."""
-        import polars as pl
-
         files = self.folder.files("packets")
         if not files:
             return "`packets` was not recorded."
         try:
             own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
-        except (OSError, *damage()) as error:
+        except (OSError, *corruption_errors()) as error:
             return (
                 f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."
             )
 
 
 def read_run(path: Path) -> RunData:
-    """Read a run folder; BadInput where there is none, or its `static.json` or summary cannot be read."""
+    """Read a run folder; BadInput if it is missing, or its `static.json` or summary cannot be read."""
     folder = RunFolder(path)
     static, summary = folder.static, folder.summary
     try:

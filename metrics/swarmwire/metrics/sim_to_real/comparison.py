@@ -5,22 +5,25 @@ all runs. A log that is one more of these runs lies farther out than all n of th
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio
-from swarmwire.metrics.real_log.measured_log import MeasuredLog
-from swarmwire.metrics.sim_to_real.emulated_runs import EmulatedRuns
-from swarmwire.metrics.sim_to_real.radio_values import RadioValue, radio_values, why_no_radio
-from swarmwire.metrics.statistics.block_bootstrap import mean_difference_interval
-from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
-from swarmwire.metrics.statistics.interval import UNKNOWN, Interval
+from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
+from swarmwire.metrics.network.latency import RELATIVE_ERROR
+from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, MeasuredLog
+from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
+from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1
+from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
+from swarmwire.metrics.text import number_text
 
+Radio = Mapping[str, Any]
 MIN_RUNS = 3  # that have a spread
+WHOLE = 0.95  # share of a run that must be compared for its totals to count
 SPREAD = (0.05, 0.5, 0.95)
 ONLY_IN_RANGE = "who was within range is not in the log, and not all were; pdr counts all on both sides"
 
@@ -61,6 +64,18 @@ class MetricRow:
         if math.isnan(self.ks):
             return -1.0
         return self.distance / self.reach if self.reach > 0.0 else 1.0 + self.ks
+
+
+@dataclass(frozen=True)
+class RadioValue:
+    """One number, of each run that has it and of the log; NaN: the log does not tell."""
+
+    name: str
+    unit: str
+    help: str
+    runs: tuple[float, ...]
+    log: float
+    grain: float  # how far apart equal networks may be by the way it is counted
 
 
 @dataclass(frozen=True)
@@ -148,17 +163,17 @@ def compare_sim_to_real(emulated: EmulatedRuns, log: MeasuredLog, metrics: Seque
     return SimToReal(len(emulated.runs), duration_s, tuple(rows), radio, lacks, not_compared, *lists)
 
 
+def spread(values: Iterable[float]) -> Spread:
+    """Over runs, by linear interpolation."""
+    known = np.array(list(values), np.float64)
+    return Spread(*np.quantile(known, SPREAD).tolist()) if len(known) else Spread(math.nan, math.nan, math.nan)
+
+
 def _of_range(emulated: EmulatedRuns, metrics: Sequence[Metric]) -> dict[str, str]:
     """Metrics that count receivers in range alone, which in a log are all: not the same where some were out of it."""
     out_of_range = any(run.radio and run.radio["fates"].get("out_of_range") for run in emulated.runs)
     counting = [metric.name for metric in metrics if isinstance(metric, LinkPacketDeliveryRatio)]
     return dict.fromkeys(counting, ONLY_IN_RANGE) if out_of_range else {}
-
-
-def spread(values: Iterable[float]) -> Spread:
-    """Over runs, by linear interpolation."""
-    known = np.array(list(values), np.float64)
-    return Spread(*np.quantile(known, SPREAD).tolist()) if len(known) else Spread(math.nan, math.nan, math.nan)
 
 
 def _values(metric: Metric, series: FloatArray, rate_hz: int, duration_s: float) -> FloatArray:
@@ -187,3 +202,89 @@ def _row(metric: Metric, runs: list[FloatArray], real: FloatArray) -> MetricRow:
 
 def _to_others(runs: list[FloatArray], place: int) -> float:
     return wasserstein_1(np.concatenate([*runs[:place], *runs[place + 1 :]]), runs[place])
+
+
+class _Whole(NamedTuple):
+    """A whole run."""
+
+    radio: Radio
+    duration_s: float
+    robots: int
+
+
+_Number = tuple[str, str, str, Callable[[_Whole], float | None]]  # name, unit, help, and the number itself
+
+
+def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> str | None:
+    """Why the totals of runs or log do not cover the compared time; None: they do."""
+    if duration_s < WHOLE * log.duration_s:
+        return f"the log's are of {number_text(log.duration_s)} s, of which {number_text(duration_s)} s are compared"
+    longest_s = max((run.duration_s for run in emulated.runs if run.radio), default=0.0)
+    if duration_s < WHOLE * longest_s:
+        return (
+            f"runs keep totals of all their {number_text(longest_s)} s, of which {number_text(duration_s)} s are "
+            f"compared; emulate {number_text(duration_s)} s for them"
+        )
+    return None
+
+
+def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> Iterator[RadioValue]:
+    """Traffic, delivery ratio and latencies over this time: to the agent, where logs have no others.
+
+    The delivery ratio is of all intended receivers, in range or not. Runs that are longer have what their counts of
+    each tick tell; none has anything if the log is longer.
+    """
+    fits = duration_s >= WHOLE * log.duration_s
+    wholes = [_within(run, emulated, duration_s) for run in emulated.runs if run.radio and fits]
+    real = _Whole(log.radio, log.duration_s, log.static.robots)
+    numbers = (*_TRAFFIC, *(_TO_AGENT if log.has_air else _ON_AIR))
+    for name, unit, text, of in numbers:
+        told = (of(whole) for whole in wholes)
+        of_log = of(real)
+        known = tuple(value for value in told if value is not None)
+        # One packet more or less at the ends; a bin of the latencies' histogram.
+        grain = 1.0 / log.duration_s if unit == "1/s" else 2.0 * RELATIVE_ERROR * max(known, default=0.0)
+        yield RadioValue(name, unit, text, known, math.nan if of_log is None else of_log, grain if unit else 0.0)
+
+
+def _within(run: EmulatedRun, emulated: EmulatedRuns, duration_s: float) -> _Whole:
+    """The totals of a run, if it is that long; else the sums of its first ticks' counts."""
+    radio = run.radio or {}
+    if duration_s >= WHOLE * run.duration_s:
+        return _Whole(radio, run.duration_s, emulated.robots)
+    ticks = math.floor(duration_s * emulated.rate_hz + 1e-6)
+    sums = {name: float(np.nansum(count[:ticks])) for name, count in run.counts.items()}
+    told: dict[str, Any] = {"sent": sums["sent"]} if "sent" in sums else {}
+    final = radio["intended"] - radio["fates"].get("in_flight", 0)
+    if sums and final == radio.get("in_range"):  # all that packets were meant for were within range
+        told |= {"intended": sums["in_range"], "fates": {"received": sums["received"]}}
+    return _Whole(told, ticks / emulated.rate_hz, emulated.robots)
+
+
+def _sent(of: _Whole) -> float | None:
+    if "sent" not in of.radio:
+        return None
+    return of.radio["sent"] / (of.duration_s * of.robots) if of.duration_s > 0.0 else None
+
+
+def _pdr(of: _Whole) -> float | None:
+    if "intended" not in of.radio:
+        return None
+    final = of.radio["intended"] - of.radio["fates"].get("in_flight", 0)
+    return of.radio["fates"]["received"] / final if final else None
+
+
+def _latency(kind: str, percent: str) -> Callable[[_Whole], float | None]:
+    return lambda of: of.radio[kind][percent] if kind in of.radio else None
+
+
+def _latencies(name: str, kind: str, text: str) -> tuple[_Number, ...]:
+    return tuple((f"{name} {percent}", "s", text, _latency(kind, percent)) for percent in ("p50", "p90", "p99"))
+
+
+_TRAFFIC: tuple[_Number, ...] = (
+    ("packets sent", "1/s", "by each robot", _sent),
+    ("total pdr", "", "received / intended receivers, of all packets", _pdr),
+)
+_ON_AIR = _latencies("latency", "latency_air_s", "from sending to hearing")
+_TO_AGENT = _latencies("latency to agent", "latency_agent_s", "from sending to the agent's next step")

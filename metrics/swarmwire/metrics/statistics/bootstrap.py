@@ -1,7 +1,7 @@
-"""The bootstrap: how a statistic of n values would change had other runs been drawn (Efron, Ann. Statist. 7, 1979).
+"""Intervals of confidence: the bootstrap (Efron, Ann. Statist. 7, 1979), of runs or of blocks of ticks, and Wilson's.
 
-Draws are keyed by n alone, so that a statistic of the same data is the same always; how often each value is drawn is
-worked out once per n, which makes the interval of a median of 50 values a matter of 0.1 ms.
+Draws are keyed by the sample size n alone: the same data always give the same interval. Counts of draws are cached per
+n, so that an interval of a median of 50 values takes about 0.1 ms.
 """
 
 import math
@@ -15,7 +15,7 @@ from scipy import special
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key, philox, purpose
-from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval
 
 Counts = NDArray[np.float32]
 
@@ -25,6 +25,8 @@ MIN_RESAMPLES = 400  # of very large samples, where intervals are narrow anyhow
 DRAWS = 2_000_000  # per statistic, at most, as long as there are more than the fewest
 KEY = derive_key("statistics")
 DRAW = purpose("bootstrap")
+BLOCKS = 10
+MIN_TICKS = 5  # of a block
 
 
 @lru_cache(maxsize=16)
@@ -80,3 +82,43 @@ def _middle(n: int, sample: int) -> tuple[IntArray, IntArray]:
     """Places, in rising order of all values, of the two (or one) in the middle of each resample."""
     below = np.cumsum(drawn(n, sample), axis=1)
     return np.argmax(below > (n - 1) // 2, axis=1), np.argmax(below > n // 2, axis=1)
+
+
+def block_means(series: FloatArray) -> FloatArray:
+    """The means of 10 blocks of equal lengths, of fewer if the series (n,) is short, (blocks,)."""
+    blocks = min(BLOCKS, len(series) // MIN_TICKS)
+    length = len(series) // blocks if blocks else 0
+    return series[len(series) - blocks * length :].reshape(blocks, length).mean(axis=1) if blocks else np.zeros(0)
+
+
+def mean_difference_interval(a: FloatArray, b: FloatArray, level: float = LEVEL) -> Interval:
+    """The interval of mean(b) - mean(a), of series of finite values (n,) and (m,) that were measured independently.
+
+    NaN if one of them is too short for two blocks.
+    """
+    blocks = block_means(a), block_means(b)
+    if min(map(len, blocks)) < 2:
+        return UNKNOWN
+    moved = resampled_means(blocks[1], sample=1) - resampled_means(blocks[0])
+    return percentile_interval(moved, min(map(len, blocks)), level)
+
+
+def binomial_interval(
+    successes: IntArray | FloatArray, trials: IntArray | FloatArray, confidence: float = 0.95
+) -> tuple[FloatArray, FloatArray]:
+    """Wilson's score interval of a probability, lower and upper ends (k,); NaN without a trial.
+
+    With p = successes / trials = s / n: (p + z^2 / 2n ± z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n). Trials are
+    taken to be independent. It stays within 0 and 1, also for shares of 0 and 1.
+
+    Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference, JASA 22 (1927) 209-212.
+    """
+    z2 = NormalDist().inv_cdf(0.5 + 0.5 * confidence) ** 2
+    n = np.where(np.asarray(trials) > 0, trials, np.nan).astype(np.float64)
+    share = np.asarray(successes) / n
+    half = np.sqrt(z2 * (share * (1.0 - share) / n + z2 / (4.0 * n * n)))
+    middle = share + z2 / (2.0 * n)
+    # Rounding would leave an end of a share of 0 or 1 just beside it.
+    low = np.where(share == 0.0, 0.0, (middle - half) / (1.0 + z2 / n))
+    high = np.where(share == 1.0, 1.0, (middle + half) / (1.0 + z2 / n))
+    return low, high

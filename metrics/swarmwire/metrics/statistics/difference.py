@@ -1,4 +1,4 @@
-"""How a second sample differs from a first: by how much, how surely, and how much that is.
+"""How a second sample differs from a first: the size of the difference, its interval, a test, and effect sizes.
 
 Where two seeds or more are in both, these are compared seed by seed: runs of one seed begin alike, so that their
 difference varies less than either. Else the samples are compared as wholes. Failed runs take no part.
@@ -13,31 +13,82 @@ from scipy import stats
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval, resampled_means, resampled_medians
-from swarmwire.metrics.statistics.effect_size import cliffs_delta, hedges_g
-from swarmwire.metrics.statistics.gehan import paired_p
-from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.log_rank import log_rank
-from swarmwire.metrics.statistics.resampled_times import resampled_quantiles
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
+from swarmwire.metrics.statistics.survival import kaplan_meier, log_rank, paired_p, resampled_quantiles, surely_less
 
 Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
 MIN_PAIRS = 2
 
 
+def cliffs_delta(first: Sample, second: Sample) -> float:
+    """P(first > second) - P(first < second) over all pairs, -1 to 1 (Cliff, Psychol. Bull. 114, 1993); NaN of none.
+
+    It is 2 A - 1 with A of Vargha and Delaney (2000). Of censored times, pairs whose order is unknown count as equal
+    (Gehan, Biometrika 52, 1965): so the value errs towards 0.
+    """
+    pairs = len(first) * len(second)
+    if not pairs:
+        return math.nan
+    return float(surely_less(first, second).sum() - surely_less(second, first).sum()) / pairs
+
+
+def hedges_g(first: FloatArray, second: FloatArray) -> float:
+    """(mean of first (n,) - mean of second (m,)) / pooled standard deviation, unbiased; NaN without variance.
+
+    The factor 1 - 3 / (4 (n + m) - 9) corrects the bias of small samples (Hedges, J. Educ. Stat. 6, 1981).
+    """
+    freedom = len(first) + len(second) - 2
+    if min(len(first), len(second)) < 1 or freedom < 1:
+        return math.nan
+    squares = float(np.sum((first - first.mean()) ** 2) + np.sum((second - second.mean()) ** 2))
+    if squares <= 0.0:
+        return math.nan
+    return float(first.mean() - second.mean()) / math.sqrt(squares / freedom) * (1.0 - 3.0 / (4.0 * freedom - 1.0))
+
+
+def kolmogorov_smirnov(a: FloatArray, b: FloatArray) -> float:
+    """The largest difference of the shares of (n,) and of (m,) finite values up to any value, 0 to 1; NaN of nothing.
+
+    Source: N. Smirnov, Table for estimating the goodness of fit of empirical distributions, Ann. Math. Statist. 19
+    (1948).
+    """
+    if not (len(a) and len(b)):
+        return float("nan")
+    _, below_a, below_b = _shares(a, b)
+    return float(np.abs(below_a - below_b).max())
+
+
+def wasserstein_1(a: FloatArray, b: FloatArray) -> float:
+    """How far the values of (n,) must move on average to be those of (m,), in their unit; NaN of nothing.
+
+    The area between the two distribution functions. Source: C. Villani, Optimal Transport (2009), chapter 6.
+    """
+    if not (len(a) and len(b)):
+        return float("nan")
+    value, below_a, below_b = _shares(a, b)
+    return float((np.abs(below_a - below_b)[:-1] * np.diff(value)).sum())
+
+
+def _shares(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """All values in rising order, and which shares of each sample are up to there."""
+    value = np.sort(np.concatenate([a, b]))
+    below = [np.searchsorted(np.sort(of), value, "right") / len(of) for of in (a, b)]
+    return value, below[0], below[1]
+
+
 @dataclass(frozen=True)
 class Difference:
-    """Second less first; NaN where it is not known."""
+    """Second minus first; NaN: unknown."""
 
     pairs: int  # seeds that were compared one by one; 0: the samples were compared as wholes
     median: float  # of numbers in pairs the median of the differences, else the difference of the medians
-    median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond what was watched
+    median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond the observed times
     mean: float  # of times: of min(time, horizon)
     mean_interval: Interval  # bootstrap
     horizon: float  # of times: up to when every run was watched; inf of numbers
     delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values of both
     g: float  # Hedges'; NaN of times
-    p: float  # two-sided, of the test; NaN: nothing tells the two apart
+    p: float  # two-sided, of the test; NaN: not defined
     test: Test
 
 

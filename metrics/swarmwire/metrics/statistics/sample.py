@@ -1,14 +1,16 @@
-"""A sample: what the runs of one design point gave, each with its seed."""
+"""Samples of the results of runs, right-censored where a run ended first, and intervals of confidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 
 Kind = Literal["number", "time"]  # a time may lie beyond its run's end: right-censored
+LEVEL = 0.95  # default confidence
 
 
 @dataclass(frozen=True)
@@ -17,7 +19,7 @@ class Sample:
 
     value: FloatArray  # (n,) finite; where not observed: the time up to which it had not happened
     observed: BoolArray  # (n,) False: right-censored, the true value lies beyond
-    seed: IntArray  # (n,) of each value's run: who has the same seed began alike
+    seed: IntArray  # (n,) of each value's run; runs of one seed start alike
     kind: Kind = "number"  # quantiles of times are Kaplan and Meier's, censored or not
     failed: int = 0  # runs that ended in an error
     undefined: int = 0  # runs that ended well with nothing to measure
@@ -31,14 +33,14 @@ class Sample:
         return len(self.value)
 
     def of_seeds(self, seed: IntArray) -> "Sample":
-        """The values (k,) of these seeds, in the order given; each must be there, once."""
+        """The values (k,) of these seeds, in this order; each occurs once."""
         order = np.argsort(self.seed)
         place = order[np.searchsorted(self.seed, seed, sorter=order)]
         return replace(self, value=self.value[place], observed=self.observed[place], seed=seed)
 
 
 def number_sample(value: FloatArray, seed: IntArray | None = None) -> Sample:
-    """A sample of numbers (n,), of which NaN are undefined; seeds are 0, 1, … unless told."""
+    """A sample of numbers (n,), of which NaN are undefined; default seeds are 0, 1 and so on."""
     there = np.isfinite(value)
     seeds = np.arange(len(value)) if seed is None else seed
     undefined = int(np.count_nonzero(~there))
@@ -46,5 +48,28 @@ def number_sample(value: FloatArray, seed: IntArray | None = None) -> Sample:
 
 
 def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = None) -> Sample:
-    """A sample of finite times (n,), right-censored where not observed; seeds are 0, 1, … unless told."""
+    """A sample of finite times (n,), right-censored where not observed; default seeds are 0, 1 and so on."""
     return Sample(value, observed, np.arange(len(value)) if seed is None else seed, "time")
+
+
+def by_seed(samples: Sequence[Sample]) -> FloatArray:
+    """The values of points and seeds, (points, seeds), seeds rising; NaN where a run has none.
+
+    Of a time that was censored it is the time up to which it had not happened: where all runs may take equally long,
+    means of these are restricted means.
+    """
+    seeds = np.unique(np.concatenate([sample.seed for sample in samples]))
+    table = np.full((len(samples), len(seeds)), np.nan)
+    for row, sample in zip(table, samples, strict=True):
+        row[np.searchsorted(seeds, sample.seed)] = sample.value
+    return table
+
+
+class Interval(NamedTuple):
+    """From low to high. NaN: unknown; infinite: open on that side, as for censored times."""
+
+    low: float
+    high: float
+
+
+UNKNOWN = Interval(float("nan"), float("nan"))  # of too few runs

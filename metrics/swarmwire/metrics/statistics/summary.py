@@ -1,4 +1,4 @@
-"""A sample in a few numbers."""
+"""A sample in a few numbers, and these numbers as text: three digits, and `> 100` beyond the time limit."""
 
 import math
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means, resampled_medians
-from swarmwire.metrics.statistics.interval import LEVEL, UNKNOWN, Interval
-from swarmwire.metrics.statistics.kaplan_meier import kaplan_meier
-from swarmwire.metrics.statistics.sample import Sample
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
+from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Of n values; NaN where there are none, and for a quartile of times that lies beyond what was watched."""
+    """Of n values; NaN without values, and for a quartile of times beyond the observed times."""
 
     n: int
     failed: int  # runs that ended in an error
@@ -25,7 +25,7 @@ class Summary:
     mean: float  # of times: of min(time, limit)
     q50_interval: Interval
     mean_interval: Interval
-    limit: float  # the largest value; of times, what a quartile that is NaN lies beyond
+    limit: float  # the largest value; a quartile of times that is NaN lies beyond it
 
 
 def summary(sample: Sample, level: float = LEVEL) -> Summary:
@@ -66,3 +66,39 @@ def _times(sample: Sample, level: float) -> Summary:
         curve.restricted_mean_interval(limit),
         limit,
     )
+
+
+def quantile_text(value: float, limit: float) -> str:
+    """A quantile of times; NaN lies beyond the limit.
+
+    >>> quantile_text(42.0, 100.0), quantile_text(float("nan"), 100.0)
+    ('42', '> 100')
+    """
+    return f"> {number_text(limit)}" if math.isnan(value) and not math.isnan(limit) else number_text(value)
+
+
+def quartiles_text(of: Summary) -> str:
+    """The median, and the quartiles around it.
+
+    `12 (8 to > 100)`, or a dash of no values.
+    """
+    q25, q50, q75 = (quantile_text(value, of.limit) for value in (of.q25, of.q50, of.q75))
+    return f"{q50} ({q25} to {q75})" if of.n else UNKNOWN_TEXT
+
+
+def interval_text(interval: Interval, sign: bool = False) -> str:
+    """An interval, which may be open.
+
+    >>> interval_text(Interval(1.0, 2.0)), interval_text(Interval(3.0, float("inf")))
+    ('1 to 2', '3 or more')
+    >>> interval_text(Interval(-float("inf"), 2.0), sign=True)
+    '+2 or less'
+    """
+    low, high = interval
+    if math.isnan(low) or math.isnan(high) or (math.isinf(low) and math.isinf(high)):
+        return UNKNOWN_TEXT
+    if math.isinf(high):
+        return f"{number_text(low, sign)} or more"
+    if math.isinf(low):
+        return f"{number_text(high, sign)} or less"
+    return f"{number_text(low, sign)} to {number_text(high, sign)}"

@@ -1,11 +1,13 @@
-"""How a recording looks when it is opened: the arena in the middle, explained on the left, measured on the right."""
+"""The layout of a recording: the arena in the middle, explanations at the left, plots at the right."""
 
 from typing import Any, Literal
 
+import rerun.blueprint as rrb
+
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.viewer.classes import LEGEND_LINES
-from swarmwire.metrics.viewer.selected import EYE, close_up_m
+from swarmwire.metrics.viewer.selection import EYE, close_up_m
+from swarmwire.metrics.viewer.style import LEGEND_LINES, shown
 
 TRAIL_S = 5.0
 _MARGIN = 1.03  # of the arena's half width, so that its walls are seen
@@ -15,16 +17,14 @@ _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high
 _MIN_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
 _PAGE_ARENA_SHARE = 0.64
-_ROWS = [4.2, 1.0]  # of what is looked at, and of the events below it
+_ROWS = [4.2, 1.0]  # of the views, and of the events below them
 
 
 def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
     """The blueprint for recordings of this run, with a close look at the selected robot.
 
-    `play_state` is "following" for what is still being recorded. Without a radio there is no plot of packets.
+    `play_state` is "following" for a live run. Without a radio there is no plot of packets.
     """
-    import rerun.blueprint as rrb
-
     wide = static.arena_size_m[0] / static.arena_size_m[1]
     arena_share = _ARENA_SHARE * min(max(wide, _MIN_ARENA_SHARE / _ARENA_SHARE), 1.0)
     side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
@@ -38,17 +38,13 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 
 
 def page_layout(static: Static, selected: str) -> Any:
-    """The blueprint for the page, which tells numbers and events itself: the arena, as large as there is room."""
-    import rerun.blueprint as rrb
-
+    """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible."""
     plots = _plots(static)[:2]
     beside = rrb.Vertical(_close_up(static, selected), *plots, row_shares=[1.15, *[1.0 for _ in plots]])
     return _whole(rrb.Horizontal(_arena(static), beside, column_shares=[_PAGE_ARENA_SHARE, 1.0 - _PAGE_ARENA_SHARE]))
 
 
 def _whole(views: Any, play_state: Literal["playing", "following", "paused"] = "following") -> Any:
-    import rerun.blueprint as rrb
-
     return rrb.Blueprint(
         views,
         rrb.TopPanel(state="collapsed"),
@@ -61,8 +57,6 @@ def _whole(views: Any, play_state: Literal["playing", "following", "paused"] = "
 
 
 def _arena(static: Static) -> Any:
-    import rerun.blueprint as rrb
-
     half_x, half_y = (_MARGIN * size / 2 for size in static.arena_size_m)
     return rrb.Spatial2DView(
         origin="/",
@@ -75,8 +69,6 @@ def _arena(static: Static) -> Any:
 
 
 def _close_up(static: Static, selected: str) -> Any:
-    import rerun.blueprint as rrb
-
     half_m = close_up_m(static, selected)
     return rrb.Spatial2DView(
         origin=f"/{EYE}",
@@ -88,8 +80,6 @@ def _close_up(static: Static, selected: str) -> Any:
 
 
 def _legend() -> Any:
-    import rerun.blueprint as rrb
-
     half = LEGEND_LINES / 2
     return rrb.Spatial2DView(
         origin="/legend",
@@ -100,21 +90,15 @@ def _legend() -> Any:
 
 
 def _about() -> Any:
-    import rerun.blueprint as rrb
-
     return rrb.TextDocumentView(origin="/about", name="About")
 
 
 def _events() -> Any:
-    import rerun.blueprint as rrb
-
     columns = rrb.TextLogColumns(timeline_columns=[_TIME], text_log_columns=["Body"])
     return rrb.TextLogView(origin="/events", name="Events", columns=columns)
 
 
 def _plots(static: Static) -> list[Any]:
-    import rerun.blueprint as rrb
-
     shares = _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08))
     distances, numbers = _plot("distances", "Distances in m"), _plot("numbers", "Counts")
     if static.range_m is None:
@@ -126,9 +110,7 @@ def _plots(static: Static) -> list[Any]:
 
 
 def _last(duration_s: float, rate_hz: int) -> Any:
-    """What was logged in the last seconds before the cursor, whichever timeline is shown."""
-    import rerun.blueprint as rrb
-
+    """The rows of the last seconds before the cursor, on either timeline."""
     since, now = -round(duration_s * NS_PER_S), rrb.TimeRangeBoundary.cursor_relative
     return rrb.VisibleTimeRanges(
         [
@@ -139,8 +121,6 @@ def _last(duration_s: float, rate_hz: int) -> Any:
 
 
 def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
-    import rerun.blueprint as rrb
-
     always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
     return rrb.TimeSeriesView(
         origin=f"/plots/{entity}",
@@ -149,3 +129,32 @@ def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> 
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
         plot_legend=rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom,
     )
+
+
+def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> str:
+    """Markdown: the run, and how to read the picture."""
+    size = " × ".join(f"{side:.3g}" for side in static.arena_size_m)
+    groups = ", ".join(f"{group.stop - group.start} × {group.body.name} ({group.name})" for group in static.groups)
+    lines = [
+        f"**{static.name}**, seed {static.seeds[arena]}",
+        "",
+        f"{groups} in {size} m, {static.rate_hz} ticks per second",
+        "",
+        " ".join([f"The ring marks {selected}.", *_drawn(static, selected)]),
+    ]
+    if static.range_m is not None:
+        often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"
+        lines += [
+            "",
+            f"The radio reaches {static.range_m:.3g} m: the large circle. Grey lines join robots in reach; "
+            f"coloured ones are packets that ended unheard{often}, in the colour of their fate in the plot of packets.",
+        ]
+    return "\n".join(shown(line) for line in lines)
+
+
+def _drawn(static: Static, selected: str) -> list[str]:
+    """Sentences on the sensors of the selected robot that the recording shows."""
+    index = static.robot_names.index(selected)
+    body = next(group.body for group in static.groups if group.start <= index < group.stop)
+    rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []
+    return [*rays, "Yellow bars: light."] if body.light else rays

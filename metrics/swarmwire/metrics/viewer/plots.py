@@ -1,24 +1,59 @@
-"""The plots of a recording: which numbers are drawn together, and what became of packets in the last second."""
+"""The plots of a recording: metrics by kind, and receivers per second by packet fate."""
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from math import isnan
 from typing import Any
 
 import numpy as np
+import rerun as rr
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
-from swarmwire.metrics.palette import Color
+from swarmwire.metrics.drawing.canvas import Color
+from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR
-from swarmwire.metrics.viewer.colors import FATES, MARK
-from swarmwire.metrics.viewer.plotted import Plotted
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.series import RerunSeries
+from swarmwire.metrics.viewer.style import FATES, MARK, SERIES
 
+_WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
+_OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
 _FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
 _PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
+
+
+class RerunSeries:
+    """Lines of a plot, by name: each from the first tick in which it has a value.
+
+    Lines that appear in the same tick are one entity, whose number of lines rerun takes from its first row:
+    `<plot>/since_<n>`, where n is how many lines were there before them.
+    """
+
+    def __init__(self, plot: str, colors: Mapping[str, Color] | None = None) -> None:
+        """Lines of the plot at this path, in these colours by name, or in those of the palette as they come."""
+        self._plot, self._colors = plot, colors or {}
+        self._names: dict[str, list[str]] = {}  # of each entity's lines
+        self._there: set[str] = set()
+
+    def add(self, rows: RerunRows, value: Mapping[str, float]) -> None:
+        """Add a tick's numbers by name, NaN for none; the same names in each tick."""
+        new = [name for name, number in value.items() if name not in self._there and not isnan(number)]
+        if new:
+            self._appear(rows.rec, new)
+        for entity, names in self._names.items():
+            rows.add(entity, rr.Scalars.columns, scalars=[value[name] for name in names])
+
+    def _appear(self, rec: Any, names: list[str]) -> None:
+        before = len(self._there)
+        entity = f"{self._plot}/since_{before}"
+        places = range(before, before + len(names))
+        colors = [self._colors.get(name, SERIES[at % len(SERIES)]) for at, name in zip(places, names, strict=True)]
+        widths = [_OWN_WIDTH if self._colors else _WIDEST / (1 + at) ** 0.5 for at in places]
+        rec.log(entity, rr.SeriesLines(names=names, colors=colors, widths=widths), static=True)
+        self._names[entity] = names
+        self._there.update(names)
 
 
 class RerunPlots:
@@ -43,15 +78,11 @@ class RerunPlots:
 
     def begin(self, rec: Any) -> None:
         """Log the look of the marks of events; that of a series comes with its first value."""
-        import rerun as rr
-
         look = rr.SeriesPoints(names="event", colors=MARK, markers="Diamond", marker_sizes=4.0)
         rec.log("plots/shares/event", look, static=True)
 
     def add(self, rows: RerunRows, latest: Mapping[str, FloatArray], truth: Truth) -> None:
         """Add the numbers of a tick."""
-        import rerun as rr
-
         numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)

@@ -1,4 +1,4 @@
-"""A recording of a run for rerun's viewer: the arena as it moves, and its metrics over time, in one file."""
+"""Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
 
 from pathlib import Path
 from typing import Any
@@ -6,24 +6,21 @@ from typing import Any
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
+from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
-from swarmwire.metrics.event_log import names
-from swarmwire.metrics.record.chunk_limit import ChunkLimit
-from swarmwire.metrics.viewer.about import about
-from swarmwire.metrics.viewer.arena import RerunArena
-from swarmwire.metrics.viewer.layout import layout
-from swarmwire.metrics.viewer.plots import RerunPlots
-from swarmwire.metrics.viewer.plotted import Measured
+from swarmwire.metrics.measure import Measured
+from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.run_folder.writer import ChunkLimit
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.selected import selected_robot
+from swarmwire.metrics.viewer.selection import selected_robot
 
-ROOM_BYTES = 1_000_000  # for what is written before the first tick
+ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
 # Of each block rerun keeps two or three kilobytes an entity until the file is closed, 37 kB for a swarm with a radio.
 SEND_BYTES = 1_000_000
 SEND_SHARE = 0.01  # of the time so far: where ticks are slow, a block every 2 s takes 70 MB an hour
 
 
-class RerunRecording:
+class RerunRecording(Observer):
     """Observer that writes one arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
     Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
@@ -39,10 +36,10 @@ class RerunRecording:
     ) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
-        What was seen is written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
+        Rows are written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
-        of the first group that has rays or photocells. A subclass that leads elsewhere has no path.
+        of the first group that has rays or photocells. A subclass with another target has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
         VIEW.need(self._what)
@@ -50,8 +47,12 @@ class RerunRecording:
         self._arena, self._selected = arena, selected
 
     def begin(self, static: Static) -> None:
-        """Open the file and log what does not change; BadInput if there is no such arena or selected robot."""
+        """Open the file and log the constants; BadInput if there is no such arena or selected robot."""
         import rerun as rr
+
+        from swarmwire.metrics.viewer.layout import about
+        from swarmwire.metrics.viewer.plots import RerunPlots
+        from swarmwire.metrics.viewer.scene import RerunArena
 
         if not 0 <= self._arena < static.arenas:
             raise BadInput(self._what, "arena", f"expected 0 to {static.arenas - 1}")
@@ -84,13 +85,13 @@ class RerunRecording:
         rows = self._rows
         rows.begin_tick(truth.tick, truth.time_ns)
         self._arena_view.add(rows, truth)
-        told = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
+        texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
             robots = ", ".join(names(event, self._static)[self._arena])
             if event.singly and not robots:
                 continue
-            told.append(f"{event.words}: {robots or 'no robot'}")
-        for text in told:
+            texts.append(f"{event.words}: {robots or 'no robot'}")
+        for text in texts:
             rows.add("events", rr.TextLog.columns, text=[text])
         self._plots.add(rows, self._metrics.latest, truth)
         self._ticks += 1
@@ -99,12 +100,14 @@ class RerunRecording:
             self._limit.restart()
 
     def _layout(self, static: Static, selected: str) -> Any:
-        """How it looks when it is opened."""
+        """The blueprint of the recording."""
+        from swarmwire.metrics.viewer.layout import layout
+
         return layout(static, selected)
 
     def _connect(self, layout: Any) -> None:
-        """Lead the stream to where it goes; OSError if there is no room: rerun would wait for ever for its writer."""
-        assert self._path is not None  # who has no path leads elsewhere
+        """Connect the stream to its target; OSError if the disk is full, since rerun would then wait for ever."""
+        assert self._path is not None  # subclasses without a path override this
         try:
             self._path.write_bytes(bytes(ROOM_BYTES))
         except OSError:
@@ -113,7 +116,7 @@ class RerunRecording:
         self._rec.save(self._path, default_blueprint=layout)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Close the file, whatever fails. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        """Close the file, also after a failure. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
         try:
             self._rows.send()
         finally:
@@ -122,3 +125,38 @@ class RerunRecording:
             finally:
                 self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
+
+
+class RerunLive(RerunRecording):
+    """Observer that draws one arena of a run in the viewer at a URL, which shows the newest tick.
+
+    For a separate process: a call blocks while the viewer does not read.
+    """
+
+    _send_bytes = 0  # people wait for it
+
+    def __init__(
+        self,
+        url: str,
+        metrics: Measured,
+        clock: Clock,
+        arena: int = 0,
+        selected: str | None = None,
+        *,
+        page: bool = False,
+    ) -> None:
+        """Draw in the viewer at "rerun+http://…/proxy", laid out for the `page` if that is it.
+
+        BadInput without the extra [view].
+        """
+        super().__init__(None, metrics, clock, arena, selected)
+        self._url, self._page = url, page
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        from swarmwire.metrics.viewer.layout import layout, page_layout
+
+        return page_layout(static, selected) if self._page else layout(static, selected, "following")
+
+    def _connect(self, layout: Any) -> None:
+        self._arena_view.links_every_ticks = 1  # the publisher of the ticks has thinned the links
+        self._rec.connect_grpc(self._url, default_blueprint=layout)

@@ -1,4 +1,4 @@
-"""What changes in a recording from tick to tick: kept, and sent to rerun for many ticks at once."""
+"""Rows of a recording that change from tick to tick, sent to rerun in blocks of many ticks."""
 
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -14,11 +14,11 @@ ROW_BYTES = 300  # that a row takes beside its fields, about
 
 
 class RerunRows:
-    """Rows of entities: what each shows from a tick on. A call to rerun for each would be most of what recording costs.
+    """Rows of entities, one per change. A call to rerun for each would be most of the cost of recording.
 
     Attributes:
-        rec: the recording that the rows go to; what does not change is logged there at once.
-        kept_bytes: about how much waits to be sent.
+        rec: the recording of the rows; constants are logged there directly.
+        kept_bytes: the approximate size of the rows that wait.
     """
 
     def __init__(self, rec: Any) -> None:
@@ -28,11 +28,11 @@ class RerunRows:
         self._kept: dict[tuple[Any, ...], list[tuple[int, int, tuple[Values, ...]]]] = {}
 
     def begin_tick(self, tick: int, time_ns: int) -> None:
-        """What is added from now on belongs to this tick."""
+        """Set the tick of the following rows."""
         self._tick, self._time_ns = tick, time_ns
 
     def add(self, entity: str, columns: Callable[..., Any], **fields: Values) -> None:
-        """Keep what an entity shows in this tick: n items, as fields (n, …) that are not written to any more.
+        """Keep a row of an entity for this tick: n items, as fields (n, …) that the caller no longer changes.
 
         `columns` makes rerun's columns of the items of many ticks, one after another: an archetype's, of its fields, or
         a function that works them out for all ticks together. Fields of the entity that it does not make stay.
@@ -42,7 +42,7 @@ class RerunRows:
         self.kept_bytes += ROW_BYTES + sum(map(_bytes, values))
 
     def send(self) -> None:
-        """Send what was kept. An entity that fails takes no other with it: the first error is raised at the end."""
+        """Send the rows. If an entity fails, the others are still sent, and the first error is raised at the end."""
         kept, self._kept, self.kept_bytes = self._kept, {}, 0
         index: dict[tuple[int, ...], list[Any]] = {}
         failed: list[Exception] = []
@@ -55,7 +55,7 @@ class RerunRows:
             try:
                 fields = {name: _joined(of_ticks) for name, of_ticks in by_name}
                 self.rec.send_columns(entity, index[ticks], columns(**fields).partition(lengths))
-            except Exception as error:  # noqa: BLE001 - whatever it is, the others' rows are not to be lost
+            except Exception as error:  # noqa: BLE001 - any error: the others' rows are still sent
                 failed.append(error)
         if failed:
             raise failed[0]
@@ -69,7 +69,7 @@ def _index(ticks: tuple[int, ...], times_ns: tuple[int, ...]) -> list[Any]:
 
 
 def _bytes(values: Values) -> int:
-    """What a field takes: an array its items, a list each of its own."""
+    """The size of a field in bytes."""
     if isinstance(values, np.ndarray):
         return values.nbytes
     return sum(item.nbytes if isinstance(item, np.ndarray) else getsizeof(item) for item in values)

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.robot_network import ESTOP, STATUS, ask_all, endpoints
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from tests.support.agent.on_robot.installed import DRIVING, Command, deeds, install, robot_flags
 from tests.support.agent.on_robot.scripted import PLAYERS
-from tests.support.waiting import until
+from tests.support.clocks import until
 
 PATIENT = ("--watchdog-s", "5")  # the machine that tests run on may be busy
 

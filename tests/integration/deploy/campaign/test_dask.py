@@ -1,4 +1,4 @@
-"""Campaigns on a dask cluster: the rows are those of this machine, whoever comes, goes or dies meanwhile."""
+"""Campaigns on a dask cluster: the rows are those of this machine, whichever workers come, go or die meanwhile."""
 
 import os
 import re
@@ -11,17 +11,29 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import dask_executor, execution, sweeping
-from swarmwire.deploy.campaign.campaign import read_campaign
-from swarmwire.deploy.campaign.campaign_folder import CampaignFolder
-from swarmwire.deploy.campaign.cluster_failed import ClusterFailed
-from swarmwire.deploy.campaign.dask_executor import DaskExecutor
-from swarmwire.deploy.terminal import sweep_progress
-from tests.support.deploy.campaign.cluster import children, cluster
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
-from tests.support.deploy.commands import called
+from swarmwire.deploy.campaign import dask, schedule
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.deploy.campaign.dask import ClusterFailed, DaskExecutor
+from swarmwire.deploy.campaign.schedule import execute, tasks_of
+from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.terminal import sweep as terminal_sweep
+from swarmwire.metrics.campaign.spec import read_campaign
+from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
+from tests.support.deploy.runs import called
 
 ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
+LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]
+ODD = """
+from swarmwire.deploy.record import provenance
+found = provenance.versions()
+provenance.versions = lambda: {**found, 'numpy': '1.0'}
+"""
+HANGING = """
+from swarmwire.agent import Agent
+class Hanging(Agent):
+    def step(self, robot):
+        while True: pass
+"""
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +48,14 @@ def reference(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def two_threads(tmp_path_factory):
-    """A worker with two threads."""
-    with cluster(tmp_path_factory.mktemp("cluster"), 2) as found:
+def one_worker(tmp_path_factory):
+    """A cluster that gives a task of which a worker dies to no other."""
+    settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+    with cluster(tmp_path_factory.mktemp("cluster"), 1, **settings) as found:
         yield found
 
 
-class Watcher:
+class Observer:
     """Looks on, and does something when the first task is done."""
 
     def __init__(self, act=lambda: None):
@@ -69,41 +82,45 @@ def same(folder, reference):
     assert series_in(folder).equals(series_in(reference / "c"), null_equal=True)
 
 
-def test_a_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, reference, two_threads):
-    done = sweep(reference / "two.toml", out=tmp_path / "c", on=two_threads.on, **ASKED)
+def test_a_cluster_gives_the_rows_and_series_of_one_machine_and_is_left_as_it_was(tmp_path, reference, one_worker):
+    done = sweep(reference / "two.toml", out=tmp_path / "c", executor=one_worker.name, **ASKED)
     assert done.is_over
     same(tmp_path / "c", reference)
     (worker,) = workers_of(tmp_path / "c")
     assert worker.startswith("tcp://127.0.0.1:")
-    assert len(children(two_threads.workers[0])) == 2
+    local = Path(one_worker.nannies[0].cwd())
+    assert not list(local.rglob("two.toml")) + list(local.rglob("stumbling.py"))
 
 
-def test_an_agent_that_kills_its_process_ends_no_worker(tmp_path, reference, two_threads):
+def test_an_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, one_worker):
     kill = ['robots.pair.params.how="kill"']
-    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, batch=1, overrides=kill)
-    assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died, signal 9"]
-    assert two_threads.workers[0].is_running()
+    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, batch=2, overrides=kill)
+    assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died"]
+    assert one_worker.nannies[0].is_running()
 
 
-def test_ctrl_c_ends_what_is_under_way_on_the_workers(tmp_path, reference, two_threads, monkeypatch):
-    long, busy = ["duration_s=100000", "robots.pair.params.share=0.0"], list[psutil.Process]()
-    monkeypatch.setattr(sweeping, "execute", interrupted_once_at_work(two_threads.workers[0], busy))
-    done = sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, overrides=long)
+def test_ctrl_c_ends_what_is_under_way_on_the_workers(tmp_path, reference, one_worker, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(sweeping, "execute", interrupted_once_at_work(one_worker.nannies[0]))
+        done = sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
     assert (done.done, done.is_over) == (0, False)
-    assert len(busy) == 1
-    assert psutil.wait_procs(busy, timeout=30)[1] == []
+    # The worker does one task at a time: another campaign ends only if the run of 100,000 s is no more.
+    assert sweep(reference / "two.toml", out=tmp_path / "next", executor=one_worker.name, **ASKED).is_over
+    same(tmp_path / "next", reference)
 
 
-def interrupted_once_at_work(worker, busy):
-    """`execute`, with a Ctrl-C as soon as a process of the worker's has worked for a while."""
-    execute, before = execution.execute, children(worker)
+def interrupted_once_at_work(nanny):
+    """`execute`, with a Ctrl-C as soon as the nanny's worker has worked for a while."""
+
+    def worked_s():
+        return sum(child.cpu_times().user for child in children(nanny))
 
     def execute_interrupted(tasks, executor, keep, stopped):
+        before, sent = worked_s(), []
+
         def asked():
-            found = [child for child in children(worker) if child not in before]
-            if found and found[0].cpu_times().user > 0.5 and not busy:
-                busy.extend(found)
-                os.kill(os.getpid(), signal.SIGINT)
+            if worked_s() > before + 0.5 and not sent:
+                sent.append(os.kill(os.getpid(), signal.SIGINT))
             return stopped()
 
         return execute(tasks, executor, keep, asked)
@@ -117,31 +134,46 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
 
         def kill_it():
             there.add_worker()  # which joins a campaign that has begun
-            gone.extend(children(there.workers[0]))
-            there.workers[0].kill()
+            gone.extend(children(there.nannies[0]))
+            there.nannies[0].kill()
 
-        watcher = Watcher(kill_it)
-        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "batch": 1})
+        done = sweep(
+            reference / "two.toml", out=tmp_path / "c", executor=there.name, observer=Observer(kill_it),
+            **{**ASKED, "batch": 1},
+        )  # fmt: skip
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
         assert psutil.wait_procs(gone, timeout=30)[1] == []
     same(tmp_path / "c", reference)
 
 
-@pytest.mark.slow  # dask waits five seconds at least
-def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference, monkeypatch):
-    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL", "5s")  # in place of five minutes
-    with cluster(tmp_path, 1) as there:
+@pytest.mark.slow  # dask waits fifteen seconds at least
+def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference):
+    with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="15s") as there:  # in place of five minutes
 
         def freeze_it():
             there.add_worker()
-            there.workers[0].suspend()
+            for child in children(there.nannies[0]):
+                child.suspend()
 
-        watcher = Watcher(freeze_it)
-        done = sweep(reference / "two.toml", out=tmp_path / "c", on=there.on, watcher=watcher, **{**ASKED, "batch": 1})
+        done = sweep(
+            reference / "two.toml", out=tmp_path / "c", executor=there.name, observer=Observer(freeze_it),
+            **{**ASKED, "batch": 1},
+        )  # fmt: skip
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
     same(tmp_path / "c", reference)
+
+
+def test_a_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, reference):
+    (tmp_path / "short.py").write_text("from swarmwire.deploy.campaign import dask\ndask.MAX_SILENCE_S = 3.0\n")
+    (reference / "hanging.py").write_text(HANGING)
+    with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as there:
+        there.add_worker(preload=tmp_path / "short.py")
+        agent = ['robots.pair.agent="hanging.py:Hanging"']
+        done = sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=there.name, overrides=agent)
+    assert (done.is_over, done.failed) == (True, 1)
+    assert rows_in(tmp_path / "c")[0]["error"] == "the worker died"
 
 
 def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
@@ -149,14 +181,14 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
 ):
     folder = tmp_path / "c"
     with cluster(tmp_path, 1) as there:
-        monkeypatch.setattr(sweep_progress, "sweep_progress", lambda _: Watcher(there.scheduler.kill))
+        monkeypatch.setattr(terminal_sweep, "SweepProgress", lambda _: Observer(there.scheduler.kill))
         vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
         code, _, errors = called(
             monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,
-            "--on", there.on,
+            "--executor", there.name,
         )  # fmt: skip
     assert (code, caplog.text) == (1, "")
-    told = f"error: {there.on}: .*--resume {folder}.*--on local"
+    told = f"error: {there.name}: .*--resume {folder}.*--executor local"
     assert [line for line in errors.splitlines() if "waiting" not in line] == [errors.splitlines()[-1]]
     assert re.fullmatch(told, errors.splitlines()[-1])
     assert 1 <= len(rows_in(folder)) < 8
@@ -166,51 +198,64 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
     same(folder, reference)
 
 
-def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, two_threads, monkeypatch):
-    monkeypatch.setattr(dask_executor, "POLL_S", 0.1)
-    monkeypatch.setattr(dask_executor, "MUTE_LOOKS", 3)
-    long, freeze = ["duration_s=100000", "robots.pair.params.share=0.0"], two_threads.scheduler.suspend
-    monkeypatch.setattr(sweeping, "execute", first_calls(freeze))
+def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one_worker, monkeypatch):
+    monkeypatch.setattr(dask, "POLL_S", 0.1)
+    monkeypatch.setattr(dask, "CLOSE_S", 0.5)
+    monkeypatch.setattr(dask, "PREPARE_S", 1.0)
+    monkeypatch.setattr(dask, "MUTE_POLLS", 3)
+    frozen = one_worker.scheduler.suspend
+    monkeypatch.setattr(sweeping, "execute", lambda *given: [frozen(), schedule.execute(*given)][1])
     try:
         with pytest.raises(ClusterFailed, match="--resume"):
-            sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", on=two_threads.on, workers=1, overrides=long)
+            sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
     finally:
-        two_threads.scheduler.resume()
-
-
-def first_calls(act):
-    """`execute`, with an act before it."""
-
-    def execute_after(*given):
-        act()
-        return execution.execute(*given)
-
-    return execute_after
+        one_worker.scheduler.resume()
 
 
 def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path, reference):
-    odd, told = tmp_path / "odd.py", []
-    odd.write_text(
-        "from swarmwire.deploy.record import machine\n"
-        "found = machine.versions()\nmachine.versions = lambda: {**found, 'numpy': '1.0'}\n"
-    )
-    with cluster(tmp_path) as there:
-        with pytest.raises(ClusterFailed, match=rf"^{there.on}: .*0\.1 s"):
-            DaskExecutor(there.on, None, Path(), say=told.append, patience_s=0.1)
+    (tmp_path / "odd.py").write_text(ODD)
+    told = []
+    with cluster(tmp_path, 0) as there:
+        with pytest.raises(ClusterFailed, match=rf"^{there.name}: .*0\.1 s"):
+            DaskExecutor(there.name, None, Path(), say=told.append, no_worker_s=0.1)
         assert len(told) == 1
-        assert told[0].startswith(f"{there.on}: ")
-        there.add_worker(preload=odd)
+        assert told[0].startswith(f"{there.name}: ")
+        there.add_worker(preload=tmp_path / "odd.py")
         with pytest.raises(BadInput, match=r"numpy.* 1\.0") as refused:
-            sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", on=there.on)
-        assert refused.value.where == "--on"
+            sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=there.name)
+        assert refused.value.where == "--executor"
         assert not (tmp_path / "c").exists()
+
+
+def test_a_worker_of_another_version_that_comes_later_is_left_out(tmp_path, reference):
+    (tmp_path / "odd.py").write_text(ODD)
+    folder, told, rows = CampaignFolder(reference / "c", read_campaign(reference / "c")), [], []
+    tasks = tasks_of(folder.campaign, folder, (), 1, 1)
+    with cluster(tmp_path, 1) as there:
+        executor = DaskExecutor(there.name, None, folder.scenario.parent, say=told.append)
+
+        def keep(_, result):
+            rows.extend(result.rows)
+            if len(rows) == 1:
+                there.add_worker(preload=tmp_path / "odd.py")
+
+        try:
+            assert execute(tasks[:1], executor, keep)
+            while not any("left out" in line for line in told):
+                executor.finished(0.1)
+            assert execute(tasks[1:], executor, keep)
+        finally:
+            executor.close()
+    assert "numpy is 1.0" in told[-1]
+    assert len(rows) == 8
+    assert len({row["machine_worker"] for row in rows}) == 1
 
 
 def test_a_scheduler_out_of_reach_is_one_line(caplog):
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
-        on = f"dask://127.0.0.1:{nobody.getsockname()[1]}"
-        with pytest.raises(ClusterFailed, match=f"^{on}: ") as failed:
-            DaskExecutor(on, None, Path(), connect_s=0.5)
+        name = f"dask://127.0.0.1:{nobody.getsockname()[1]}"
+        with pytest.raises(ClusterFailed, match=f"^{name}: ") as failed:
+            DaskExecutor(name, None, Path(), connect_s=0.5)
     assert "\n" not in str(failed.value)
     assert caplog.text == ""

@@ -9,15 +9,14 @@ import pytest
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import sweeping, worker_process
-from swarmwire.deploy.campaign.execution import execute
-from swarmwire.deploy.campaign.local_executor import LocalExecutor
-from swarmwire.deploy.campaign.silence import Silence
-from swarmwire.deploy.campaign.task import Task
-from tests.support.clocks import FakeClock
-from tests.support.deploy.campaign.small import InThisProcess, rows_in, scenario_in, series_in
-from tests.support.deploy.commands import ROOT
-from tests.support.waiting import until
+from swarmwire.deploy.campaign import local
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.deploy.campaign.local import LocalExecutor, Silence
+from swarmwire.deploy.campaign.schedule import execute
+from swarmwire.deploy.campaign.worker import Task
+from tests.support.clocks import FakeClock, until
+from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.runs import ROOT
 
 VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble
@@ -81,14 +80,15 @@ def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
         executor.close()
 
 
-ONCE = """
+FROZEN = """
 import os, signal
 from pathlib import Path
 from swarmwire.agent import Agent
-class FrozenOnce(Agent):
+class Frozen(Agent):
+    always: bool = False
     def step(self, robot):
         before = Path(__file__).with_name("before")
-        if not before.exists():
+        if self.always or not before.exists():
             before.touch()
             os.kill(os.getpid(), signal.SIGSTOP)
 """
@@ -103,25 +103,21 @@ class WhileFrozen(FakeClock):
         return self.time_ns
 
 
-def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch):
-    monkeypatch.setattr(worker_process, "Silence", lambda: Silence(WhileFrozen(), most_s=2.0))
-    (scenario.parent / "frozen.py").write_text(ONCE)
-    executor, rows, lost = LocalExecutor(1), [], []
-    finished = executor.finished
-    monkeypatch.setattr(executor, "finished", lambda timeout_s: _noted(finished(timeout_s), lost))
-    task = Task(str(scenario), ('robots.pair.agent="frozen.py:FrozenOnce"',), 0, (0,), (1,))
+@pytest.mark.parametrize(("always", "ended"), [(False, "duration"), (True, "failed")])
+def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch, always, ended):
+    monkeypatch.setattr(local, "Silence", lambda: Silence(WhileFrozen(), most_s=2.0))
+    (scenario.parent / "frozen.py").write_text(FROZEN)
+    executor, rows = LocalExecutor(1), []
+    agent = ('robots.pair.agent="frozen.py:Frozen"', f"robots.pair.params.always={str(always).lower()}")
     try:
-        assert execute([task], executor, lambda _, result: rows.extend(result.rows))
+        assert execute([Task(str(scenario), agent, 0, (0,), (1,))], executor, lambda _, done: rows.extend(done.rows))
     finally:
         executor.close()
-    assert [row["ended"] for row in rows] == ["duration"]
-    assert [bool(done.lost) for done in lost] == [True, False]
-    assert "2 s" in lost[0].lost
-
-
-def _noted(found, into):
-    into.extend(found)
-    return found
+    assert [row["ended"] for row in rows] == [ended]
+    if always:
+        assert rows[0]["error"] == "the worker stood still for 2 s"
+    else:
+        assert rows[0]["machine_worker"] == "local-1"
 
 
 KILLED = """
@@ -132,7 +128,7 @@ class Watcher:
     def see(self, result): print("task", flush=True)
     def end(self): pass
 vary = {sys.argv[3]: [float(value) for value in sys.argv[4:]]}
-sweep(sys.argv[1], seeds=4, vary=vary, batch=1, workers=1, out=sys.argv[2], watcher=Watcher())
+sweep(sys.argv[1], seeds=4, vary=vary, batch=1, workers=1, out=sys.argv[2], observer=Watcher())
 """
 
 

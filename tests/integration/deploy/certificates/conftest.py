@@ -1,5 +1,5 @@
 """Fixtures of these tests."""
 
-from tests.support.deploy.certificates.fixtures import clock, folder
+from tests.support.deploy.certificates import clock, folder
 
 __all__ = ["clock", "folder"]

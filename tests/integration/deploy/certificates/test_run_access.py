@@ -22,11 +22,11 @@ from swarmwire.comms.wire.sessions import (
     open_runner,
     open_world,
 )
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.folder_access import network_in
-from swarmwire.deploy.certificates.wanted import wanted
-from tests.support.deploy.certificates.peers import WITHIN_S, at_once, wait_for_listeners
-from tests.support.waiting import until
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.member import network_in
+from swarmwire.deploy.certificates.register import certificate_request
+from tests.support.clocks import until
+from tests.support.deploy.certificates import WITHIN_S, at_once, wait_for_listeners
 
 KEYS, SEEN = Keys("run1"), ObserverKeys("run1")
 ACCESS = RunAccess(("a", "b", "gone"), ("wall",), ("alice",), ("gate", "gate2"), ("gone",))
@@ -40,7 +40,7 @@ BLOCK = zenoh.CongestionControl.BLOCK
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("lab") / "ca"
     begin_authority(folder, WallClock())
-    issue(folder, [wanted(name, ("127.0.0.1",)) for name in NAMES], 1, WallClock())
+    issue(folder, [certificate_request(name, ("127.0.0.1",)) for name in NAMES], 1, WallClock())
     return folder
 
 
@@ -49,7 +49,7 @@ def strangers(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Another CA, that has issued a certificate to the same name."""
     folder = tmp_path_factory.mktemp("other") / "ca"
     begin_authority(folder, WallClock())
-    issue(folder, [wanted("a", ("127.0.0.1",))], 1, WallClock())
+    issue(folder, [certificate_request("a", ("127.0.0.1",))], 1, WallClock())
     return folder
 
 

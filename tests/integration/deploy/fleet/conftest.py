@@ -1,5 +1,5 @@
 """Fixtures of these tests."""
 
-from tests.support.deploy.fleet.fixtures import client_key, fleet, lab_certificates, packages, robots, servers
+from tests.support.deploy.fleet.fleets import client_key, fleet, lab_certificates, packages, robots, servers
 
 __all__ = ["client_key", "fleet", "lab_certificates", "packages", "robots", "servers"]

@@ -1,13 +1,14 @@
-"""Deployments to real SSH servers: what robots have afterwards, and what they have if something fails in the middle."""
+"""Deployments, also through OpenSSH."""
 
+import getpass
 import re
 import stat
 
 import pytest
 
 from swarmwire.deploy.fleet import deploy as deploy_module
-from tests.support.deploy.fleet.fake_host import new_key, write_key
-from tests.support.deploy.fleet.small_fleet import AGENT
+from tests.support.deploy.fleet.fleets import AGENT
+from tests.support.deploy.fleet.hosts import new_key, openssh, write_key
 
 STUMBLES = AGENT + "# stumbles on robots\n"
 SLOW_TO_WRITE = "ulimit -f 100"  # blocks of half a kilobyte that a file may have: a disk that fills up on the way
@@ -88,7 +89,7 @@ def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
     code, lines = robots("deploy", "--group", "rad")
     assert (code, len(lines)) == (2, 1)
     assert lines[0].startswith("error: --group: ")
-    assert "red, blue" in lines[0]
+    assert all(name in lines[0] for name in ("red", "blue", "rad"))
 
 
 def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
@@ -282,3 +283,45 @@ def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots
     assert code == 1
     assert "systemd" in lines[0]
     assert host.environments() == []
+
+
+@pytest.fixture
+def host(fleet, tmp_path, client_key):
+    """A robot whose host OpenSSH serves."""
+    with openssh(tmp_path / "home-flock-0", client_key) as host:
+        yield fleet.add("flock-0", host, user=getpass.getuser())
+
+
+def test_a_fleet_of_openssh_is_deployed_started_told_gone_back_from_and_stopped(fleet, robots, host, monkeypatch):
+    assert robots("deploy")[1] == [f"flock-0 deployed {host.current('flock-0')} and 0.1 MB of packages"]
+    first = host.current("flock-0")
+    assert robots("deploy") == (0, [f"flock-0 up to date: {first}"])
+    assert robots("start") == (0, [f"flock-0 started: {first}"])
+    fleet.agent((fleet.folder / "still.py").read_text() + "# another\n")
+    _, lines = robots("deploy", "--restart")
+    second = host.current("flock-0")
+    assert lines == [f"flock-0 deployed {second}, restarted"]
+    assert f" active (running) {second} " in robots("status")[1][1]
+    assert robots("rollback") == (0, [f"flock-0 back to {first}, restarted"])
+    assert robots("logs")[1] == ["flock-0 it runs"] * 3
+    assert robots("stop") == (0, ["flock-0 stopped"])
+    assert host.parts() == []
+
+
+def test_a_key_of_openssh_that_changed_is_refused(fleet, robots, host):
+    other = fleet.servers.add(host.home.parent / "home-other")
+    host.host_key = other.host_key
+    fleet.know(host)
+    code, lines = robots("deploy")
+    assert code == 1
+    assert "another machine" in lines[0]
+    assert not host.root.exists()
+
+
+def test_an_emergency_stop_goes_through_openssh(robots, host, monkeypatch):
+    from swarmwire.deploy.fleet import units
+
+    monkeypatch.setattr(units, "NETWORK_S", 0.2)
+    robots("deploy")
+    robots("start")
+    assert robots("estop") == (0, ["flock-0 stopped, confirmed by SSH (over the network: no answer)"])

@@ -1,5 +1,5 @@
 """Fixtures of these tests."""
 
-from tests.support.deploy.gateways.fixtures import scenario, scripted
+from tests.support.deploy.gateways import scenario, scripted
 
 __all__ = ["scenario", "scripted"]

@@ -1,6 +1,9 @@
-"""Runs with robots behind a gateway: what programs tell them is done, recorded, told in the summary and repeated."""
+"""Runs with gateways."""
 
 import json
+import signal
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -8,12 +11,70 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy import Recording, Simulation, repeat, run
-from tests.support.deploy.commands import called
-from tests.support.world.gateways.scripted import ScriptedGateway
+from swarmwire.deploy import Recording, Result, Simulation, repeat, run
+from swarmwire.deploy.gateways import serving
+from swarmwire.world.scenario_file import load_scenario
+from tests.support.deploy.gateways import driven as driven_run
+from tests.support.deploy.runs import ROOT, called
+from tests.support.world.gateways import ScriptedGateway
 
 FAST = 100.0  # times real time
 BARE = Recording(tables=False, rrd=False)
+MIXED = """
+format = 1
+name = "one flock, two ways"
+duration_s = 16.0
+
+[arena]
+size_m = [3.0, 3.0]
+
+[robots.here]
+body = "epuck2"
+count = 3
+place = { how = "disc", radius_m = 0.5 }
+agent = "swarmwire.agent.behaviours:Flocking"
+params = { speed_mps = 0.05 }
+
+[robots.outside]
+body = "epuck2"
+count = 3
+place = { how = "disc", radius_m = 0.5 }
+agent = "swarmwire.agent.behaviours:Flocking"
+params = { speed_mps = 0.05 }
+
+[radio]
+range_m = 2.0
+measures = { range = {}, bearing = {} }
+"""
+FOLDER = ROOT / "scenarios" / "robots"
+NOT_SCENARIOS = {"turtlebot"}
+BODIES = ("epuck2", "turtlebot")
+# As GCtronic's page on the e-puck2 says it: 21 bytes go out, a header and 104 bytes come back.
+PROGRAM = """
+import socket, struct, sys
+
+host, port = sys.argv[1].split(":")
+TURN_LEFT = struct.pack("<BBB", 0x80, 0x02, 0x00) + struct.pack("<hh", -300, 300) + bytes(14)
+
+def packet(link):
+    data = b""
+    while len(data) < 105:
+        got = link.recv(105 - len(data))
+        if not got:
+            sys.exit("the robot hung up")
+        data += got
+    return data
+
+with socket.create_connection((host, int(port)), timeout=20) as link:
+    right = 0
+    while right < 90:
+        link.sendall(TURN_LEFT)
+        answer = packet(link)
+        left, right = struct.unpack_from("<hh", answer, 1 + 79)
+    print(answer[0], left, right)
+"""
+SCENARIO = ROOT / "scenarios" / "robots" / "flocking-epuck2.toml"
+PROGRAMS = Path(sys.executable).parent
 
 
 def driven(scenario: Path, scripted: list[ScriptedGateway], out: Path | None) -> Simulation:
@@ -42,7 +103,7 @@ def test_robots_do_what_programs_tell_them_and_others_what_their_agents_decide(s
 def test_the_summary_says_that_it_was_real_time_and_which_gateways_there_were(scenario, scripted, tmp_path) -> None:
     result = driven(scenario, scripted, tmp_path / "run").result
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert (result.mode, result.gateways) == ("realtime", {"other": "scripted"})
+    assert (result.mode, result.facts.gateways) == ("realtime", {"other": "scripted"})
     assert (summary["mode"], summary["gateways"], summary["realtime"]["factor"]) == (
         "realtime",
         {"other": "scripted"},
@@ -156,3 +217,153 @@ def test_with_a_subtick_it_is_repeated_bit_for_bit_too(scenario, scripted, tmp_p
     repetition = repeat(folder)
     assert repetition.same
     assert repetition.result.radio == result.radio
+
+
+def test_they_find_one_heading_together(tmp_path) -> None:
+    scenario = tmp_path / "mixed.toml"
+    scenario.write_text(MIXED)
+    result = driven_run(scenario, {"outside": "epuck2"}, tmp_path / "run", pace=4.0)
+    assert result.facts.gateways == {"outside": "epuck2"}
+    order = result.metrics["order"]
+    assert (order.min or 0.0) < 0.6
+    assert (order.final or 0.0) > 0.9
+    assert result.radio is not None
+    assert result.radio.sent > 6 * 16 * 10 * 0.8
+
+
+def shipped(behaviour: str, body: str) -> Result:
+    return run(FOLDER / f"{behaviour}-{body}.toml")
+
+
+def final(result: Result, metric: str) -> float:
+    value = result.metrics[metric].final
+    assert value is not None, metric
+    return value
+
+
+def test_all_of_them_are_tried_here_and_are_small_enough_for_a_desk() -> None:
+    names = {path.stem for path in FOLDER.glob("*.toml")} - NOT_SCENARIOS
+    assert names == {f"{behaviour}-{body}" for behaviour in ("avoidance", "flocking", "pso") for body in BODIES}
+    for name in names:
+        scenario = load_scenario(FOLDER / f"{name}.toml")
+        assert 6 <= sum(table.count for table in scenario.robots.values()) <= 10
+        assert scenario.arena.size_m == (3.0, 3.0)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_wanderers_touch_nothing(body) -> None:
+    result = shipped("avoidance", body)
+    assert (final(result, "collisions"), final(result, "wall_contacts")) == (0, 0)
+    assert (result.metrics["order"].mean or 0.0) < 0.6
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_flock_finds_one_heading(body) -> None:
+    result = shipped("flocking", body)
+    assert (result.metrics["order"].min or 0.0) < 0.8
+    assert final(result, "order") > 0.9
+    assert final(result, "largest_component") == 1.0
+    assert result.radio is not None
+    assert result.radio.link_pdr == pytest.approx(0.9, abs=0.01)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_particles_gather_at_the_lamp(body) -> None:
+    result = shipped("pso", body)
+    assert final(result, "target_best") < 0.3
+    assert final(result, "target_mean") < 0.6
+
+
+@pytest.mark.parametrize("driven", [(), (1,), (0, 1, 2)])
+def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys, monkeypatch, driven) -> None:
+    monkeypatch.setattr(serving, "GRACE_S", 0.01)  # wall time: the tenth tick
+    out = tmp_path / "run"
+    with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, out=out, record=BARE) as simulation:
+        scripted[-1].drive = dict.fromkeys(driven, (0.0, 0.0))
+        simulation.run(15)
+        early = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
+    late = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
+    names = [f"other-{place}" for place in range(3) if place not in driven]
+    if not names:
+        assert early == late == []
+        return
+    rest = f"{', '.join(names)}: swarmwire-agent run --config {out}/robots/{names[0]}.toml and so on"
+    assert (early, late) == ([f"nobody drives {rest}"], [f"nobody drove {rest}"])
+
+
+def test_what_is_said_soon_is_said_in_wall_time(scenario, scripted, capsys) -> None:
+    with Simulation(scenario, gateways="scripted", realtime=100) as simulation:
+        simulation.run(15)
+        assert "nobody dr" not in capsys.readouterr().err
+
+
+def test_few_are_named(scenario, scripted, capsys) -> None:
+    many = ["robots.other.count=8"]
+    with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=many) as simulation:
+        simulation.run(1)
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
+    assert line == "nobody drove other-0, other-1, other-2, other-3, other-4, other-5 and 2 more"
+
+
+def test_one_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, capsys) -> None:
+    events = [
+        "events=[{at_s=0.2, do='kill', robots={group='other'}}, {at_s=0.6, do='revive', robots={group='other'}}]",
+    ]
+    with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=events) as simulation:
+        for tick in (2, 6):  # as gateways tell it: with the first readings after
+            simulation.run(tick)
+            scripted[-1].drive = dict.fromkeys(range(3), (0.0, 0.0))
+            simulation.run(tick + 1)
+    assert "nobody drove other-0" in capsys.readouterr().err
+
+
+def test_a_program_of_plain_sockets_turns_a_robot(tmp_path) -> None:
+    scenario = ROOT / "scenarios" / "robots" / "avoidance-epuck2.toml"
+    with Simulation(scenario, gateways="epuck2", overrides=["robots.wanderers.count=2"], realtime=20) as simulation:
+        assert simulation.served is not None
+        address = simulation.served.robots[1].address
+        program = subprocess.Popen(
+            [sys.executable, "-I", "-c", PROGRAM, address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        before = simulation.world.pose[:, 2].copy()
+        while program.poll() is None and simulation.tick < 2000:
+            simulation.step()
+        out, errors = program.communicate(timeout=20)
+        simulation.run(simulation.tick + 3)  # the connection is gone
+        turned = simulation.world.velocity[:, 2]
+    assert not errors, errors
+    header, left, right = map(int, out.split())
+    assert header == 0x02
+    assert left == pytest.approx(-right, abs=20)
+    assert turned[0] == 0.0
+    assert before[0] == simulation.world.pose[0, 2]
+    # 300 steps/s of 0.12566 mm on either wheel, 53 mm apart: it goes on as it was told, as the firmware does.
+    assert turned[1] == pytest.approx(2 * 300 * 0.12566e-3 / 0.053, rel=0.05)
+
+
+def test_the_printed_command_drives_the_robot(tmp_path) -> None:
+    command = [sys.executable, "-m", "swarmwire.deploy", "run", SCENARIO, "--gateway", "epuck2", "--realtime=2"]
+    more = ["--set", "robots.flock.count=2", "--out", tmp_path / "run", "--no-rrd"]
+    with subprocess.Popen([*command, *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as run:
+        assert run.stdout is not None
+        try:
+            line = next(line for line in run.stdout if line.startswith("flock-1"))
+            program, *arguments = line.split()[3:]
+            assert program == "swarmwire-agent"
+            agent = subprocess.run(
+                [PROGRAMS / program, *arguments, "--duration-s", "4"],
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+        finally:
+            run.send_signal(signal.SIGINT)
+            run.stdout.read()
+    assert agent.returncode == 0, agent.stderr
+    assert "flock-1: ended (duration)" in agent.stdout
+    assert run.returncode == 130
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["ended"] == "interrupted"
+    assert summary["radio"]["sent"] > 20, agent.stdout
+    assert summary["inputs"]["ticks"] == summary["ticks"]

@@ -9,9 +9,8 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.deploy import Result, run
-from tests.support.deploy.commands import ROOT
-from tests.support.deploy.gateways.driven import driven
-from tests.support.deploy.gateways.measured import Speeds, measured, outside
+from tests.support.deploy.gateways import Speeds, driven, measured, outside
+from tests.support.deploy.runs import ROOT
 
 SEEDS = range(1, 21)
 SEED = 2  # of runs through gateways

@@ -1,20 +1,46 @@
-"""A tuning finds a known optimum, whatever interrupts it, and says what it is worth on fresh seeds."""
+"""Tuning: from Python, by the command line, gone on with, and killed."""
 
 import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import polars as pl
+import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.tuning.fresh_check import gained
-from swarmwire.deploy.tuning.study_file import FILE
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from tests.support.deploy.tuning.small import gone_on_with, trials_in, tuned
+from swarmwire.deploy import run
+from swarmwire.deploy.terminal import tune
+from swarmwire.deploy.tuning.best import gained
+from swarmwire.deploy.tuning.run import NothingFound
+from swarmwire.deploy.tuning.study import FILE
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from tests.support.deploy.runs import ROOT, called
+from tests.support.deploy.tuning import AT, gone_on_with, scenario_in, trials_in, tuned
 
-pytestmark = pytest.mark.usefixtures("calculated")
+GOAL = ("--goal", "min bowl")
+KILLED = """
+import sys
+from pathlib import Path
+from swarmwire.deploy.campaign.sweep import NoObserver
+from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.tuning.run import TuneObservers, begin_tune
+from tests.support.deploy.tuning import plan_of
+class Watcher:
+    def begin(self, tuning, trials): print("begins", flush=True)
+    def see(self, trial): print("trial", flush=True)
+    def end(self): pass
+plan = plan_of(Path(sys.argv[1]), seeds=1, trials=5, parallel_trials=2)
+begin_tune(plan, Path(sys.argv[2]), "", 1, TuneObservers(Watcher(), NoObserver(), Interrupt()))
+"""
 
 
+@pytest.mark.usefixtures("calculated")
 @pytest.mark.parametrize(("sampler", "within"), [("tpe", 0.05), ("random", 0.15)])
 def test_a_known_optimum_is_found(tmp_path, scenario, sampler, within):
     found = tuned(scenario, tmp_path / "t", sampler=sampler, trials=24, seeds=1)
@@ -27,6 +53,7 @@ def test_a_known_optimum_is_found(tmp_path, scenario, sampler, within):
     assert set(rows["state"]) == {"complete"}
 
 
+@pytest.mark.usefixtures("calculated")
 def test_the_best_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
     own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{found.best.number}"))
@@ -38,6 +65,7 @@ def test_the_best_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
     assert interval.low == interval.high == pytest.approx(difference)
 
 
+@pytest.mark.usefixtures("calculated")
 @pytest.mark.parametrize("until", [1, 4, 6])
 def test_ended_anywhere_and_gone_on_with_it_is_as_in_one_go(tmp_path, scenario, until):
     tuned(scenario, tmp_path / "whole", seeds=1)
@@ -49,6 +77,7 @@ def test_ended_anywhere_and_gone_on_with_it_is_as_in_one_go(tmp_path, scenario, 
     assert (tmp_path / "t" / "best.toml").read_text() == (tmp_path / "whole" / "best.toml").read_text()
 
 
+@pytest.mark.usefixtures("calculated")
 def test_more_trials_are_those_of_a_longer_tuning(tmp_path, scenario):
     tuned(scenario, tmp_path / "whole", seeds=1, trials=14)
     tuned(scenario, tmp_path / "t", seeds=1, trials=5)
@@ -60,6 +89,7 @@ def test_more_trials_are_those_of_a_longer_tuning(tmp_path, scenario):
     assert refused.value.where == "--trials"
 
 
+@pytest.mark.usefixtures("calculated")
 def test_a_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario):
     tuned(scenario, tmp_path / "whole", seeds=1, trials=5)
     tuned(scenario, tmp_path / "t", seeds=1, trials=5, until=1)
@@ -69,6 +99,7 @@ def test_a_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario)
     assert trials_in(tmp_path / "t").equals(trials_in(tmp_path / "whole"), null_equal=True)
 
 
+@pytest.mark.usefixtures("calculated")
 def test_a_time_that_most_runs_do_not_reach_is_worse_than_any_that_they_do(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", "metrics.1.after_s=0.1:0.9", goal="min ready_s", trials=10)
     rows = trials_in(tmp_path / "t")
@@ -81,12 +112,13 @@ def test_a_time_that_most_runs_do_not_reach_is_worse_than_any_that_they_do(tmp_p
     assert found.best.result.value == early["value"].min()
 
 
+@pytest.mark.usefixtures("calculated")
 def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
     tuned(scenario, tmp_path / "t", trials=2)
     about = tmp_path / "t" / "tuning.json"
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "cpu": "another"}))
-    with pytest.raises(BadInput, match="CPU.* another.*--anyway"):
+    with pytest.raises(BadInput, match="CPU.* another.*--force"):
         gone_on_with(tmp_path / "t")
     about.write_text(json.dumps(found))
     (tmp_path / "t" / "scenario" / "files" / "careful.py").write_text("x = 1")
@@ -94,6 +126,7 @@ def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
         gone_on_with(tmp_path / "t")
 
 
+@pytest.mark.usefixtures("calculated")
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
 def test_a_folder_that_is_no_tuning_is_refused_in_a_line(tmp_path, text):
     if text is not None:
@@ -101,3 +134,198 @@ def test_a_folder_that_is_no_tuning_is_refused_in_a_line(tmp_path, text):
     with pytest.raises(BadInput, match=f"^{tmp_path}.*expected ") as refused:
         gone_on_with(tmp_path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.usefixtures("here")
+def test_the_best_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
+    found = tuned(
+        scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, seeds=1, overrides=("duration_s=0.3",)
+    )
+    shutil.rmtree(tmp_path / "t" / "scenario")
+    for file in ("bowl.py", "careful.py", "bowl.toml"):
+        (tmp_path / file).unlink()
+    result = run(tmp_path / "t" / "best.toml")
+    assert (result.ticks, result.arenas[0].seed) == (3, 7)
+    assert result.metrics["bowl"].final == found.best.result.value
+    assert result.robots == found.best.parameters["robots.pair.count"]
+
+
+@pytest.mark.usefixtures("here")
+def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
+    searched = ("robots.pair.params.speed=0:1", AT)
+    found = tuned(scenario, tmp_path / "t", *searched, trials=8, seeds=1)
+    rows = trials_in(tmp_path / "t")
+    too_fast = pl.col("robots.pair.params.speed") > 0.5
+    failed, complete = rows.filter(too_fast), rows.filter(~too_fast)
+    assert len(failed)
+    assert len(complete)
+    assert set(failed["state"]) == {"failed"}
+    assert set(failed["failed"]) == {1}
+    assert failed["value"].null_count() == len(failed)
+    assert all("ValueError: too fast" in error for error in failed["error"])
+    assert set(complete["state"]) == {"complete"}
+    assert found.best.parameters["robots.pair.params.speed"] <= 0.5
+
+
+@pytest.mark.usefixtures("here")
+def test_where_all_trials_fail_it_ends_in_a_line(tmp_path, scenario):
+    with pytest.raises(NothingFound, match="all 3 trials failed.*too fast") as ended:
+        tuned(scenario, tmp_path / "t", "robots.pair.params.speed=0.6:1", trials=3)
+    assert "\n" not in str(ended.value)
+    assert not (tmp_path / "t" / "best.toml").exists()
+
+
+@pytest.mark.usefixtures("here")
+def test_where_values_are_no_good_together_that_trial_fails(tmp_path, scenario):
+    searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
+    found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1, sampler="random")
+    rows = trials_in(tmp_path / "t")
+    crowded = (pl.col("robots.pair.count") == "60") & (pl.col("arena.size_m") == "[0.3, 0.3]")
+    assert set(rows.filter(crowded)["state"]) == {"failed"}
+    assert set(rows.filter(~crowded)["state"]) == {"complete"}
+    assert found.is_over
+
+
+@pytest.mark.usefixtures("here")
+def test_choices_may_be_files_which_the_folder_keeps(tmp_path, scenario):
+    (tmp_path / "other.py").write_text((tmp_path / "careful.py").read_text())
+    searched = "robots.pair.agent=careful.py:Careful,other.py:Careful"
+    tuned(scenario, tmp_path / "t", searched, trials=2, seeds=1, until=1, parallel_trials=1, sampler="random")
+    for file in ("careful.py", "other.py", "bowl.py"):
+        (tmp_path / file).unlink()
+    found = gone_on_with(tmp_path / "t", trials=5)
+    assert set(trials_in(tmp_path / "t")["robots.pair.agent"]) == {"careful.py:Careful", "other.py:Careful"}
+    assert run(tmp_path / "t" / "best.toml").ended == "duration"
+    assert found.is_over
+
+
+@pytest.fixture
+def typed(monkeypatch, capsys, calculated):
+    return lambda *arguments: called(monkeypatch, capsys, *arguments)
+
+
+def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_path, scenario, typed):
+    folder = tmp_path / "t"
+    searched = ("--search", AT, "--search", "robots.pair.params.steps=1:8")
+    code, out, errors = typed(
+        "tune", scenario, *searched, *GOAL, "--trials", "20", "--seeds", "2", "--check-seeds", "3", "--out", folder
+    )  # fmt: skip
+    assert (code, errors) == (0, "")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    best = trials_in(folder)["value"].arg_min()
+    assert lines[0].endswith("min bowl.final.q50: 20 trials x 2 seeds")
+    assert any(re.match(rf"20/20 trials, .* \(trial {best}\)", line) for line in lines)
+    assert any(re.fullmatch(r"│ metrics.0.at │ 0.[67]\d* │ 0 to 1 │ \d+ % │", line) for line in lines)
+    assert "0.36 (0.36 to 0.36)" in out
+    for line, command in zip(
+        lines[-4:],
+        (
+            str(folder),
+            f"swarmwire run {folder}/best.toml",
+            f"swarmwire compare {folder}/check/baseline {folder}/check/trial-{best}",
+            f"swarmwire tune --resume {folder} --trials 40",
+        ),
+        strict=True,
+    ):
+        assert line.endswith(f": {command}")
+    assert json.loads((folder / "tuning.json").read_text())["command"].startswith(f"swarmwire tune {scenario}")
+    code, out, _ = typed(
+        "compare", folder / "check" / "baseline", folder / "check" / f"trial-{best}", "--response", "bowl"
+    )
+    assert code == 0
+    assert typed("tune", "--resume", folder)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "SCENARIO: is missing"),
+        (["bowl.toml", "--search", AT], "--goal: is missing"),
+        (["bowl.toml", *GOAL], "--search: is missing"),
+        (["no.toml", *GOAL, "--search", AT], "no.toml: "),
+        (["bowl.toml", *GOAL, "--search", "robots.pair.cuont=1:2"], "--search robots.pair.cuont=1:2: .*cuont: "),
+        (["bowl.toml", *GOAL, "--search", "metrics.0.at=0:2"], "--search metrics.0.at=0:2: .*at most 1"),
+        (["bowl.toml", *GOAL, "--search", "metrics.0.at=-1:1"], "--search metrics.0.at=-1:1: .*at least 0"),
+        (["bowl.toml", *GOAL, "--search", "robots.pair.body=epuck,epock"], "--search robots.pair.body=.*epuck"),
+        (["bowl.toml", *GOAL, "--search", "seed=1:5"], "--search seed=1:5: "),
+        (["bowl.toml", *GOAL, "--search", AT, "--search", AT], f"--search {AT}: .*once"),
+        (["bowl.toml", "--goal", "min bawl", "--search", AT], "--goal: bawl: .*bowl"),
+        (["bowl.toml", *GOAL, "--search", AT, "--trials", "0"], "--trials: expected 1 to"),
+        (["bowl.toml", *GOAL, "--search", AT, "--parallel-trials", "0"], "--parallel-trials: expected 1 to"),
+        (["bowl.toml", *GOAL, "--search", AT, "--sampler", "tpee"], "--sampler: .*tpe"),
+        (["bowl.toml", *GOAL, "--search", AT, "--sampler-seed", "-1"], "--sampler-seed: "),
+        (["bowl.toml", *GOAL, "--search", AT, "--check-seeds", "20:30"], "--check-seeds: .*20"),
+        (["bowl.toml", *GOAL, "--search", AT, "--set", "duration_s=-1"], "--set duration_s=-1"),
+        (["--resume", "nowhere"], "nowhere: "),
+        (["bowl.toml", "--resume", "nowhere"], "SCENARIO: .*--resume"),
+    ],
+)
+def test_what_cannot_be_tuned_is_refused_in_a_line_before_anything_is(
+    tmp_path, scenario, typed, monkeypatch, arguments, told
+):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    code, out, errors = typed("tune", *arguments)
+    assert (code, out) == (2, "")
+    assert re.match(f"error: {told}", errors), errors
+    assert errors.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+class Interrupting:
+    """Looks on, and presses Ctrl-C after the first trial."""
+
+    def begin(self, tuning, trials):
+        pass
+
+    def see(self, trial):
+        os.kill(os.getpid(), signal.SIGINT) if trial.number == 2 else None
+
+    def end(self):
+        pass
+
+
+def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
+    folder = tmp_path / "t"
+    with monkeypatch.context() as patched:
+        patched.setattr(tune, "TuneProgress", lambda _: Interrupting())
+        code, out, errors = typed(
+            "tune", scenario, "--search", AT, *GOAL, "--trials", "6", "--seeds", "1", "--out", folder
+        )
+    assert (code, errors) == (130, "")
+    first, best, last = out.splitlines()
+    assert "3 of 6 trials" in first
+    assert re.search(r"metrics.0.at=\S+$", best)
+    assert last.endswith(f"swarmwire tune --resume {folder}")
+    code, out, _ = typed("tune", "--resume", folder)
+    assert code == 0
+    assert re.search("6 trials x 1 seeds; 3 of them", out.splitlines()[0])
+
+
+def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, monkeypatch, capsys, here):
+    folder, searched = tmp_path / "t", "robots.pair.params.speed=0.6:1"
+    arguments = ("--search", searched, *GOAL, "--trials", "2", "--seeds", "1", "--out", folder, "--quiet")
+    code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)
+    assert (code, out) == (1, "")
+    assert re.fullmatch(r"error: \S+: all 2 trials failed.* trial 0: ValueError: too fast.*\n", errors)
+
+
+def test_a_tuning_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, typed):
+    scenario, folder = scenario_in(tmp_path), tmp_path / "t"
+    command = [sys.executable, "-c", KILLED, str(scenario), str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        lines = iter(process.stdout)
+        assert [next(lines).strip() for _ in range(4)] == ["begins", "trial", "trial", "trial"]
+        workers = psutil.Process(process.pid).children(recursive=True)
+        assert len(workers) == 1
+        process.kill()
+        gone, alive = psutil.wait_procs(workers, timeout=60)
+    assert (len(gone), alive) == (1, [])
+    code, out, _ = typed("tune", "--resume", folder)
+    there = re.search(r"5 trials x 1 seeds; (\d) of them are there", out)
+    assert code == 0
+    assert there is not None
+    assert int(there[1]) >= 3
+    tuned(scenario, tmp_path / "whole", seeds=1, trials=5, parallel_trials=2)
+    assert trials_in(folder).equals(trials_in(tmp_path / "whole"), null_equal=True)

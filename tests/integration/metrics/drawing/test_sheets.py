@@ -12,15 +12,12 @@ import pytest
 from swarmwire.comms.bodies.body import body_from, body_names, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
-from swarmwire.metrics.drawing import canvas, coverage_sheet, distance_sheet
-from swarmwire.metrics.drawing.body_facts import facts_of
-from swarmwire.metrics.drawing.body_sheet import draw_body
-from swarmwire.metrics.drawing.coverage_sheet import draw_coverage
-from swarmwire.metrics.drawing.distance_sheet import draw_distances
-from swarmwire.metrics.drawing.mp4 import write_mp4
-from swarmwire.metrics.drawing.view_from_above import draw_from_above
-from swarmwire.metrics.run_folder import RunFolder
-from tests.support.metrics.radio_runs import DISK, ticks
+from swarmwire.metrics.drawing import canvas, radio
+from swarmwire.metrics.drawing.animation import write_mp4
+from swarmwire.metrics.drawing.bodies import draw_body, draw_from_above, facts_of
+from swarmwire.metrics.drawing.radio import draw_coverage, draw_distances
+from swarmwire.metrics.run_folder.reader import RunFolder
+from tests.support.metrics.radio import DISK, ticks
 from tests.support.metrics.recorded import links, record
 from tests.support.metrics.truths import departed, static, truth
 
@@ -121,7 +118,7 @@ STRENGTH = Band(*np.array([[-50.0, -70.0, -90.0]] * 3))
 @pytest.mark.parametrize("signals", [True, False])
 def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(tmp_path, monkeypatch, signals):
     drawn = []
-    monkeypatch.setattr(coverage_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     found = SIGNALS if signals else replace(SIGNALS, mean_dbm=None)
     distances = ByDistance(DISTANCES, DELIVERY, STRENGTH if signals else None)
     draw_coverage(static(3), found, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png", 400)
@@ -138,7 +135,7 @@ def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(t
 def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_received(tmp_path, monkeypatch):
     of, drawn = static(6, arenas=2), []
     record(tmp_path, of, ticks(DISK, of, 3, count=20))
-    monkeypatch.setattr(distance_sheet, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     draw_distances(RunFolder(tmp_path), 1, tmp_path / "pdr.png", 640)
     [figure] = drawn
     upper, lower = figure.axes
@@ -156,7 +153,7 @@ def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_received(
 def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
     of = static(2)
     record(tmp_path, of, [truth(of, departed=departed([]), finished=links([], [], 0, 0))])
-    for arena, option in enumerate(("--pdr", "--arena")):
+    for arena, option in enumerate(("--kind", "--arena")):
         with pytest.raises(BadInput, check=lambda error, option=option: error.where == option):
             draw_distances(RunFolder(tmp_path), arena, tmp_path / "pdr.png", 640)
     (tmp_path / "radio_distances.parquet").unlink()

@@ -13,8 +13,7 @@ from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from tests.support.robots.epuck2.fact_sheet import COMMAND, command, read, sensors
-from tests.support.robots.epuck2.scripted_robot import ScriptedRobot
+from tests.support.robots.epuck2 import COMMAND, ScriptedRobot, command, read, sensors
 
 BODY = load_body("epuck2")
 STEP_M = pi * 0.04 / 1000

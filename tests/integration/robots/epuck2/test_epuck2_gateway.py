@@ -18,8 +18,8 @@ from swarmwire.comms.robots.epuck2.commands import RobotCommand
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import Connection, EmulatedRobot
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
-from tests.support.robots.epuck2.fact_sheet import SENSORS, command, read
-from tests.support.waiting import until
+from tests.support.clocks import until
+from tests.support.robots.epuck2 import SENSORS, command, read
 
 BODY = load_body("epuck2")
 STEP_M = pi * 0.04 / 1000

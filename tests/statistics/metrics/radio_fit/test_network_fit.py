@@ -6,22 +6,19 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.radio_fit.latency_fit import LatencyFit, fit_latency
-from swarmwire.metrics.radio_fit.loss_fit import LossFit
-from swarmwire.metrics.radio_fit.network_fit import NetworkFit, deliveries, fit_network
-from swarmwire.metrics.radio_fit.network_log import (
+from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_latency
+from swarmwire.metrics.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range
+from swarmwire.metrics.radio_fit.logs import (
     NetworkLog,
     is_network_table,
     network_log_of_robots,
     network_log_of_table,
 )
-from swarmwire.metrics.radio_fit.network_rows import network_rows
-from swarmwire.metrics.radio_fit.network_table import network_comments, network_table
-from swarmwire.metrics.radio_fit.range_fit import RangeFit, fit_range
+from swarmwire.metrics.radio_fit.losses import LossFit
+from swarmwire.metrics.radio_fit.tables import network_comments, network_rows, network_table
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from tests.statistics.metrics.radio_fit.test_radio_fit import is_found
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import flock, watched
+from tests.support.metrics.real_logs import as_logs, flock, watched
 
 AIRTIME_S = 14 * 8 / 250_000  # of a beacon, which the radio adds to its latency
 HEAD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given\n"

@@ -7,17 +7,13 @@ import pytest
 
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
-from swarmwire.metrics.radio_fit.expected_runs import expected_runs
-from swarmwire.metrics.radio_fit.fit_rows import Row, parameter_rows, residual_rows
-from swarmwire.metrics.radio_fit.link_field import link_covariance
-from swarmwire.metrics.radio_fit.loss_fit import LossFit, fit_losses
-from swarmwire.metrics.radio_fit.loss_sequences import loss_sequences
-from swarmwire.metrics.radio_fit.path_loss_fit import PathLossFit
-from swarmwire.metrics.radio_fit.radio_fit import fit_radio
-from swarmwire.metrics.radio_fit.radio_table import radio_table
-from swarmwire.metrics.radio_fit.read_log import read_log
-from swarmwire.metrics.radio_fit.shadowing_fit import ShadowingFit
-from tests.support.metrics.radio_fit.synthetic import (
+from swarmwire.metrics.radio_fit.fit import fit_radio
+from swarmwire.metrics.radio_fit.logs import loss_sequences, read_log
+from swarmwire.metrics.radio_fit.losses import LossFit, expected_runs, fit_losses
+from swarmwire.metrics.radio_fit.path_loss import PathLossFit
+from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, link_covariance
+from swarmwire.metrics.radio_fit.tables import Row, parameter_rows, radio_table, residual_rows
+from tests.support.metrics.radio import (
     EXPONENT,
     NOISE_DB,
     RSSI_AT_1_M_DBM,

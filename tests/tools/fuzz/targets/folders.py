@@ -6,22 +6,19 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, Simulation
-from swarmwire.deploy.radio.link_trace_file import read_link_traces
 from swarmwire.deploy.repetition import RepeatedRun
-from swarmwire.metrics.campaign.campaign_folder import CampaignFolder
-from swarmwire.metrics.radio_fit.network_log import is_network_table, network_log_of_robots, network_log_of_table
-from swarmwire.metrics.radio_fit.read_log import read_log
-from swarmwire.metrics.real_log.clock_offsets import in_step
-from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.deploy.scenario_parts import read_link_traces
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.radio_fit.logs import is_network_table, network_log_of_robots, network_log_of_table, read_log
+from swarmwire.metrics.real_log.real_logs import in_step, read_real_logs
 from swarmwire.metrics.real_log.truths import real_run
-from swarmwire.metrics.record.names import RECORDING, SCENARIO
 from swarmwire.metrics.report.run_data import read_run
-from swarmwire.metrics.run_folder import RunFolder
-from swarmwire.metrics.verify.verify import verify
-from tests.support.deploy.commands import LOSSY
-from tests.support.metrics.campaign.campaigns import write_campaign
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import watched
+from swarmwire.metrics.run_folder.layout import RECORDING, SCENARIO
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.verify import verify
+from tests.support.deploy.runs import LOSSY
+from tests.support.metrics.campaigns import write_campaign
+from tests.support.metrics.real_logs import as_logs, watched
 from tests.tools.fuzz.target import FolderTarget, check_refusal
 
 TABLES: tuple[Callable[[RunFolder], Any], ...] = (

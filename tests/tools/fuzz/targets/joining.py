@@ -15,10 +15,9 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
-from swarmwire.deploy.control.control_server import ControlServer
 from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.page.app import MAX_BYTES
-from swarmwire.deploy.page.orders import Order
+from swarmwire.deploy.live.control_server import ControlServer
+from swarmwire.deploy.page.server import MAX_BYTES, Order, give
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents
@@ -211,4 +210,4 @@ class PageOrders(DocumentTarget):
             order = self.adapter.validate_json(case)
         except ValidationError as error:
             raise ValueError(error.errors()[0]["type"]) from None
-        order.give(AnyRequest())
+        give(order, AnyRequest())

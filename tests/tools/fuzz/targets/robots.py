@@ -23,7 +23,7 @@ from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.base import CommandInbox
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
-from tests.support.robots.ros2.ros2_rig import AT_START
+from tests.support.robots.rigs import AT_START
 from tests.tools.fuzz.mutations import mutated_bytes, pick
 from tests.tools.fuzz.target import ByteTarget
 from tests.tools.fuzz.targets.radio import CLOCK, Payload

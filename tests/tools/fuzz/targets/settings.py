@@ -14,22 +14,19 @@ from swarmwire.comms.bodies import body as body_module
 from swarmwire.comms.bodies.body import body_from_mapping
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.deploy.agents import agent_specs, check_agents
-from swarmwire.deploy.campaign.campaign_file import asked_in, campaign_table
-from swarmwire.deploy.campaign.plan import planned
-from swarmwire.deploy.certificates.folder_access import access_in, network_in
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.robot_settings import robot_settings
-from swarmwire.deploy.measuring import measuring
-from swarmwire.deploy.radio.link_trace_file import scenario_traces
+from swarmwire.deploy.fleet.fleet import read_fleet
+from swarmwire.deploy.fleet.release import robot_settings
+from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.target import File, FolderTarget, Target, check_refusal, mutated_file
-from tests.unit.agent.on_robot.test_settings_file import WHOLE
-from tests.unit.deploy.fleet.test_fleet_file import EXAMPLE
+from tests.unit.agent.on_robot.test_settings import WHOLE
+from tests.unit.deploy.fleet.test_fleet import EXAMPLE
 
 MAX_ROBOTS, MAX_OBSTACLES = 60, 200  # of scenarios that are run for a tick
 
@@ -135,12 +132,12 @@ class Campaigns(TomlTarget):
         return "scenario" in table and "vary" in table
 
     def read(self, path: Path, *, deep: bool) -> str | None:
-        table = campaign_table(path)
-        if table is None:
+        file = campaign_file(path)
+        if file is None:
             return "a scenario"
-        campaign = asked_in(path, table)
+        spec = spec_in(path, file)
         if deep:
-            planned(campaign)
+            plan_of(spec)
         return None
 
 

@@ -10,10 +10,14 @@ from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestVector
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from tests.support.agent.behaviours.one_particle import HERE, One, place
+from tests.support.agent.behaviours import HERE, One, place
 
 FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
 CALM = {"inertia": 0.0, "own_weight": 0.0, "neighbour_weight": 0.0}  # the robot stays where it is
+OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
+RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
+AGAIN_M = 0.1
+SPEED_MPS, PERIOD_S = 0.1, 0.1
 
 
 @pytest.mark.parametrize("pull", [0.0, 1.5, 100.0])
@@ -145,10 +149,6 @@ def test_on_its_way_a_robot_turns_from_what_is_near_ahead(ray: int, side: float)
     assert actions.linear_mps[0] < free.linear_mps[0]
 
 
-OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
-RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
-
-
 @pytest.mark.parametrize(
     ("index", "width", "heeded"), [(0, 1, 9), (0, 4, 6), (0, 5, 5), (4, 1, 5), (3, 1, 4), (2, 2, 4)]
 )
@@ -213,9 +213,6 @@ def test_each_robot_decides_for_itself(kind: Any, more: dict[str, Any]) -> None:
     assert_rows_independent(kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
 
 
-AGAIN_M = 0.1
-
-
 def test_by_itself_the_brightest_reading_counts() -> None:
     one = One()
     for brightness in (0.5, 0.9, 0.4, 0.6):
@@ -259,9 +256,6 @@ def test_who_comes_back_measures_the_own_best_again_and_tells_its_mean() -> None
     one.step()
     (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
     assert told == place((1.0 + 0.5 + 0.5) / 3.0, *HERE).encode()
-
-
-SPEED_MPS, PERIOD_S = 0.1, 0.1
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])

@@ -1,19 +1,48 @@
-"""Robots that walk: random walks, covering, and the states of aggregation."""
+"""Behaviours that walk: random walks, avoidance, aggregation by a threshold."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from swarmwire.agent.behaviours import Aggregation, Coverage, RandomWalk
+from swarmwire.agent.behaviours import (
+    Aggregation,
+    BeaconAvoidance,
+    Coverage,
+    RandomWalk,
+    SmoothedAvoidance,
+    SmoothedAvoidanceProximity,
+    ThresholdRule,
+    ThresholdRuleProximity,
+)
 from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
+from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
+from swarmwire.agent.behaviours.beacon_avoidance import Traffic
+from swarmwire.agent.behaviours.neighbour_table import NO_ROBOT, SLOTS, Remembered, forget, remember
 from swarmwire.agent.behaviours.random_walk import Present
+from swarmwire.agent.fields import Vectors
+from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
+from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.packets import Payloads, ReceivedPackets
+from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import run
-from tests.support.agent.behaviours.walker import Walker
+from tests.support.agent.behaviours import Walker
+from tests.support.agent.hosts import group
 
 SCENARIO = Path("scenarios/behaviours/random_walk.toml")
 MANY = 4000
+COVERAGE_SCENARIO = Path("scenarios/behaviours/coverage.toml")
+AGGREGATION_SCENARIO = Path("scenarios/behaviours/aggregation.toml")
+NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
+BEACON_SCENARIO = Path(__file__).parents[4] / "scenarios" / "behaviours" / "beacon_avoidance.toml"
+PERIOD_NS = 10**8
+FOOTBOT, BURGER = load_body("footbot"), load_body("turtlebot3-burger")
+CORRIDOR = Path(__file__).parents[4] / "scenarios" / "papers" / "scenarios" / "corridor.toml"
+SHOWN = Path(__file__).parents[4] / "scenarios" / "behaviours"
+ON, BACK = (0.2, 0.0), (-0.1, 0.5)  # the article's numbers
 
 
 @pytest.mark.parametrize("kind", [RandomWalk, Coverage, Aggregation])
@@ -64,19 +93,6 @@ def test_what_is_behind_is_in_nobodys_way():
     assert (walker.step(near_rad=np.pi).linear_mps == 0.1).all()
 
 
-def test_who_tumbles_all_the_time_covers_less():
-    few = ["standard_metrics=false", "duration_s=20"]
-    far, tumbling = (
-        run(SCENARIO, seeds=range(1, 4), overrides=[*few, f"robots.walkers.params={{ spell_m = {spell_m} }}"])
-        for spell_m in (2.0, 0.05)
-    )
-    least = min(arena.metrics["coverage"].final for arena in far.arenas)
-    assert least > max(arena.metrics["coverage"].final for arena in tumbling.arenas)
-
-
-COVERAGE_SCENARIO = Path("scenarios/behaviours/coverage.toml")
-
-
 def turns(*neighbours: tuple[float, float], **params: float) -> np.ndarray:
     return Walker(Coverage, Present, n=400, **params).first_turns_rad(*neighbours)
 
@@ -116,10 +132,6 @@ def test_robots_that_hear_one_another_cover_more_than_those_that_lose_every_pack
     hearing, deaf = covered(), covered("radio.loss=1.0")
     assert np.count_nonzero(hearing > deaf) >= 3
     assert hearing.mean() > deaf.mean()
-
-
-AGGREGATION_SCENARIO = Path("scenarios/behaviours/aggregation.toml")
-NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
 
 
 def gatherers(n: int = 1, **params: float) -> Walker:
@@ -171,10 +183,232 @@ def test_who_leaves_turns_its_back_and_approaches_again_after_a_while():
     assert np.mean(many.memory.at == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
 
 
-def test_robots_gather_by_radio_and_not_without():
-    few = ["standard_metrics=false", "duration_s=15", "metrics.0.metric=aggregation"]
-    hearing, deaf = (
-        run(AGGREGATION_SCENARIO, seeds=[1], overrides=o).arenas[0].metrics["aggregation"].final or 0.0
-        for o in (few, [*few, "radio.loss=1.0"])
+class One:
+    """One e-puck whose tests say what it hears: (range_m, bearing_rad, heading_rad, speed_mps) of neighbours."""
+
+    def __init__(self, heading_rad: float = 0.0, **params: float) -> None:
+        self.tick, self.heading_rad = 0, heading_rad
+        self._host = agent_group(group("", [0], params=dict(params)), BeaconAvoidance)
+
+    def step(self, *beacons: tuple[float, float, float, float], late_ns: int = 0) -> tuple[float, float]:
+        """Forward speed and turn rate; packets were received `late_ns` before the step."""
+        table = np.array(beacons, np.float64).reshape(-1, 4)
+        k, now_ns = len(table), self.tick * PERIOD_NS
+        payloads = Payloads.of([BeaconPacket(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()])
+        zeros, given = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
+        at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
+        readings = GroupReadings(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
+        actions = self._host.act((self.tick, now_ns, PERIOD_NS), readings, received)
+        self.tick += 1
+        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+
+    def steps(self, count: int) -> tuple[float, float]:
+        return [self.step() for _ in range(count)][-1]
+
+    @property
+    def known(self) -> Traffic:
+        return self._host._state
+
+    def place(self) -> tuple[float, float]:
+        return float(self.known.x_m[0, 0]), float(self.known.y_m[0, 0])
+
+
+def test_alone_a_robot_goes_straight_on() -> None:
+    assert One(2.0).steps(3) == (0.1, 0.0)
+
+
+def test_a_robot_that_was_turned_goes_back_to_its_course() -> None:
+    one = One(0.0)
+    one.step()
+    one.heading_rad = 0.5
+    linear, angular = one.step()
+    assert angular == pytest.approx(-0.5 * 2.5)
+    assert 0.0 < linear < 0.1
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 2.0, -3.0])
+def test_who_comes_head_on_is_passed_on_the_right(heading_rad: float) -> None:
+    one = One(heading_rad)
+    assert one.step((0.6, 0.0, heading_rad + np.pi, 0.1))[1] < 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_who_would_pass_at_one_side_is_passed_on_the_other(side: float) -> None:
+    assert np.sign(One().step((0.6, side * 0.2, np.pi, 0.1))[1]) == -side
+
+
+@pytest.mark.parametrize(
+    ("beacon", "why"),
+    [
+        ((0.5, 1.5, 0.0, 0.1), "goes beside it, the same way"),
+        ((0.5, 0.0, 0.0, 0.1), "goes before it, as fast"),
+        ((0.5, np.pi, np.pi, 0.1), "has passed"),
+        ((1.4, 0.0, np.pi, 0.1), "is seven seconds away"),
+    ],
+)
+def test_who_will_not_be_met_soon_turns_nobody(beacon: tuple[float, float, float, float], why: str) -> None:
+    assert One().step(beacon) == pytest.approx((0.1, 0.0), abs=1e-6), why
+
+
+def test_a_neighbour_is_remembered_where_it_should_be_by_now_and_then_forgotten() -> None:
+    one = One(np.pi / 2.0, memory_s=1.0, strength=0.0, close=0.0)
+    one.step()
+    one.step((1.0, 0.0, 0.0, 0.05))  # ahead is +y, the way it goes; the other goes to +x
+    assert one.place() == pytest.approx((0.0, 1.0), abs=1e-7)
+    one.steps(10)
+    assert one.place() == pytest.approx((0.05, 0.9), abs=1e-7)
+    one.step()
+    assert (one.known.sender == NO_ROBOT).all()
+
+
+def test_a_packet_is_moved_on_by_its_age_and_by_a_delay_that_is_known() -> None:
+    received, delayed = One(strength=0.0, close=0.0), One(strength=0.0, close=0.0, latency_s=1.5)
+    for one in (received, delayed):
+        one.step()
+        one.step((1.0, 0.0, np.pi, 0.1), late_ns=PERIOD_NS // 2)
+    assert received.place() == pytest.approx((1.0 - 0.2 * 0.05, 0.0), abs=1e-7)
+    assert delayed.place() == pytest.approx((1.0 - 0.2 * 1.55, 0.0), abs=1e-7)
+
+
+def told(table: Remembered, row: list[int], sender: list[int], sequence: list[int], x_m: FloatArray) -> None:
+    zeros = np.zeros(len(row))
+    where, still = Vectors(x_m, zeros), Vectors(zeros, zeros)
+    remember(table, np.array(row), np.array(sender), np.array(sequence), where, still, zeros)
+
+
+def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
+    table, many = Remembered.fresh(2), SLOTS + 5
+    told(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
+    assert table.sender[1].tolist() == list(range(many - 1, many - 1 - SLOTS, -1))
+    assert (table.sender[0] == NO_ROBOT).all()
+    told(table, [1], [99], [0], np.array([0.1]))
+    assert table.sender[1, :2].tolist() == [99, many - 1]
+    assert table.sender[1, -1] == many - SLOTS + 1, "the farthest gave way"
+
+
+def test_of_a_sender_the_newest_packet_counts_also_if_an_older_one_comes_later() -> None:
+    table = Remembered.fresh(1)
+    told(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
+    told(table, [0], [3], [6], np.array([0.6]))
+    assert (table.sender[0, :2].tolist(), table.x_m[0, 0]) == ([3, NO_ROBOT], 0.7)
+    forget(table, -1.0)
+    assert table.age_s.tolist() == [[np.inf] * SLOTS]
+
+
+@pytest.mark.parametrize("trial", [Trial(seed=1, ticks=25), Trial(seed=2, robots=14, ticks=25)], ids=repr)
+def test_each_robot_decides_alone(trial: Trial) -> None:
+    assert_rows_independent(BeaconAvoidance, trial)
+
+
+class Alone:
+    """One robot whose tests say what its rays see."""
+
+    def __init__(self, kind: type[VectorAgent], **params: float) -> None:
+        self.body = "turtlebot3-burger" if "scan" in kind.needs else "footbot"
+        self._tick, self._host = 0, agent_group(group("", [0], body=self.body, params=dict(params)), kind)
+
+    def step(self, **readings: FloatArray) -> tuple[float, float]:
+        fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in readings.items()}
+        at = GroupReadings(np.zeros(1, np.int64), fields)
+        actions = self._host.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
+        self._tick += 1
+        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+
+    def sees(self, *things: tuple[float, float], wide_deg: float = 0.5) -> tuple[float, float]:
+        """Its command where the scanner sees things, each at (angle_deg, range_m), so wide to either side."""
+        range_m = np.full(360, np.inf)
+        for angle_deg, far_m in things:
+            assert BURGER.scan is not None
+            off = np.rad2deg(np.angle(np.exp(1j * (BURGER.scan.angle_rad - np.deg2rad(angle_deg)))))
+            range_m[np.abs(off) <= wide_deg] = far_m
+        return self.step(scan_range_m=range_m)
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 90.0, 180.0, -90.0])
+def test_nearer_than_half_a_metre_on_any_side_is_backed_off_from_always_to_the_left(angle_deg: float) -> None:
+    one = Alone(ThresholdRule)
+    assert one.sees() == ON
+    assert one.sees((angle_deg, 0.49)) == BACK
+    assert one.sees((angle_deg, 0.51)) == ON, "nothing is remembered"
+
+
+def test_the_threshold_and_its_speeds_are_parameters() -> None:
+    one = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
+    assert (one.sees((0.0, 0.31)), one.sees((0.0, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
+
+
+def rays(*seen: tuple[int, float]) -> FloatArray:
+    """Answers of a foot-bot's rays that see something at a distance from the rim."""
+    value = np.zeros(24)
+    assert FOOTBOT.proximity is not None
+    for ray, far_m in seen:
+        value[ray] = FOOTBOT.proximity.response.value(np.array(far_m))
+    return value
+
+
+@pytest.mark.parametrize("ray", [0, 7, 12, 23])
+def test_by_rays_the_threshold_is_from_the_rim(ray: int) -> None:
+    one = Alone(ThresholdRuleProximity, safe_m=0.05)
+    assert one.step(proximity_value=rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
+    assert one.step(proximity_value=rays((ray, 0.045))) == (-0.05, 0.5)
+    assert one.step(proximity_value=rays((ray, 0.055))) == (0.1, 0.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_cure_turns_away_and_never_drives_backwards(side: float) -> None:
+    scanner, short = Alone(SmoothedAvoidance), Alone(SmoothedAvoidanceProximity)
+    ray = 1 if side > 0.0 else 22  # at 22.5 degrees
+    for _ in range(20):
+        by_scanner = scanner.sees((side * 30.0, 0.3), wide_deg=20.0)
+        by_rays = short.step(proximity_value=rays((ray, 0.02)))
+        for linear, angular in (by_scanner, by_rays):
+            assert linear >= 0.0
+            assert np.sign(angular) == -side
+
+
+def test_the_cure_goes_straight_on_between_walls_that_are_equally_near() -> None:
+    one = Alone(SmoothedAvoidance)
+    commands = [one.sees((90.0, 0.3), (-90.0, 0.3), wide_deg=40.0) for _ in range(30)]
+    assert commands[-1] == pytest.approx(ON, abs=1e-3)
+
+
+def test_the_cure_comes_up_to_its_speed_with_its_time_constant() -> None:
+    one = Alone(SmoothedAvoidance, smooth_s=0.3)
+    linear = [one.sees()[0] for _ in range(3)]
+    assert linear == pytest.approx([0.2 * (1.0 - 0.75**step) for step in (1, 2, 3)])
+    assert Alone(SmoothedAvoidance, smooth_s=0.0).sees() == ON
+
+
+def test_blocked_the_cure_keeps_its_side_until_the_way_is_free() -> None:
+    """What is ahead seems now a little to the left, now a little to the right."""
+    steady, fickle = (
+        Alone(SmoothedAvoidance, smooth_s=0.0),
+        Alone(SmoothedAvoidance, smooth_s=0.0, blocked_rad=4.0),
     )
-    assert hearing > deaf > 0.0
+    where = [3.0, -3.0, 3.0, -3.0]
+    assert {np.sign(steady.sees((angle, 0.25), wide_deg=40.0)[1]) for angle in where} == {-1.0}
+    assert {np.sign(fickle.sees((angle, 0.25), wide_deg=40.0)[1]) for angle in where} == {-1.0, 1.0}
+    assert steady.sees() == ON, "nothing is in its way any more"
+    assert steady.sees((-3.0, 0.25), wide_deg=40.0)[1] > 0.0, "and the side is chosen anew"
+
+
+@pytest.mark.parametrize("kind", [ThresholdRule, SmoothedAvoidance])
+def test_by_a_scanner_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
+    assert_rows_independent(kind, Trial(body="turtlebot3-burger"))
+
+
+@pytest.mark.parametrize("kind", [ThresholdRuleProximity, SmoothedAvoidanceProximity])
+def test_by_rays_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
+    assert_rows_independent(kind, Trial(body="footbot"))
+    assert_rows_independent(kind, Trial(body="epuck", seed=2))
+
+
+def test_by_rays_the_cure_meets_nobody_where_the_rule_does() -> None:
+    contacts = {
+        name: run(SHOWN / f"{name}_proximity.toml", overrides=["duration_s=20"]).metrics["collisions"].final
+        for name in ("threshold_rule", "smoothed_avoidance")
+    }
+    assert contacts["smoothed_avoidance"] == 0.0
+    assert contacts["threshold_rule"] is not None
+    assert contacts["threshold_rule"] > 0.0

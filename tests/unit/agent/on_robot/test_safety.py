@@ -1,4 +1,4 @@
-"""What stops the motors: the watchdog, an emergency stop, signals, and heartbeats for the guard."""
+"""Safety of a robot: limits, watchdog, the lock, and commands that are repeated."""
 
 import os
 import signal
@@ -8,12 +8,20 @@ from contextlib import suppress
 
 import pytest
 
-from swarmwire.agent.drivers.driver import Command, DriverLost
+from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
+from swarmwire.agent.drivers.ros2.driver import STOP_REPEATS, CommandPublisher
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
+from swarmwire.agent.on_robot.robot_lock import OUT_OF_REACH, STOP_SIGNAL, NotStopped, RobotLock
+from swarmwire.agent.on_robot.robot_lock import STOPPED as STOPPED_MESSAGE
 from swarmwire.agent.on_robot.safety import SIGNALS, Heartbeats, Motors, StopFlag, Watchdog, by_signals
+from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
-from tests.support.agent.on_robot.scripted import Rig
+from swarmwire.comms.errors import BadInput
+from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver
 from tests.support.clocks import MS, FakeClock
+
+DRIVE = Command(0.1, 0.5)
 
 
 def _watchdog(clock: FakeClock) -> tuple[Watchdog, list[str]]:
@@ -209,3 +217,164 @@ def test_a_guard_that_is_gone_is_noticed(ends):
 
 def test_without_a_guard_nothing_happens():
     Heartbeats(None, lambda: False, _alone)()
+
+
+def _epuck2(address: str) -> Epuck2Driver:
+    return Epuck2Driver(address, load_body("epuck2"), Epuck2Options(), DatedFakeClock())
+
+
+def test_an_address_with_the_usual_port_is_the_same_robot_as_without():
+    assert _epuck2("10.0.0.1").target == _epuck2("10.0.0.1:1000").target != _epuck2("10.0.0.1:1001").target
+
+
+def test_one_holds_it_at_a_time_and_nobody_once_it_is_let_go(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    clock = DatedFakeClock()
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    assert second.stopped_by_holder() is None
+    with first.held("robot.toml"):
+        first.tell(STOPPED_MESSAGE)
+        with pytest.raises(BadInput, match="the robot at nowhere is driven by process"), second.held("robot.toml"):
+            pass
+    with second.held("robot.toml"):
+        pass
+
+
+def test_what_a_dead_agent_left_behind_is_not_asked(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    clock = DatedFakeClock()
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    with first.held("robot.toml"):
+        next((tmp_path / "swarmwire").iterdir()).write_text("99999999\n")  # no process has this number
+        assert second.stopped_by_holder() is None
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        (OUT_OF_REACH, "cannot reach the robot at nowhere, and stops it as soon as it can"),
+        ("", "drives the robot at nowhere, and did not say within 2 s that it stopped it"),
+    ],
+)
+def test_a_holder_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_path, monkeypatch, told, expected):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    clock, asked = DatedFakeClock(), []
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    before = signal.signal(STOP_SIGNAL, lambda *_: asked.append(True))
+    try:
+        with first.held("robot.toml"):
+            first.tell(told)
+            with pytest.raises(NotStopped, match=expected):
+                second.stopped_by_holder()
+    finally:
+        signal.signal(STOP_SIGNAL, before)
+    assert asked == [True]  # once, not in every round
+
+
+@pytest.mark.parametrize("words", ["", "somebody\n", "\xff\xfe"])
+def test_a_lock_that_names_nobody_holds_up_nobody(tmp_path, monkeypatch, words):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    clock = DatedFakeClock()
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    with first.held("robot.toml"):
+        next((tmp_path / "swarmwire").iterdir()).write_bytes(words.encode("latin-1"))
+        assert second.stopped_by_holder() is None
+
+
+def test_a_folder_for_locks_must_be_one_of_ones_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "swarmwire").symlink_to(tmp_path)
+    clock = DatedFakeClock()
+    with pytest.raises(BadInput, match="expected a folder of this user's own"):
+        RobotLock("scripted", ScriptedDriver(clock), clock)
+    (tmp_path / "swarmwire").unlink()
+    (tmp_path / "swarmwire").write_text("no folder")
+    with pytest.raises(BadInput, match="expected a folder for locks of robots"):
+        RobotLock("scripted", ScriptedDriver(clock), clock)
+
+
+class StepClock:
+    """A clock whose sleepers the test wakes, one period at a time."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+        self._sleeps, self._wakes = threading.Semaphore(0), threading.Semaphore(0)
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, at_ns: int) -> None:
+        self._sleeps.release()
+        assert self._wakes.acquire(timeout=20.0)
+        self.time_ns = at_ns
+
+    def step(self) -> None:
+        """Wake the sleeper, and wait until it sleeps again."""
+        self._wakes.release()
+        assert self._sleeps.acquire(timeout=20.0)
+
+    def settle(self) -> None:
+        assert self._sleeps.acquire(timeout=20.0)
+
+    def wake(self) -> None:
+        self._wakes.release()
+
+
+class SentPackets:
+    def __init__(self) -> None:
+        self.clock, self.commands = StepClock(), []
+        self.commander = CommandPublisher(self.commands.append, self.clock)
+        self.clock.settle()
+
+    def steps(self, count: int) -> list[Command]:
+        """What is sent in so many periods."""
+        before = len(self.commands)
+        for _ in range(count):
+            self.clock.step()
+        return self.commands[before:]
+
+    def end(self) -> None:
+        self.clock.wake()
+        self.commander.end()
+
+
+def test_it_begins_with_a_stop_which_goes_out_some_times_and_no_more():
+    sent = SentPackets()
+    assert sent.commands == [STOP]
+    assert sent.steps(10) == [STOP] * STOP_REPEATS
+    sent.end()
+
+
+def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
+    sent = SentPackets()
+    sent.commander.tell(DRIVE)
+    assert sent.commands[-1] == DRIVE
+    before_ns = sent.clock.time_ns
+    assert sent.steps(20) == [DRIVE] * 20
+    assert sent.clock.time_ns - before_ns <= 2_000_000_000
+    sent.end()
+
+
+def test_after_a_stop_from_any_thread_no_command_goes_out_again():
+    sent = SentPackets()
+    sent.commander.tell(DRIVE)
+    sent.steps(3)
+    thread = threading.Thread(target=sent.commander.tell, args=(STOP,))
+    thread.start()
+    thread.join()
+    assert sent.commands[-1] == STOP
+    assert sent.steps(10) == [STOP] * STOP_REPEATS
+    sent.commander.tell(DRIVE)  # until the agent commands anew
+    assert sent.steps(2) == [DRIVE] * 2
+    sent.end()
+
+
+def test_the_end_is_a_stop_and_after_it_nothing_goes_out():
+    sent = SentPackets()
+    sent.commander.tell(DRIVE)
+    sent.end()
+    assert sent.commands[-1] == STOP
+    told = len(sent.commands)
+    sent.commander.tell(DRIVE)
+    sent.commander.end()
+    assert len(sent.commands) == told

@@ -9,18 +9,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import ReceivedPackets, SentPackets
+from swarmwire.comms.packets import BROADCAST, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import RATE_HZ, TICK_NS, Run, everybody, make_medium, packets, run, scattered
-from tests.support.comms.radio.traffic import RADIOS, random_traffic
+from tests.support.comms.radio import (
+    METHODS,
+    RADIOS,
+    RATE_HZ,
+    TICK_NS,
+    drawing,
+    everybody,
+    make_medium,
+    packets,
+    random_traffic,
+    run,
+    scattered,
+    story,
+    with_access,
+)
 
 ROBOTS = 7
 RADIO = Radio(
@@ -36,52 +48,44 @@ OBSTACLES = [[Obstacle("cylinder", 0.1 * a, 0.0, radius_m=0.3 + 0.1 * a)] for a 
 COLUMNS = ("receiver", "sender", "sequence", "received_at_ns")
 
 
-def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
-    """Everything received in one arena, with what came with it, then its tally."""
-    rows: list[tuple[object, ...]] = []
-    for tick, one in enumerate(told.news):
-        h = one.received
-        for i in np.flatnonzero(h.receiver // ROBOTS == arena):
-            given = tuple(column[i] for column in h.given.values())
-            rest = h.sender[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
-            rows.append((tick, h.receiver[i] % ROBOTS, *rest))
-    return [*rows, (*told.tally.fates[arena], told.tally.in_range[arena])]
-
-
 def two_each(arenas: int) -> SentPackets:
-    """Each robot sends two different packets."""
-    sent = packets(range(2 * ROBOTS), size=20)
+    """Each robot sends two different packets, one to all and one to its neighbour."""
+    sender = np.repeat(np.arange(ROBOTS), 2)
+    sent = packets(sender, np.where(np.arange(2 * ROBOTS) % 2, (sender + 1) % ROBOTS, BROADCAST), size=20)
     payloads = sent.payloads.rows(np.tile(np.arange(2 * ROBOTS), arenas))
     return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
 
 
-def test_an_arena_alone_gives_the_same_as_beside_others():
+def places(radio: Radio, rows: int) -> FloatArray:
+    """Random poses, twenty times as far apart where signals are heard as far."""
+    return scattered(rows) * ([1.0, 1.0, 1.0] if radio.model == "unit-disk" else [20.0, 20.0, 1.0])
+
+
+@pytest.mark.parametrize("radio", [RADIO, *map(drawing, METHODS)], ids=["unit-disk", *METHODS])
+def test_an_arena_alone_gives_the_same_as_beside_others(radio: Radio):
     seeds = (11, 12, 13)
-    pose = scattered(3 * ROBOTS)
-    beside = run(make_medium(RADIO, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
+    pose = places(radio, 3 * ROBOTS)
+    beside = run(make_medium(radio, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
     for arena, seed in enumerate(seeds):
-        alone_medium = make_medium(RADIO, ROBOTS, [seed], [OBSTACLES[arena]])
+        alone_medium = make_medium(radio, ROBOTS, [seed], [OBSTACLES[arena]])
         alone = run(alone_medium, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
-        assert len(story(alone)) > 50
-        assert story(alone) == story(beside, arena)
+        assert len(story(alone, ROBOTS)) > 50
+        assert story(alone, ROBOTS) == story(beside, ROBOTS, arena)
 
 
+@pytest.mark.parametrize("radio", [RADIO, drawing("csma-802154")], ids=["unit-disk", "signals"])
 @settings(max_examples=20)
-@given(st.randoms(use_true_random=False))
-def test_the_order_among_senders_is_indifferent(shuffle):
+@given(shuffle=st.randoms(use_true_random=False))
+def test_the_order_among_senders_is_indifferent(radio: Radio, shuffle):
     """Each sender's own packets keep theirs."""
     sent = two_each(1)
-    place = shuffle.sample(range(len(sent)), len(sent))
-    order = np.array(place)[np.argsort(sent.sender[place], kind="stable")]
-    index = np.empty_like(order)
-    index[:] = np.array(place)
+    index = np.array(shuffle.sample(range(len(sent)), len(sent)))
     for s in range(ROBOTS):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
     mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
-    pose = scattered(ROBOTS)
-    assert story(run(make_medium(RADIO, ROBOTS), pose, lambda _: mixed, 3, 2)) == story(
-        run(make_medium(RADIO, ROBOTS), pose, lambda _: sent, 3, 2)
-    )
+    pose = places(radio, ROBOTS)
+    runs = [run(make_medium(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
+    assert story(runs[0], ROBOTS) == story(runs[1], ROBOTS)
 
 
 def test_no_stage_shifts_the_draws_of_another():
@@ -122,7 +126,7 @@ def test_payloads_hold_only_packets_that_somebody_received():
 
 
 SIX, TICKS = 6, 5
-SIGNALS = st.sampled_from(METHODS).map(with_access)
+SIGNALS = st.sampled_from([*map(with_access, METHODS), *map(drawing, METHODS)])
 
 
 def told(news: list[Results]) -> list[Any]:
@@ -157,7 +161,7 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
             if tick == 1:
                 disruption.radio_on[out] = disruption.alive[(out + 1) % SIX] = False
         within.append(medium.advance(start_ns).received)
-        news.append(medium.step(start_ns, pose, disruption))
+        news.append(medium.step(start_ns, pose + 0.01 * tick, disruption))
         sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
         for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):

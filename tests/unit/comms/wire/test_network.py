@@ -1,12 +1,22 @@
-"""Settings of networks: what is refused, what is safe, and what sessions are opened with."""
+"""Settings of a network, and who may do what in it."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.access_control import (
+    RunAccess,
+    access_control,
+    access_of,
+    agents_access,
+    observers_access,
+    router_access,
+)
+from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, ObserverKeys, SwarmKeys, run_of, runner_of
 from swarmwire.comms.wire.network import Network, is_local
 from swarmwire.comms.wire.robot_network import swarm_config
 from swarmwire.comms.wire.sessions import (
@@ -20,6 +30,11 @@ from swarmwire.comms.wire.sessions import (
 
 LOCAL = ["tcp/127.0.0.1:0"]
 AFAR = "tls/10.0.0.5:7447"
+KEYS = SwarmKeys("lab")
+ROBOTS = ("flock-0", "flock-1")
+RUN_KEYS, SEEN = Keys("run1"), ObserverKeys("run1")
+ACCESS = RunAccess(("a", "b", "gone"), ("wall",), ("alice",), ("gate",), ("gone",))
+ANY_RUN = Keys("*")
 
 
 @pytest.fixture
@@ -193,3 +208,164 @@ def test_with_certificates_nothing_else_is_spoken(tmp_path):
     assert config["scouting"]["multicast"] == {"enabled": True}
     assert config["access_control"] == {"enabled": True}
     json.dumps(config)
+
+
+def rules_of(access: dict[str, Any], name: str, flow: str) -> list[dict[str, Any]]:
+    """The rules that hold between this peer and the other of that name."""
+    ids = [rule for policy in access["policies"] if name in policy["subjects"] for rule in policy["rules"]]
+    return [rule for rule in access["rules"] if rule["id"] in ids and flow in rule["flows"]]
+
+
+def keys_put(access: dict[str, Any], name: str, flow: str) -> set[str]:
+    return {key for rule in rules_of(access, name, flow) if "put" in rule["messages"] for key in rule["key_exprs"]}
+
+
+def test_each_name_may_put_its_own_keys():
+    access = access_control(KEYS, ROBOTS, "flock-0")
+    assert keys_put(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.bridge_sent("flock-1")}
+    assert keys_put(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
+    assert keys_put(access, "operator", "ingress") == set()
+
+
+@pytest.mark.parametrize("other", ["flock-1", "tracker", "operator"])
+def test_a_peer_puts_its_own_keys_to_all(other: str):
+    access = access_control(KEYS, ROBOTS, "flock-0")
+    assert keys_put(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.bridge_sent("flock-0")}
+
+
+def test_all_that_is_not_named_is_refused_and_every_rule_is_of_one_name():
+    access = access_control(KEYS, ROBOTS, "tracker")
+    assert (access["enabled"], access["default_permission"]) == (True, "deny")
+    assert [subject["cert_common_names"] for subject in access["subjects"]] == [
+        [name] for name in (*ROBOTS, "tracker", "operator")
+    ]
+    assert len({rule["id"] for rule in access["rules"]}) == len(access["rules"])
+
+
+def test_tracker_and_operator_have_the_names_that_they_are_given():
+    access = access_control(KEYS, ROBOTS, "flock-0", tracker="vicon", operator="alice")
+    assert keys_put(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
+    assert not rules_of(access, "tracker", "ingress")
+    assert any("query" in rule["messages"] for rule in rules_of(access, "alice", "ingress"))
+
+
+def test_a_revoked_name_is_in_no_policy():
+    access = access_control(KEYS, ROBOTS, "flock-0", revoked=("flock-1", "nobody"))
+    assert [subject["id"] for subject in access["subjects"]] == ["flock-0", "tracker", "operator"]
+    assert not rules_of(access, "flock-1", "ingress") + rules_of(access, "flock-1", "egress")
+
+
+def test_settings_without_certificates_have_no_rules_and_others_have_their_names():
+    assert access_of(Network(insecure=True), KEYS, ROBOTS, "flock-0") is None
+    file = Path("flock-0.pem")
+    network = Network(ca=file, certificate=file, key=file, operator="alice", tracker="vicon", revoked=("flock-1",))
+    expected = access_control(KEYS, ROBOTS, "flock-0", "vicon", "alice", ("flock-1",))
+    assert access_of(network, KEYS, ROBOTS, "flock-0") == expected
+
+
+@pytest.mark.parametrize(
+    ("robots", "own", "revoked", "expected"),
+    [
+        (("a", "*"), "a", (), "'*'"),
+        (("a", "b/c"), "a", (), "'b/c'"),
+        (("a", "tracker"), "a", (), "tracker: expected names that differ"),
+        (("a", "a"), "a", (), "a: expected names that differ"),
+        (("a",), "b", (), "expected the name of a robot, tracker or operator"),
+        (("a",), "a", ("a",), "a: its certificate is revoked"),
+    ],
+)
+def test_names_that_would_have_others_rights_are_refused(robots, own, revoked, expected):
+    with pytest.raises(BadInput) as refused:
+        access_control(KEYS, robots, own, revoked=revoked)
+    assert expected in str(refused.value)
+
+
+def keys_of(access: dict[str, Any], name: str, flow: str, message: str) -> set[str]:
+    """The keys that this name may have such messages of."""
+    ids = [rule for policy in access["policies"] if name in policy["subjects"] for rule in policy["rules"]]
+    rules = [rule for rule in access["rules"] if rule["id"] in ids and flow in rule["flows"]]
+    return {key for rule in rules if message in rule["messages"] for key in rule["key_exprs"]}
+
+
+def test_a_runner_speaks_and_hears_for_itself_alone() -> None:
+    access = agents_access(RUN_KEYS, ACCESS)
+    assert keys_of(access, "a", "ingress", "put") == {RUN_KEYS.answer("a")}
+    assert keys_of(access, "a", "egress", "put") == {RUN_KEYS.frame("a")}
+    assert keys_of(access, "a", "ingress", "query") == {RUN_KEYS.session_info("a"), RUN_KEYS.join("a")}
+    assert keys_of(access, "a", "ingress", "liveliness_token") == {RUN_KEYS.alive("a")}
+
+
+def test_a_router_speaks_for_the_runners_that_are_named_and_a_socket_for_any() -> None:
+    access = agents_access(RUN_KEYS, ACCESS)
+    assert keys_of(access, "gate", "ingress", "put") == {RUN_KEYS.answer("a"), RUN_KEYS.answer("b")}
+    assert keys_of(access, "local", "ingress", "put") == {RUN_KEYS.answer("*")}
+
+
+def test_observers_look_on_and_only_operators_control() -> None:
+    access = observers_access(SEEN, ACCESS)
+    for name in ("wall", "alice", "gate", "local"):
+        assert keys_of(access, name, "egress", "put") == {SEEN.truth}
+        assert keys_of(access, name, "ingress", "put") == set()
+        controls = SEEN.control in keys_of(access, name, "ingress", "query")
+        assert controls == (name != "wall")
+        assert (SEEN.control in keys_of(access, name, "egress", "reply")) == controls
+
+
+def test_a_router_lets_the_world_tell_and_runners_answer_and_never_the_other_way_round() -> None:
+    access = router_access(ACCESS)
+    assert keys_of(access, "world", "ingress", "put") == {ANY_RUN.frame("a"), ANY_RUN.frame("b")}
+    assert keys_of(access, "world", "egress", "put") == {ANY_RUN.answer("a"), ANY_RUN.answer("b")}
+    assert keys_of(access, "a", "ingress", "put") == {ANY_RUN.answer("a")}
+    both = keys_of(access, "world", "ingress", "put") | keys_of(access, "world", "egress", "put")
+    assert keys_of(access, "gate", "ingress", "put") == both
+
+
+@pytest.mark.parametrize(
+    "access", [agents_access(RUN_KEYS, ACCESS), observers_access(SEEN, ACCESS), router_access(ACCESS)]
+)
+def test_what_is_not_named_is_refused_and_who_is_revoked_is_not_named(access: dict[str, Any]) -> None:
+    assert access["default_permission"] == "deny"
+    assert {rule["permission"] for rule in access["rules"]} == {"allow"}
+    assert "gone" not in str(access)
+
+
+def test_members_of_equal_rights_share_their_rules() -> None:
+    one, many = (observers_access(SEEN, RunAccess(observers=("a", "b", "c")[:count])) for count in (1, 3))
+    assert many["rules"] == one["rules"]
+    assert len({tuple(policy["rules"]) for policy in many["policies"] if policy["subjects"] != ["local"]}) == 1
+
+
+@pytest.mark.parametrize(
+    ("access", "fault"),
+    [
+        (RunAccess(runners=("*",)), "access"),
+        (RunAccess(runners=("a/b",)), "access"),
+        (RunAccess(runners=("a",), operators=("a",)), "expected each name once, for one purpose"),
+        (RunAccess(runners=("world",)), "expected each name once, for one purpose"),
+    ],
+)
+def test_names_that_are_none_or_stand_for_two_are_refused_everywhere(access: RunAccess, fault: str) -> None:
+    for refuses in (lambda: agents_access(RUN_KEYS, access), lambda: observers_access(SEEN, access)):
+        with pytest.raises(BadInput, match=fault):
+            refuses()
+    with pytest.raises(BadInput, match=fault):
+        router_access(access)
+
+
+def test_a_key_of_a_runner_leads_back_to_it():
+    keys = Keys("run-1")
+    of_runner = (keys.session_info, keys.join, keys.alive, keys.frame, keys.answer)
+    assert {runner_of(key("flock-3")) for key in of_runner} == {"flock-3"}
+
+
+def test_a_world_s_token_leads_back_to_its_run():
+    assert run_of(Keys("run-1").world) == "run-1"
+    assert Keys("*").world == EVERY_WORLD
+
+
+def test_no_key_is_of_two_runs_or_of_runners_and_observers():
+    of_runners = {key for run in ("a", "b") for key in vars(Keys(run)).values()}
+    of_observers = {key for run in ("a", "b") for key in vars(ObserverKeys(run)).values()}
+    assert len(of_runners) == 2 * len(vars(Keys("a")))
+    assert len(of_observers) == 2 * len(vars(ObserverKeys("a")))
+    assert not of_runners & of_observers

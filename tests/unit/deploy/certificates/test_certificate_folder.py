@@ -1,20 +1,30 @@
-"""A CA's folder: what it issues holds as it should, keys stay private and whole, revoked names never come back."""
+"""A folder of certificates: what others read in it, private keys, revoked names, and who may take part in a run."""
 
+import stat
+from ipaddress import ip_address
 from pathlib import Path
 
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.certificates import certificate_folder
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue, renew_authority, revoke
-from swarmwire.deploy.certificates.dates import date_now
-from swarmwire.deploy.certificates.files import REGISTER, REPLACED, REVOKED
-from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.certificates.wanted import wanted
-from tests.support.deploy.certificates.dated import DatedFakeClock
-from tests.support.deploy.certificates.made import certificate, issued
+from swarmwire.comms.wire.access_control import RunAccess
+from swarmwire.deploy.certificates import folder as certificate_folder
+from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, renew_authority, revoke
+from swarmwire.deploy.certificates.member import access_in, network_in
+from swarmwire.deploy.certificates.register import (
+    DAY,
+    PURPOSES,
+    REGISTER,
+    REVOKED,
+    Register,
+    certificate_request,
+    date_now,
+)
+from tests.support.deploy.certificates import DatedFakeClock, certificate, issued
 
 
 def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
@@ -27,7 +37,7 @@ def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
 
 
 def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Path, clock: DatedFakeClock):
-    issue(folder, [wanted("flock-0", ("10.0.0.5",))], 365, clock)
+    issue(folder, [certificate_request("flock-0", ("10.0.0.5",))], 365, clock)
     old = (folder / "flock-0.key").read_bytes()
     assert "2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
     (again,) = issued(folder, clock, "flock-0", renew=True)
@@ -36,7 +46,7 @@ def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Pat
     issued(folder, clock, "flock-0", renew=True)
     assert (folder / REPLACED / "flock-0.1.key").read_bytes() == old
     register = Register.read(folder)
-    states = [register.state_of(of, date_now(clock)) for of in register.certificates]
+    states = [state for _, state in register.states(date_now(clock))][1:]
     assert states == ["replaced", "replaced", "valid"]
 
 
@@ -46,7 +56,7 @@ def test_a_certificate_that_ends_within_a_month_may_be_renewed(folder: Path, clo
     assert "has a certificate" in refusal(folder, clock, "flock-0")
     clock.pass_days(2)
     register = Register.read(folder)
-    assert register.state_of(register.certificates[0], date_now(clock)) == "ends soon"
+    assert list(register.states(date_now(clock)))[1][1] == "ends soon"
     (again,) = issued(folder, clock, "flock-0")
     assert again.valid_until > register.certificates[0].valid_until
 
@@ -100,7 +110,7 @@ def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(certificate_folder, "write_whole", killed)
+    monkeypatch.setattr(certificate_folder, "write_text", killed)
     with pytest.raises(KeyboardInterrupt):
         issued(folder, clock, "flock-0")
     monkeypatch.undo()
@@ -164,16 +174,122 @@ def test_what_is_damaged_in_a_folder_is_named(
 @pytest.mark.parametrize("name", ["", "radio/*", "a b", "-a", "a-", "0", "ä", "a" * 64, "a\n", "ca", "CA", "../x"])
 def test_a_bad_name_is_refused(name: str):
     with pytest.raises(BadInput, match="^NAME: "):
-        wanted(name)
+        certificate_request(name)
 
 
 @pytest.mark.parametrize("host", ["", "tls/10.0.0.5", "10.0.0.5:7447", "10.0.0.256", "10.0", "a b", "*.lab"])
 def test_a_bad_host_is_refused(host: str):
     with pytest.raises(BadInput, match="^--host: "):
-        wanted("flock-0", (host,))
+        certificate_request("flock-0", (host,))
 
 
 def test_names_that_one_file_might_hold_are_refused(folder: Path, clock: DatedFakeClock):
     assert refusal(folder, clock, "flock-0", "Flock-0").startswith("NAME: ")
     issued(folder, clock, "flock-0")
     assert refusal(folder, clock, "FLOCK-0").startswith("NAME: ")
+
+
+def test_a_ca_signs_certificates_and_lists_for_ten_years(folder: Path, clock: DatedFakeClock):
+    ca = certificate(folder, "ca")
+    basic = ca.extensions.get_extension_for_class(x509.BasicConstraints)
+    usage = ca.extensions.get_extension_for_class(x509.KeyUsage)
+    assert basic.critical
+    assert (basic.value.ca, basic.value.path_length) == (True, 0)
+    assert (usage.value.key_cert_sign, usage.value.crl_sign, usage.value.digital_signature) == (True, True, False)
+    assert (ca.not_valid_after_utc - date_now(clock)).days == 3652
+
+
+def test_a_certificate_is_a_servers_and_a_clients_of_its_name_and_hosts(folder: Path, clock: DatedFakeClock):
+    issue(folder, [certificate_request("flock-0", ("10.0.0.5", "pi.local", "fe80::1"))], 365, clock)
+    leaf = certificate(folder, "flock-0")
+    leaf.verify_directly_issued_by(certificate(folder, "ca"))
+    names = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    purposes = leaf.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+    assert [of.value for of in leaf.subject.get_attributes_for_oid(NameOID.COMMON_NAME)] == ["flock-0"]
+    assert names.get_values_for_type(x509.DNSName) == ["flock-0", "pi.local"]
+    assert names.get_values_for_type(x509.IPAddress) == [ip_address("10.0.0.5"), ip_address("fe80::1")]
+    assert set(purposes) == {ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH}
+    assert not leaf.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    assert leaf.not_valid_after_utc == date_now(clock) + 365 * DAY
+    assert leaf.not_valid_before_utc == date_now(clock) - DAY  # for robots whose clock is late
+
+
+def test_a_key_is_its_certificates_on_p256_and_its_owners_alone(folder: Path, clock: DatedFakeClock):
+    issued(folder, clock, "flock-0")
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    for name in ("ca", "flock-0"):
+        path = folder / f"{name}.key"
+        key = serialization.load_pem_private_key(path.read_bytes(), None)
+        assert isinstance(key, ec.EllipticCurvePrivateKey)
+        assert isinstance(key.curve, ec.SECP256R1)
+        assert key.public_key() == certificate(folder, name).public_key()
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        assert path.read_text().startswith("-----BEGIN PRIVATE KEY-----")  # PKCS#8
+
+
+@pytest.fixture
+def registered(folder: Path, clock: DatedFakeClock) -> Path:
+    members = [
+        certificate_request("laptop-1", purpose="runner"),
+        certificate_request("laptop-2", purpose="runner"),
+        certificate_request("wall", purpose="observer"),
+        certificate_request("gate", purpose="router"),
+        *map(certificate_request, ("world", "operator", "tracker", "flock-0")),
+    ]
+    issue(folder, members, 365, clock)
+    return folder
+
+
+def test_each_may_do_what_its_certificate_is_for_and_robots_and_trackers_take_no_part(registered, clock):
+    revoke(registered, "laptop-2", clock)
+    access = access_in(registered)
+    assert access == RunAccess(
+        ("laptop-1", "laptop-2"), ("wall",), ("operator",), ("gate",), revoked=("laptop-2",), worlds=("world",)
+    )
+    assert access.without_revoked().runners == ("laptop-1",)
+
+
+@pytest.mark.parametrize("role", ["runners", "observers", "operators", "routers"])
+def test_a_revoked_name_loses_whatever_it_may_do(role: str):
+    left = RunAccess(**{role: ("kept", "gone")}, revoked=("gone",)).without_revoked()
+    assert getattr(left, role) == ("kept",)
+
+
+def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(registered, clock):
+    issue(registered, [certificate_request("wall", purpose="runner")], 365, clock, renew=True)
+    issue(registered, [certificate_request("wall")], 365, clock, renew=True)
+    access = access_in(registered)
+    assert access.observers == ()
+    assert access.runners == ("laptop-1", "laptop-2", "wall")
+
+
+def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(registered):
+    assert network_in(registered, "world").certificate == registered / "world.pem"
+    network = network_in(registered, "runner", "laptop-2")
+    assert (network.certificate, network.ca) == (registered / "laptop-2.pem", registered / "ca.pem")
+    assert network.proves
+    with pytest.raises(BadInput, match="laptop-1, laptop-2"):
+        network_in(registered, "runner")
+    with pytest.raises(BadInput, match="nobody"):
+        network_in(registered, "runner", "nobody")
+
+
+def test_a_machine_with_its_own_files_alone_needs_no_register(registered, tmp_path):
+    own = tmp_path / "own"
+    own.mkdir()
+    with pytest.raises(BadInput) as refused:
+        network_in(own, "runner")
+    assert refused.value.where == str(own)
+    for name in ("ca.pem", "laptop-1.pem", "laptop-1.key"):
+        (own / name).write_bytes((registered / name).read_bytes())
+    (own / "laptop-1.key").chmod(0o600)
+    assert network_in(own, "runner").certificate == own / "laptop-1.pem"
+    with pytest.raises(BadInput):
+        access_in(own)
+
+
+def test_a_purpose_that_nobody_looks_for_is_refused():
+    for purpose in PURPOSES:
+        assert certificate_request("a", purpose=purpose).purpose == purpose
+    with pytest.raises(BadInput, match=r"runner \(did you mean this"):
+        certificate_request("a", purpose="runer")

@@ -1,4 +1,4 @@
-"""`swarmwire certs` as it is called: one line for each thing done, and one for each refusal."""
+"""The command certs, line by line, and the options by which a run becomes a member of a network."""
 
 import json
 from pathlib import Path
@@ -6,10 +6,13 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.deploy.certificates.certificate_folder import begin_authority, issue
-from swarmwire.deploy.certificates.wanted import wanted
-from tests.support.deploy.certificates.dated import DatedFakeClock
-from tests.support.deploy.commands import called
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.access_control import RunAccess
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.member import member
+from swarmwire.deploy.certificates.register import certificate_request
+from tests.support.deploy.certificates import DatedFakeClock
+from tests.support.deploy.runs import called
 
 FLEET = """
 format = 1
@@ -64,8 +67,8 @@ def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
 def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
     past = DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(certs.folder, past)
-    issue(certs.folder, [wanted("old")], 1, past)
-    issue(certs.folder, [wanted("gone")], 1, past)
+    issue(certs.folder, [certificate_request("old")], 1, past)
+    issue(certs.folder, [certificate_request("gone")], 1, past)
     certs("revoke", "gone")
     assert certs("list")[1].endswith(f": swarmwire certs issue {certs.folder} old\n")
     certs("issue", "old")
@@ -83,7 +86,7 @@ def test_a_fleet_gets_what_it_lacks(certs: Certs, tmp_path: Path):
     fleet = tmp_path / "fleet.toml"
     fleet.write_text(FLEET.replace("ADDRESS", "10.0.0.11"))
     begin_authority(certs.folder, WallClock())
-    issue(certs.folder, [wanted("flock-0", ("10.0.0.10",))], 365, WallClock())
+    issue(certs.folder, [certificate_request("flock-0", ("10.0.0.10",))], 365, WallClock())
     assert names_written(certs("issue", "--fleet", fleet)[0]) == ["flock-1", "tracker", "alice"]
     assert certs("issue", "--fleet", fleet)[1] == ""
     fleet.write_text(FLEET.replace("ADDRESS", "fe80::1"))  # a robot that has moved
@@ -112,3 +115,73 @@ def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.M
     assert errors.startswith("2 error: certs: ")
     assert 'pip install "swarmwire[fleet]"' in errors
     assert not certs.folder.exists()
+
+
+BEYOND, HERE = ("tls/10.0.0.5:7447",), ("unixsock-stream//tmp/x", "tcp/127.0.0.1:1")
+
+
+@pytest.fixture
+def certified(folder: Path, clock) -> Path:
+    issue(
+        folder,
+        [
+            certificate_request("world"),
+            certificate_request("a", purpose="runner"),
+            certificate_request("gate", purpose="router"),
+        ],
+        365,
+        clock,
+    )
+    return folder
+
+
+def test_a_folder_says_everything(certified):
+    world = member("world", certs=certified, revoked=("b",))
+    assert world.access == RunAccess(("a",), routers=("gate",), revoked=("b",))
+    assert world.network.certificate == certified / "world.pem"
+    assert world.warning(BEYOND) is None
+
+
+def test_files_and_names_say_the_same(certified):
+    files = certified / "ca.pem", certified / "world.pem", certified / "world.key"
+    world = member("world", files=files, access=RunAccess(("a",)))
+    assert world.access == RunAccess(("a",))
+    assert world.network.proves
+
+
+def test_without_certificates_there_are_no_rights_and_a_warning_beyond_this_machine():
+    insecure = member("world", insecure=True)
+    assert insecure.access is None
+    assert "insecure" in (insecure.warning(["tcp/0.0.0.0:7447"]) or "")
+    assert member("world").warning(HERE) is None
+
+
+def test_a_runners_machine_needs_no_register_but_who_lets_others_in_does(certified, tmp_path):
+    own = tmp_path / "own"
+    own.mkdir()
+    for name in ("ca.pem", "gate.pem", "gate.key"):
+        (own / name).write_bytes((certified / name).read_bytes())
+    (own / "gate.key").chmod(0o600)
+    assert member("runner", certs=own).network.proves
+    with pytest.raises(BadInput):
+        member("router", certs=own)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"name": "world"},
+        {"files": (Path("ca.pem"), None, None)},
+        {"access": RunAccess(("a",))},
+        {"files": (Path("none"), Path("none"), Path("none"))},
+    ],
+)
+def test_what_contradicts_itself_is_refused(given):
+    with pytest.raises(BadInput):
+        member("world", **given)
+
+
+def test_a_folder_excludes_the_rest(certified):
+    for given in ({"insecure": True}, {"access": RunAccess(("b",))}, {"files": (certified / "ca.pem", None, None)}):
+        with pytest.raises(BadInput):
+            member("world", certs=certified, **given)

@@ -12,10 +12,8 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel import Panel
-from swarmwire.deploy.terminal.panel_view import panel_view
-from swarmwire.deploy.terminal.sparkline import sparkline
-from swarmwire.metrics.metrics import Metrics
+from swarmwire.deploy.terminal.panel import Panel, panel_view, sparkline
+from swarmwire.metrics.measure import Metrics
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.registry import RunnerHealth
 from tests.support.clocks import MS, FakeClock

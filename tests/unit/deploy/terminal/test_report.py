@@ -1,18 +1,26 @@
-"""The table that a run ends with: what its numbers say, in words."""
+"""Tables with which runs and campaigns end, and how campaigns are shown while they run."""
 
+import io
+import json
 from dataclasses import replace
 from io import StringIO
 
+import polars as pl
 import pytest
 from rich.console import Console
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
+from swarmwire.deploy.campaign.sweep import Sweep
+from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
+from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
-from tests.support.deploy.commands import LOSSY
+from tests.support.clocks import StillClock
+from tests.support.deploy.runs import LOSSY
 
 
 @pytest.fixture(scope="module")
@@ -30,20 +38,22 @@ def shown(result: Result, **changes: object) -> str:
 
 
 def row(text: str, name: str) -> str:
-    return next(line for line in text.splitlines() if line.startswith(f"│ {name} ")).strip("│ ").split("│")[1].strip()
+    line = next(line for line in text.splitlines() if line.startswith(f"  {name} "))
+    return " ".join(line.split()).removeprefix(f"{name} ")
 
 
 def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
     numbers = Statistics(final=3.0, mean=0.25, min=0.0, max=1.0)
     text = shown(result, metrics={"collisions": numbers, "min_gap": numbers})
-    assert row(text, "collisions") == "total 3"
-    assert row(text, "min_gap") == "final 3, mean 0.25, min 0 (m)"
+    assert row(text, "collisions") == "3 in all"
+    assert row(text, "min_gap") == "3 0.25 0 1 m"
+    assert "final mean min max unit" in [" ".join(line.split()) for line in text.splitlines()]
 
 
 def test_a_time_is_told_also_if_it_did_not_come(result):
     never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
-    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "at 12.5 s"
-    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "not in 1 s"
+    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "12.5 s"
+    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "never within 1 s"
 
 
 def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
@@ -52,16 +62,16 @@ def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     fates = dict.fromkeys(FATE_NAMES, 0) | {"received": 60, "lost": 20, "out_of_range": 10}
     told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.6, link_pdr=0.75, fates=fates)
     assert (
-        row(shown(result, radio=told), "radio")
-        == "10 packets, 100 intended receivers (pdr 60.0%), 80 in range (link_pdr 75.0%)"
+        row(shown(result, radio=told), "packets")
+        == "10 sent, 100 intended receivers (pdr 60.0%), 80 in range (link_pdr 75.0%)"
     )
     told = replace(told, fates=fates | {"blocked": 10})
-    assert row(shown(result, radio=told), "radio").endswith("80 in range and sight (link_pdr 75.0%)")
+    assert row(shown(result, radio=told), "packets").endswith("80 in range and sight (link_pdr 75.0%)")
 
 
 def test_where_nobody_was_in_range_there_is_no_share(result):
     told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=0.0, link_pdr=None)
-    assert row(shown(result, radio=told), "radio") == "1 packets, 19 intended receivers (pdr 0.0%), 0 in range"
+    assert row(shown(result, radio=told), "packets") == "1 sent, 19 intended receivers (pdr 0.0%), 0 in range"
 
 
 def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_not(result):
@@ -77,11 +87,11 @@ def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_n
     out = StringIO()
     told = replace(result, arenas=tuple(of), stop=(early, late), ended="duration")
     print_result(told, METRICS.values(), Console(file=out, width=160, color_system=None))
-    rows = [line.strip("│ ") for line in out.getvalue().splitlines() if "stopped" in line]
+    rows = [line for line in out.getvalue().splitlines() if "stopped" in line]
     assert [" ".join(row.split()) for row in rows] == [
-        f"stopped │ {early}: seed 3 since 1.5 s",
-        f"stopped │ {late}: seed 5 since 0 s",
-        f"not stopped │ seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
+        f"stopped {early}: seed 3 since 1.5 s",
+        f"stopped {late}: seed 5 since 0 s",
+        f"not stopped seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
     ]
     assert "stopped" not in shown(result)
 
@@ -90,9 +100,9 @@ def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
     def rows(gateways: dict[str, str]) -> tuple[str, str]:
         out = StringIO()
         late = RealTimeReport(1.0, 2, 9.9924)
-        run = replace(
-            result, ticks=600, sim_time_s=60.0, wall_time_s=80.64, mode="realtime", realtime=late, gateways=gateways
-        )
+        facts = replace(result.facts, gateways=gateways)
+        took = {"ticks": 600, "sim_time_s": 60.0, "wall_time_s": 80.64}
+        run = replace(result, **took, mode="realtime", realtime=late, facts=facts)
         print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
         return row(out.getvalue(), "simulated").partition(" (")[0], row(out.getvalue(), "real time")
 
@@ -102,3 +112,78 @@ def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
         "asked for x 1, took 20.64 s longer; 2 of 600 ticks missed, worst lag 9.99 s",
     )
     assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")
+
+
+class Campaign:
+    name, points, seeds, runs = "a [bold] flock", [{}, {}], list(range(50)), 100
+
+
+def task(runs, failed=0):
+    return TaskResult(tuple({"run": run, "ended": "failed" if run < failed else "duration"} for run in range(runs)))
+
+
+def printed(tasks, terminal, done=0):
+    clock, text = StillClock(), io.StringIO()
+    watcher = SweepProgress(Console(file=text, force_terminal=terminal, width=110), clock)
+    watcher.begin(Campaign(), done, 0)
+    for one in tasks:
+        clock.time_ns += NS_PER_S
+        watcher.see(one)
+    watcher.end()
+    return text.getvalue()
+
+
+def test_plain_lines_tell_how_far_how_fast_and_how_long():
+    lines = printed([task(25), task(25, failed=2), task(50)], terminal=False).splitlines()
+    assert lines == [
+        "a [bold] flock: 2 points x 50 seeds = 100 runs",
+        "25/100 runs, 25.0 runs/s, 3 s left",
+        "50/100 runs, 25.0 runs/s, 2 failed, 2 s left",
+        "100/100 runs, 33.3 runs/s, 2 failed, 0 s left",
+    ]
+
+
+def test_many_pieces_are_a_few_lines_and_what_was_there_is_no_speed():
+    lines = printed([task(1)] * 60, terminal=False, done=40).splitlines()
+    assert lines[0].endswith("; 40 of them are there")
+    assert len(lines) == 7
+    assert lines[-1] == "100/100 runs, 1.0 runs/s, 0 s left"
+
+
+def test_a_bar_shows_the_same():
+    text = printed([task(25, failed=1)], terminal=True)
+    assert "a [bold] flock" in text
+    assert "25/100" in text
+    assert "1 failed" in text
+
+
+TIME = {"unit": "s", "kind": "time", "help": "", "listed": False, "hold_s": 0.0}
+ABOUT = {
+    "format": 1, "name": "times", "scenario": "times", "command": "", "began_utc": "", "versions": {}, "cpu": "",
+    "modules": {}, "files": [], "design": "grid", "seeds": [1, 2, 3, 4], "vary": {}, "points": [{}], "overrides": [],
+    "duration_s": 50.0, "robots": 1, "series": False, "record_seeds": [], "batch": None, "point_overrides": [[]],
+    "responses": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
+}  # fmt: skip
+
+
+def table(folder, stop, find, ends):
+    (folder / "campaign.json").write_text(json.dumps(ABOUT))
+    rows = {"run": [0, 1, 2, 3], "point": [0] * 4, "seed": [1, 2, 3, 4], "ended": ["stopped"] * 4}
+    times = {"sim_time_s": ends, "stop_time_s": stop, "find_time_s": find}
+    pl.DataFrame(rows | times).write_parquet(folder / "summary.parquet")
+    console = Console(width=100)
+    with console.capture() as printed:
+        print_sweep(Sweep(folder, 4, 4, 0), console, "swarmwire")
+    return next(line for line in printed.get().splitlines() if line.startswith("│"))
+
+
+@pytest.mark.parametrize(
+    ("find", "ends", "median"),
+    [
+        ([10.0, None, 30.0, None], [50.0, 20.0, 50.0, 20.0], "30"),  # at risk by 30 s: one run, to which it happens
+        ([10.0, 20.0, 30.0, 40.0], [50.0] * 4, "20"),  # the first by which it has happened to half of them
+        ([10.0, None, None, None], [50.0, 20.0, 5.0, 20.0], "> 20"),  # not 50: nobody was watched so long in vain
+    ],
+)
+def test_a_median_of_times_is_kaplan_and_meiers(tmp_path, find, ends, median):
+    assert f" {median} " in table(tmp_path, [1.0] * 4, find, ends)

@@ -9,21 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.capture import pcapng
-from swarmwire.metrics.capture.frame import Frame
-from swarmwire.metrics.capture.frames_on_air import frames_on_air
-from swarmwire.metrics.capture.link_headers import link_of
-from swarmwire.metrics.record.packet_columns import packet_schema
-from tests.support.metrics.capture.reading import Captured, read
-from tests.unit.world.scenario.test_radio_tables import radio_of
+from swarmwire.metrics.capture import Frame, frames_on_air, interface, link_of, packet, section
+from swarmwire.metrics.run_folder.packets import Packets
+from tests.support.metrics.films import Captured, read
+from tests.unit.world.scenario.test_bodies import radio_of
 
 NAMES = ("a-0", "a-1", "a-2")
 
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
     usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
-    whole = [{**dict.fromkeys(packet_schema()), **usual, **row} for row in rows]
-    return pl.DataFrame(whole, schema=packet_schema())
+    whole = [{**dict.fromkeys(Packets.types), **usual, **row} for row in rows]
+    return pl.DataFrame(whole, schema=Packets.types)
 
 
 def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
@@ -112,15 +109,15 @@ def test_a_radio_without_a_standard_has_a_plain_header():
 
 
 def test_blocks_are_those_of_the_specification():
-    section = "0a0d0d0a 28000000 4d3c2b1a 0100 0000 ffffffffffffffff 0400 0200 73770000 00000000 28000000"
-    assert pcapng.section("sw").hex() == section.replace(" ", "")
-    interface = (
+    expected = "0a0d0d0a 28000000 4d3c2b1a 0100 0000 ffffffffffffffff 0400 0200 73770000 00000000 28000000"
+    assert section("sw").hex() == expected.replace(" ", "")
+    expected = (
         "01000000 30000000 1b01 0000 00000000"
         " 0200 0300 61697200 0300 0200 68690000 0900 0100 09000000 00000000 30000000"
     )
-    assert pcapng.interface(283, "air", "hi").hex() == interface.replace(" ", "")
-    packet = "06000000 28000000 00000000 01000000 02000000 05000000 09000000 0102030405000000 28000000"
-    assert pcapng.packet(2**32 + 2, bytes([1, 2, 3, 4, 5]), 9).hex() == packet.replace(" ", "")
+    assert interface(283, "air", "hi").hex() == expected.replace(" ", "")
+    expected = "06000000 28000000 00000000 01000000 02000000 05000000 09000000 0102030405000000 28000000"
+    assert packet(2**32 + 2, bytes([1, 2, 3, 4, 5]), 9).hex() == expected.replace(" ", "")
 
 
 PACKETS = st.lists(
@@ -133,8 +130,8 @@ PACKETS = st.lists(
 @given(PACKETS)
 def test_what_was_written_is_read_back(tmp_path_factory, packets: list[Captured]):
     path = tmp_path_factory.mktemp("capture") / "some.pcapng"
-    blocks = [pcapng.packet(one.at_ns, one.data, one.length, one.comments) for one in packets]
-    path.write_bytes(pcapng.section("s") + pcapng.interface(147, "n", "d") + b"".join(blocks))
+    blocks = [packet(one.at_ns, one.data, one.length, one.comments) for one in packets]
+    path.write_bytes(section("s") + interface(147, "n", "d") + b"".join(blocks))
     found = read(path)
     assert (found.section, found.interface) == ({4: [b"s"]}, {2: [b"n"], 3: [b"d"], 9: [b"\x09"]})
     assert (found.link_type, found.packets) == (147, packets)
@@ -142,7 +139,5 @@ def test_what_was_written_is_read_back(tmp_path_factory, packets: list[Captured]
 
 def test_a_comment_too_long_for_an_option_is_cut_between_characters(tmp_path):
     path = tmp_path / "long.pcapng"
-    path.write_bytes(
-        pcapng.section("s") + pcapng.interface(147, "n", "d") + pcapng.packet(0, b"", 0, ["é" * 40_000, "next"])
-    )
+    path.write_bytes(section("s") + interface(147, "n", "d") + packet(0, b"", 0, ["é" * 40_000, "next"]))
     assert read(path).packets[0].comments == ["é" * 32_767, "next"]

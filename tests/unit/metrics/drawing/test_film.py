@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.drawing.film import NO_STATE, film_of, states
-from swarmwire.metrics.drawing.footage import MAX_BY_DEFAULT, footage
+from swarmwire.metrics.drawing.film import MAX_BY_DEFAULT, NO_STATE, film_of, footage, states
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
 
 

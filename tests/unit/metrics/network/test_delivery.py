@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.metrics import Metrics
-from swarmwire.metrics.network import link_counts
-from swarmwire.metrics.network.link_counts import LinkCounts
-from swarmwire.metrics.network.radio_tally import RadioTally
-from swarmwire.metrics.network.robot_counts import RobotCounts
-from tests.support.comms.radio.runs import make_medium, packets
-from tests.support.metrics.radio_runs import radio_runs, rows_of
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder import radio_totals as links_table
+from swarmwire.metrics.run_folder.radio_totals import LinkCounts, RobotCounts
+from tests.support.comms.radio import make_medium, packets
+from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch
 
@@ -96,9 +95,9 @@ def test_what_the_ticks_counted_is_what_the_run_counted(ticks):
 def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
     counts = RobotCounts(static(3, arenas=2))
     refused = links([2], [-1], 4, 0, fate=Fate.QUEUE_FULL, receivers=2, arena=1)
-    counts.see(departed([2], intended=2, fate=Fate.QUEUE_FULL, arena=1), refused)
+    counts.add(departed([2], intended=2, fate=Fate.QUEUE_FULL, arena=1), refused)
     ended = links([0, 0], [1, 2], 7, 0, fate=[Fate.RECEIVED, Fate.LOST], arena=1)
-    counts.see(departed([0], intended=5, out_of_range=2, on_air_at_ns=10, off_air_at_ns=40, arena=1), ended)
+    counts.add(departed([0], intended=5, out_of_range=2, on_air_at_ns=10, off_air_at_ns=40, arena=1), ended)
     assert counts.packets.tolist() == [0, 0, 0, 1, 0, 1]
     assert counts.packets_on_air.tolist() == [0, 0, 0, 1, 0, 0]
     assert counts.on_air_ns.tolist() == [0, 0, 0, 30, 0, 0]
@@ -114,8 +113,8 @@ def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
 
 def test_a_link_has_a_row_for_each_fate_that_occurred_on_it():
     counts = LinkCounts(static(3, arenas=2))
-    counts.see(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED]))
-    counts.see(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
+    counts.add(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED]))
+    counts.add(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
     rows = np.column_stack(list(counts.columns().values())).tolist()
     assert rows == [[0, 0, 1, Fate.LOST, 1], [0, 2, 1, Fate.RECEIVED, 2], [1, 2, 1, Fate.LOST, 1]]
 
@@ -127,7 +126,7 @@ def test_robots_have_what_counters_have(run):
     counts, as_sender, as_receiver, got, packets = RobotCounts(of), Counter(), Counter(), Counter(), Counter()
     tally = np.zeros((of.arenas, len(Fate)), np.int64)
     for one in seen:
-        counts.see(one.departed, one.finished)
+        counts.add(one.departed, one.finished)
         tally += one.tally.fates
         columns = ("arena", "sender", "receiver", "receivers", "fate", "size_bytes")
         for arena, sender, receiver, receivers, fate, size in rows_of(one.finished, *columns):
@@ -154,9 +153,9 @@ def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, 
     of, seen = run
     counts, expected = LinkCounts(of), Counter()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(link_counts, "WAITING_ROWS", waiting)
+        patch.setattr(links_table, "WAITING_ROWS", waiting)
         for one in seen:
-            counts.see(one.finished)
+            counts.add(one.finished)
             expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)
         found = counts.columns()
     *link, packets = (column.tolist() for column in found.values())

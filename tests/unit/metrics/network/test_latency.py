@@ -11,15 +11,15 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information
-from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
-from swarmwire.metrics.network.pdr import LinkPacketDeliveryRatio, PacketDeliveryRatio
-from swarmwire.metrics.network.windowed import Window
-from tests.support.comms.radio.runs import make_medium, packets
-from tests.support.metrics.radio_runs import radio_runs, rows_of
+from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
+from swarmwire.metrics.network.latency import LARGEST_NS, RELATIVE_ERROR, LatencyOnAir, LatencyToAgent, LogHistogram
+from tests.support.comms.radio import make_medium, packets
+from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
 
 MS = 1_000_000
+PERCENTS = (0.0, 50.0, 90.0, 99.0, 100.0)
 KINDS = PacketDeliveryRatio, LinkPacketDeliveryRatio, LatencyOnAir, LatencyToAgent
 
 
@@ -231,3 +231,32 @@ def test_of_independent_losses_age_is_what_the_renewals_say(lost):
     # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.
     expected_s = (delay_ms + period_ms * (1 + lost) / (2 * (1 - lost))) / 1000
     assert mean_s == pytest.approx(expected_s, rel=0.02)
+
+
+def percentiles_ns(durations_ns):
+    histogram = LogHistogram(1)
+    values = np.array(durations_ns, np.int64)
+    half = len(values) // 2
+    for part in (values[:half], values[half:]):
+        histogram.add(np.zeros(len(part), np.int64), part)
+    return histogram.percentiles_ns(0, PERCENTS)
+
+
+@given(st.lists(st.one_of(st.integers(0, 20), st.integers(0, LARGEST_NS)), min_size=1, max_size=60))
+def test_percentiles_are_numpys_within_the_stated_error(durations_ns):
+    exact = np.percentile(durations_ns, PERCENTS, method="inverted_cdf")
+    np.testing.assert_allclose(percentiles_ns(durations_ns), exact, rtol=RELATIVE_ERROR * (1 + 1e-9))
+
+
+def test_percentiles_of_many_latencies_are_numpys_within_the_stated_error():
+    durations_ns = np.random.default_rng(3).lognormal(np.log(0.1e9), 1.0, 20_000).astype(np.int64)
+    exact = np.percentile(durations_ns, PERCENTS, method="inverted_cdf")
+    np.testing.assert_allclose(percentiles_ns(durations_ns), exact, rtol=RELATIVE_ERROR)
+
+
+def test_nothing_has_no_percentile():
+    assert np.isnan(percentiles_ns([])).all()
+
+
+def test_what_is_longer_than_the_largest_counts_as_the_largest():
+    assert percentiles_ns([10 * LARGEST_NS])[1] == pytest.approx(LARGEST_NS, rel=RELATIVE_ERROR)

@@ -13,13 +13,12 @@ from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
-from swarmwire.metrics.real_log.measured_log import measured_log
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.robot_log import read_robot_log
 from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.sim_to_real.runs import measured_log
 from tests.support.agent.on_robot.scripted import UTC_NS, DatedFakeClock, ScriptedDriver
-from tests.support.metrics.real_log.as_logs import as_logs
-from tests.support.metrics.real_log.emulated import flock
+from tests.support.metrics.real_logs import as_logs, flock
 
 MEASURES = [
     METRICS[name]() for name in ("order", "speed", "cohesion", "min_gap", "throughput", "link_pdr", "latency_air")

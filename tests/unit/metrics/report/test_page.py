@@ -4,10 +4,8 @@ import re
 
 import pytest
 
-from swarmwire.metrics.report.page import page
-from swarmwire.metrics.report.section import Figure, Listing, Report, Section, Table
-from swarmwire.metrics.report.svg import COLUMN_IN, as_svg, blank_figure
-from tests.support.metrics.report.pages import Page, check_alone
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Report, Section, Table, as_svg, blank_figure, page
+from tests.support.metrics.report import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 

@@ -8,12 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmwire.metrics.statistics.difference import difference
-from swarmwire.metrics.statistics.distances import kolmogorov_smirnov, wasserstein_1
-from swarmwire.metrics.statistics.effect_size import cliffs_delta, hedges_g
-from swarmwire.metrics.statistics.log_rank import log_rank
+from swarmwire.metrics.statistics.difference import (
+    cliffs_delta,
+    difference,
+    hedges_g,
+    kolmogorov_smirnov,
+    wasserstein_1,
+)
 from swarmwire.metrics.statistics.sample import time_sample
-from tests.support.metrics.statistics.samples import number_samples, numbers, placebo, time_samples, times, treated
+from swarmwire.metrics.statistics.survival import log_rank
+from tests.support.metrics.samples import number_samples, numbers, placebo, time_samples, times, treated
 
 
 def censored(value, limit):

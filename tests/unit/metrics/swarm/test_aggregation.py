@@ -8,10 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.aggregation import Aggregation
-from swarmwire.metrics.swarm.aggregation_hop import AggregationHop
-from swarmwire.metrics.swarm.aggregation_time import AggregationTime
-from tests.support.metrics.swarm.swarms import mixed, said, stand, swarms, told
+from swarmwire.metrics.swarm.aggregation import Aggregation, AggregationHop, AggregationTime
+from tests.support.metrics.swarms import mixed, said, stand, swarms, told
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
 gaps = st.sampled_from([None, 0.01, 0.4, 2.0])

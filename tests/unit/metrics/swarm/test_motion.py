@@ -1,15 +1,16 @@
-"""How robots move: their speed, how straight they go, and how often they change sides."""
+"""How robots move and are ordered, and how a swarm stands around its centroid: formulas and known values."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.oscillation import Oscillation
-from tests.support.metrics.swarm.swarms import rolled, stand, told
-from tests.support.metrics.truths import measured, static, truth
+from swarmwire.metrics.swarm.motion import Oscillation
+from swarmwire.metrics.swarm.order import OrderLocal
+from tests.support.metrics.swarms import away_m, mixed, rolled, said, stand, swarms, told
+from tests.support.metrics.truths import measured, poses, static, truth
 
 
 def speed(velocity, **given) -> float:
@@ -132,3 +133,171 @@ def test_oscillation_is_that_of_the_definition(seed, ticks):
         living = np.count_nonzero(alive[:, own])
         values.append(changes / living * PER_MIN if living else np.nan)
     assert oscillation(turn, alive=alive, arenas=2) == pytest.approx(values, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "exact"),
+    [([0.7] * 9, 1.0), ([0.3, 0.3 + np.pi, -1.0, -1.0 - np.pi], 0.0), ([0.0, np.pi / 2], np.sqrt(0.5))],
+)
+def test_headings_that_agree_cancel_or_stand_at_a_right_angle_have_the_known_order(heading_rad, exact):
+    of = static(len(heading_rad))
+    assert measured("order", of, truth(of, pose=poses(heading_rad))) == [pytest.approx(exact, abs=1e-15)]
+
+
+@pytest.mark.parametrize(("robots", "exact"), [(5, 0.402), (10, 0.282), (40, 0.1404), (100, 0.0887), (400, 0.0445)])
+def test_headings_at_random_have_the_known_mean_order(robots, exact):
+    """E[order^2] = 1/N gives a variance below 0.22/N; 5 standard errors of 2000 samples: false alarm 6e-7."""
+    samples = 2000
+    of = static(robots, arenas=samples)
+    heading_rad = np.random.default_rng(1).uniform(-np.pi, np.pi, samples * robots)
+    found = np.array(measured("order", of, truth(of, pose=poses(heading_rad))))
+    tolerance = 5 * np.sqrt(0.22 / robots / samples) + 0.0005  # and the rounding of the table
+    assert found.mean() == pytest.approx(exact, abs=tolerance)
+    assert np.square(found).mean() == pytest.approx(1 / robots, rel=5 / np.sqrt(samples))
+
+
+ranges = st.sampled_from([0.1, 1.0, 3.5])
+
+
+@given(swarms(), ranges)
+def test_local_order_is_that_of_the_formula(swarm, range_m):
+    values = []
+    for pose, _ in swarm.arenas:
+        near = swarm.apart_m(pose) < range_m
+        means = []
+        for i in range(len(pose)):
+            others = [j for j in range(len(pose)) if j != i and near[i, j]]
+            means.append(np.mean([np.cos(pose[i, 2] - pose[j, 2]) for j in others]) if others else 1.0)
+        values.append(np.mean(means) if means else np.nan)
+    assert said(OrderLocal(range_m=range_m), swarm) == pytest.approx(values, abs=1e-12, nan_ok=True)
+
+
+def test_groups_that_agree_each_within_itself_are_ordered_however_they_differ():
+    groups = stand((0, 0, 0), (0.1, 0, 0), (3, 0, np.pi), (3.1, 0, np.pi))
+    assert said("order_local", groups) == [pytest.approx(1.0)]
+    assert said("order", groups) == [pytest.approx(0.0, abs=1e-15)]
+
+
+def test_opposite_neighbours_count_minus_one_and_a_robot_alone_one():
+    assert said("order_local", stand((0, 0, 0), (0.1, 0, np.pi))) == [pytest.approx(-1.0)]
+    assert said("order_local", stand((0, 0, 0), (0.1, 0, np.pi), (3, 0, 0))) == [pytest.approx(-1 / 3)]
+
+
+def test_headings_at_random_have_no_local_order():
+    """A mean of 400 x 190 cosines of pairs, variance 1/2 each and uncorrelated: 5 standard errors, false alarm 6e-7."""
+    rng, arenas, robots = np.random.default_rng(1), 400, 20
+    pose = np.column_stack([np.zeros((arenas * robots, 2)), rng.uniform(-np.pi, np.pi, arenas * robots)])
+    found = np.array(said("order_local", stand(*pose, arenas=arenas)))
+    assert found.mean() == pytest.approx(0.0, abs=5 * np.sqrt(0.5 / (arenas * robots * (robots - 1) / 2)))
+
+
+def order_of_velocities(*velocity):
+    of = static(len(velocity))
+    table = np.zeros((len(velocity), 3))
+    table[:, :2] = velocity
+    return measured("order_velocity", of, truth(of, velocity=table))[0]
+
+
+def test_robots_count_by_their_speed():
+    assert order_of_velocities((0.1, 0.1), (0.2, 0.2), (0.0, 0.0)) == pytest.approx(1.0)
+    assert order_of_velocities((0.3, 0.0), (-0.1, 0.0)) == pytest.approx(0.5)
+    assert order_of_velocities((0.1, 0.0), (0.0, 0.1)) == pytest.approx(np.sqrt(0.5))
+    assert order_of_velocities((0.0, 0.0), (0.0, 0.0)) == 0.0
+
+
+@given(swarms())
+def test_cohesion_is_the_largest_distance_to_the_centroid(swarm):
+    values = [np.hypot(*away_m(swarm, pose).T).max() if len(pose) else np.nan for pose, _ in swarm.arenas]
+    assert said("cohesion", swarm) == pytest.approx(values, abs=1e-9, nan_ok=True)
+
+
+def test_a_ring_has_its_radius():
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = stand(*np.column_stack([1.0 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)]))
+    assert said("cohesion", ring) == [pytest.approx(0.5)]
+
+
+@pytest.mark.parametrize("name", ["cohesion", "dispersion", "rotation"])
+def test_places_spread_evenly_over_a_torus_have_no_centroid(name):
+    at = (-4, 0), (-2, 0), (0, 0), (2, 0)
+    assert np.isnan(said(name, stand(*at, boundary="torus"))).all()
+    assert np.isfinite(said(name, stand(*at))).all()
+
+
+RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
+
+
+def hexagon(rings, apart_m):
+    """A hexagonal packing of so many rings around one robot."""
+    cells = range(-rings, rings + 1)
+    return [((q + 0.5 * r) * apart_m, 0.75**0.5 * r * apart_m) for q in cells for r in cells if abs(q + r) <= rings]
+
+
+@given(swarms())
+def test_dispersion_is_that_of_the_formula(swarm):
+    values = [
+        np.sum(away_m(swarm, pose) ** 2) / (4.0 * np.mean(radius_m**2)) if len(pose) else np.nan
+        for pose, radius_m in swarm.arenas
+    ]
+    assert said("dispersion", swarm) == pytest.approx(values, rel=1e-6, abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.parametrize(("rings", "least"), [(0, 0.0), (1, 6.0), (2, 48.0), (3, 186.0)])
+def test_a_hexagonal_packing_has_its_known_second_moment(rings, least):
+    """Squares of distances in diameters: 6 x 1, then 6 x 4 + 6 x 3, then 6 x 9 + 12 x 7."""
+    packed = stand(*hexagon(rings, 2.0 * RADIUS_M))
+    assert said("dispersion", packed) == [pytest.approx(least, abs=1e-12)]
+    assert said("dispersion", stand(*hexagon(rings, 4.0 * RADIUS_M))) == [pytest.approx(4.0 * least, abs=1e-12)]
+
+
+def test_of_mixed_bodies_the_radius_squared_is_the_mean_of_those_alive():
+    two = stand((0, 0), (1, 0), (0.5, 0))
+    both = replace(two, of=mixed(two.of, 1), alive=np.array([True, True, False]))
+    small_m, large_m = (group.body.radius_m for group in both.of.groups)
+    assert said("dispersion", both) == [pytest.approx(0.5 / (2.0 * (small_m**2 + large_m**2)))]
+
+
+def ring(robots, heading_offset_rad, at=(0.0, 0.0)):
+    angle = np.linspace(0.0, 2.0 * np.pi, robots, endpoint=False)
+    return np.column_stack([at[0] + np.cos(angle), at[1] + np.sin(angle), angle + heading_offset_rad])
+
+
+@given(swarms())
+def test_rotation_is_that_of_the_formula(swarm):
+    values = []
+    for pose, _ in swarm.arenas:
+        away = away_m(swarm, pose) if len(pose) else np.empty((0, 2))
+        length_m = np.hypot(*away.T)
+        # Who is nearly at the centroid is a matter of rounding.
+        assume(not np.any((length_m > 1e-12) & (length_m < 1e-6)))
+        unit = away / np.where(length_m > 1e-12, length_m, np.inf)[:, None]
+        crosses = unit[:, 0] * np.sin(pose[:, 2]) - unit[:, 1] * np.cos(pose[:, 2])
+        values.append(abs(crosses.sum()) / len(pose) if len(pose) else np.nan)
+    assert said("rotation", swarm) == pytest.approx(values, abs=1e-6, nan_ok=True)
+
+
+HALF_TURNED = np.arange(12) % 2 * np.pi
+
+
+@pytest.mark.parametrize(
+    ("offset_rad", "exact"), [(np.pi / 2, 1.0), (-np.pi / 2, 1.0), (0.0, 0.0), (np.pi / 2 + HALF_TURNED, 0.0)]
+)
+def test_a_ring_that_mills_either_way_has_one_and_a_ring_that_opens_or_mills_both_ways_none(offset_rad, exact):
+    assert said("rotation", stand(*ring(12, offset_rad, at=(1.0, -0.5)))) == [pytest.approx(exact, abs=1e-12)]
+
+
+def test_a_ring_that_goes_one_way_has_none():
+    one_way = ring(12, 0.0)
+    one_way[:, 2] = 0.4
+    assert said("rotation", stand(*one_way)) == [pytest.approx(0.0, abs=1e-12)]
+
+
+def test_a_mill_across_the_corner_of_a_torus_is_one():
+    mill = ring(12, np.pi / 2, at=(4.0, 3.0))
+    mill[:, :2] = rolled(mill[:, :2])
+    assert said("rotation", stand(*mill, boundary="torus")) == [pytest.approx(1.0)]
+
+
+def test_a_robot_at_the_centroid_adds_nothing():
+    assert said("rotation", stand((1.0, 1.0, 0.3))) == [0.0]
+    assert said("rotation", stand(*ring(4, np.pi / 2), (0.0, 0.0, 1.0))) == [pytest.approx(0.8)]

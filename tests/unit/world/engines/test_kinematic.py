@@ -1,4 +1,4 @@
-"""Bodies without contacts go exactly where told, wrap on a torus, slide along what holds them back, and fly over."""
+"""The kinematic engine."""
 
 from typing import Any
 
@@ -7,16 +7,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
-from swarmwire.world.engines.engine import EngineConfig, Motors
+from swarmwire.world.engines.discs.engine import DiscsEngine
+from swarmwire.world.engines.engine import Engine, EngineConfig, Motors
 from swarmwire.world.engines.kinematic import KinematicEngine
+from tests.support.world.engines.conformance import EVERY, FLOOR, Make, R, asked, made, packed
 
 RADIUS_M, TICK_S = 0.05, 0.1
 BOX = Obstacle("box", 1.0, 0.0, 0.3, size_m=(0.02, 1.0), height_m=0.5)
 DISC = Obstacle("cylinder", 1.0, 0.0, radius_m=0.2, height_m=0.5)
 TRIANGLE = Obstacle("polygon", 1.0, 0.0, 0.4, points_m=((-0.3, -0.2), (0.3, -0.2), (0.0, 0.4)), height_m=0.5)
+SIDE_M, N = 2.4, 30
+OBSTACLES = (
+    Obstacle("cylinder", 0.2, 0.1, radius_m=0.05),
+    Obstacle("box", -0.6, 0.4, 0.3, size_m=(0.05, 0.3)),
+    Obstacle("polygon", 0.5, -0.6, 1.0, points_m=((-0.05, -0.05), (0.05, -0.05), (0.0, 0.08))),
+)
+SIZE_M, STEP_S, ROBOTS = (4.0, 3.0), 0.1, 30
+BASE_M = 0.14
 
 
 def engine(
@@ -168,3 +178,208 @@ def test_overlaps_are_those_that_brute_force_finds(boundary: str, n: int) -> Non
         if boundary != "walls":
             assert {(int(a), int(i)) for a, i in np.argwhere(moved.touched)} == touching
         before = now
+
+
+def clear_of_obstacles(pose: FloatArray) -> FloatArray:
+    """Those of the poses that stand free."""
+    return pose[[all(np.hypot(x - o.x_m, y - o.y_m) > 0.17 + R for o in OBSTACLES) for x, y, _ in pose]]
+
+
+def wander(engine: Engine, ticks: int, seed: int) -> tuple[list[FloatArray], IntArray]:
+    """Let all robots of every arena wander by the same draws; the states after each tick, and contacts that began."""
+    rng = np.random.default_rng(seed)
+    arenas, n = engine.touched.shape
+    states: list[FloatArray] = []
+    onsets = np.zeros((arenas, 2), np.int64)
+    for _ in range(ticks):
+        target = asked(engine, rng.uniform(0.0, 0.3, n), rng.normal(0.0, 1.0, n), rng.choice([0.0, 0.1], n))
+        onsets += engine.tick(target)
+        states.append(np.concatenate([engine.state, engine.travel_m, engine.touched[:, :, None]], axis=2))
+    return states, onsets
+
+
+@pytest.mark.parametrize("make", EVERY)
+def test_an_arena_moves_bit_for_bit_alike_alone_and_beside_others(make: Make) -> None:
+    poses = [clear_of_obstacles(packed(40, SIDE_M, R, seed)) for seed in range(3)]
+    n = min(len(pose) for pose in poses)
+    poses = [pose[:n] for pose in poses]
+    poses[0][:, :2] *= 0.999  # nothing alike in any two
+    together, onsets = wander(made(make, poses, (SIDE_M, SIDE_M), obstacles=OBSTACLES), 60, 1)
+    assert (onsets > 0).all()
+    for arena, pose in enumerate(poses):
+        alone, of_it = wander(made(make, pose, (SIDE_M, SIDE_M), obstacles=OBSTACLES), 60, 1)
+        assert np.array_equal(np.array(together)[:, arena], np.array(alone)[:, 0])
+        assert np.array_equal(onsets[arena], of_it[0])
+
+
+@pytest.mark.parametrize("make", EVERY)
+def test_an_arena_that_leaves_stays_as_it_is_and_the_others_go_on_as_alone(make: Make) -> None:
+    poses = [clear_of_obstacles(packed(40, SIDE_M, R, seed)) for seed in range(3)]
+    n = min(len(pose) for pose in poses)
+    engine = made(make, [pose[:n] for pose in poses], (SIDE_M, SIDE_M), obstacles=OBSTACLES)
+    ends: list[FloatArray] = []
+    for over in (1, 0):
+        together, _ = wander(engine, 10, over)
+        ends.append(together[-1][over, :, :-1])
+        engine.leave(np.arange(3) == over)
+    together, onsets = wander(engine, 30, 2)
+    assert not onsets[:2].any()
+    for over, end in zip((1, 0), ends, strict=True):
+        assert np.array_equal(together[-1][over, :, :-1], end)
+    other = made(make, poses[2][:n], (SIDE_M, SIDE_M), obstacles=OBSTACLES)
+    alone = [wander(other, ticks, seed) for ticks, seed in ((10, 1), (10, 0), (30, 2))]
+    assert np.array_equal(np.array(together)[:, 2], np.array(alone[-1][0])[:, 0])
+    assert onsets[2].tolist() == alone[-1][1][0].tolist()
+
+
+@pytest.mark.parametrize("make", FLOOR)
+def test_a_crowd_that_is_turned_or_shifted_moves_alike(make: Make) -> None:
+    """To rounding, which grows with each contact: so for a second and a half."""
+    pose = packed(N, 1.5, R, 2)
+    states, onsets = wander(made(make, pose, boundary="open"), 15, 3)
+    assert onsets[0, 0] > 10
+    for turn, shift in ((0.7, (0.0, 0.0)), (np.pi / 2, (0.0, 0.0)), (0.0, (0.31, -0.27)), (2.0, (-0.2, 0.5))):
+        rotate = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        moved = np.column_stack([pose[:, :2] @ rotate.T + shift, pose[:, 2] + turn])
+        there, began = wander(made(make, moved, boundary="open"), 15, 3)
+        assert np.array_equal(began, onsets)
+        assert there[-1][0, :, :2] == pytest.approx(states[-1][0, :, :2] @ rotate.T + shift, abs=1e-6)
+        assert there[-1][0, :, 2] == pytest.approx(states[-1][0, :, 2] + turn, abs=1e-5)
+
+
+def test_robots_far_away_and_faster_change_no_bit() -> None:
+    """In the array engine; pymunk's order of contacts depends on all that there is."""
+    pose = packed(N, 1.5, R, 2)
+    alone, _ = wander(made(DiscsEngine, pose, (40.0, 40.0)), 60, 4)
+    far = packed(20, 1.2, R, 5) + np.array([15.0, 15.0, 0.0])
+    engine = made(DiscsEngine, np.concatenate([pose, far]), (40.0, 40.0))
+    rng = np.random.default_rng(4)
+    for tick in range(60):
+        target = asked(engine, 3.0, 0.5)
+        near = [rng.uniform(0.0, 0.3, N), rng.normal(0.0, 1.0, N), rng.choice([0.0, 0.1], N)]
+        target[0, :N] = np.stack(near, axis=1)
+        engine.tick(target)
+        assert np.array_equal(engine.state[0, :N], alone[tick][0, :, :6])
+
+
+def engine_with(
+    pose: FloatArray, standing: tuple[tuple[Obstacle, ...], ...], arrays: Obstacles, boundary: Any
+) -> KinematicEngine:
+    """Discs of several sizes, every third of them above low obstacles."""
+    n = pose.shape[1]
+    radius_m, bottom_m = np.resize([0.02, 0.1, 0.05, 0.04], n), np.resize([0.0, 0.0, 0.2], n)
+    motors = Motors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
+    of = radius_m, bottom_m, bottom_m + 0.1, motors
+    return KinematicEngine(EngineConfig(SIZE_M, boundary, standing, arrays, *of, STEP_S, 5), pose)
+
+
+def crowded(rng: np.random.Generator, count: int) -> tuple[Obstacle, ...]:
+    """Small and large cylinders and boxes, of which some are low and some reach over the border."""
+    made: list[Obstacle] = []
+    for i in range(count):
+        x, y, heading, long, wide = (
+            rng.uniform(-0.5, 0.5, 5) * [*SIZE_M, 6.0, 1.0, 0.2] + [0, 0, 0, 0.52, 0.12]
+        ).tolist()
+        height_m = 0.1 if i % 4 == 0 else 1.0
+        if i % 2:
+            made.append(Obstacle("cylinder", x, y, radius_m=wide, height_m=height_m))
+        else:
+            made.append(Obstacle("box", x, y, heading, size_m=(long, wide), height_m=height_m))
+    return tuple(made)
+
+
+def held_alike(rng: np.random.Generator, standing: tuple[tuple[Obstacle, ...], ...], boundary: str, ticks: int) -> int:
+    """Robots anywhere go bit for bit as beside one so fast that all obstacles are near; how often one is held back."""
+    pose = rng.uniform(-0.5, 0.5, (len(standing), ROBOTS + 1, 3)) * [*SIZE_M, 6.0]
+    arrays = obstacle_arrays(standing)
+    alone, beside = (engine_with(some, standing, arrays, boundary) for some in (pose[:, :ROBOTS].copy(), pose))
+    held = 0
+    for _ in range(ticks):
+        target = rng.uniform(-1.0, 1.0, pose.shape) * [1.0, 3.0, 0.3]
+        target[:, ROBOTS] = 80.0, 0.0, 0.0  # 8 m in a tick
+        alone.tick(target[:, :ROBOTS].copy())
+        beside.tick(target)
+        held += int(alone.touched.sum())
+        assert alone.state.tobytes() == beside.state[:, :ROBOTS].tobytes()
+        assert alone.travel_m.tobytes() == beside.travel_m[:, :ROBOTS].tobytes()
+    return held
+
+
+@pytest.mark.parametrize("boundary", ["walls", "torus", "open"])
+@pytest.mark.parametrize("count", [3, 40, 120])
+def test_robots_are_held_back_bit_for_bit_as_if_all_obstacles_were_looked_at(boundary: str, count: int) -> None:
+    rng = np.random.default_rng(count)
+    assert held_alike(rng, tuple(crowded(rng, some) for some in (count, 0, count // 2)), boundary, 40)
+
+
+def test_who_is_pushed_far_is_pushed_on_from_there_before_the_wall_holds_it() -> None:
+    posts = tuple(
+        Obstacle("cylinder", *at, radius_m=0.02) for at in np.linspace([-1.9, -1.0], [-1.0, 1.0], 120).tolist()
+    )
+    tower, beyond = Obstacle("cylinder", 1.0, 0.0, radius_m=1.0), Obstacle("cylinder", 2.02, 0.1, radius_m=0.3)
+    standing = ((tower, beyond, *posts),)
+    towards = np.array([0.97, 0.243]) / np.hypot(0.97, 0.243)
+    pose = np.zeros((1, 1, 3))
+    pose[0, 0, :2] = [1.0, 0.0] + 0.1 * towards
+    moved = engine_with(pose, standing, obstacle_arrays(standing), "walls")
+    moved.tick(np.zeros((1, 1, 3)))
+    out = [1.0, 0.0] + 1.02 * towards  # of the tower
+    away = out - [2.02, 0.1]
+    assert moved.state[0, 0, :2] == pytest.approx([2.02, 0.1] + 0.32 * away / np.hypot(*away), abs=1e-12)
+
+
+def test_an_obstacle_that_is_pushed_holds_back_where_it_then_is() -> None:
+    standing = ((Obstacle("cylinder", -1.0, 0.0, radius_m=0.1, mass_kg=1.0),),)
+    arrays = obstacle_arrays(standing)
+    moved = engine_with(np.zeros((1, 1, 3)), standing, arrays, "walls")
+    forward = np.array([[[1.0, 0.0, 0.0]]])
+    moved.tick(forward)
+    arrays.circle[0, 0] = 1.0
+    for _ in range(15):
+        moved.tick(forward)
+    assert moved.state[0, 0, 0] == pytest.approx(1.0 - 0.1 - 0.02)
+
+
+@pytest.mark.parametrize("make", EVERY)
+@pytest.mark.parametrize("steps", [1, 5])
+@given(
+    forward=st.floats(-0.3, 0.3),
+    left=st.floats(-0.3, 0.3),
+    turn=st.floats(-2.0, 2.0),
+    heading=st.floats(-3.1, 3.1),
+)
+def test_a_robot_drives_chords_of_its_arc(
+    make: Make, steps: int, forward: float, left: float, turn: float, heading: float
+) -> None:
+    engine = made(make, [[0.1, -0.2, heading]], steps=steps)
+    target = asked(engine, forward, turn, left)
+    for _ in range(3):
+        engine.tick(target)
+    x, y, start = engine.state[0, 0, :3]
+    rolled = engine.travel_m[0, 0].copy()
+    for _ in range(10):
+        engine.tick(target)
+    chord = np.sinc(turn / (2.0 * np.pi))
+    along, across = start + turn / 2.0, start + turn / 2.0 + np.pi / 2.0
+    at_x = x + chord * (forward * np.cos(along) + left * np.cos(across))
+    at_y = y + chord * (forward * np.sin(along) + left * np.sin(across))
+    # The path of k steps is k chords, each longer than its own by (turn per step)^2 / 24.
+    slack = 1e-9 + np.hypot(forward, left) * (turn * 0.1 / steps) ** 2 / 20
+    assert engine.state[0, 0, :2] == pytest.approx((at_x, at_y), abs=slack)
+    assert engine.state[0, 0, 2] - start == pytest.approx(turn, abs=1e-9)
+    wheels = forward - 0.5 * BASE_M * turn, forward + 0.5 * BASE_M * turn
+    assert engine.travel_m[0, 0] - rolled == pytest.approx(wheels, abs=1e-9)
+
+
+@pytest.mark.parametrize("make", FLOOR)
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_speed_builds_up_and_turns_with_the_grip_that_there_is(make: Make, heading: float) -> None:
+    """From driving ahead to driving across: velocity changes by force / mass along the straight line between both."""
+    engine = made(make, [[0.0, 0.0, heading]], max_force_n=1.6, mass_kg=1.6, steps=50)
+    for _ in range(4):
+        engine.tick(asked(engine, 0.3))
+    for tick in range(1, 4):
+        engine.tick(asked(engine, 0.0, 0.0, 0.4))
+        ahead = np.array([np.cos(heading), np.sin(heading)])
+        wanted = ahead * (0.3 - 0.06 * tick * 10 / 10) + np.array([-ahead[1], ahead[0]]) * 0.08 * tick
+        assert engine.state[0, 0, 3:5] == pytest.approx(wanted, abs=1e-6)

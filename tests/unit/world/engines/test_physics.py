@@ -1,4 +1,8 @@
-"""Robots follow commands within the limits of their wheels, stop at what they hit, and contacts are counted once."""
+"""Physics: which engine, its steps, and movable obstacles."""
+
+import re
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,11 +10,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, load_of
+from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.world import World
-from tests.support.world.samples import commanded, posed
+from tests.support.world.scenes import commanded, posed, wandering
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 CLOSING_STEPS = [2, 3, 5, 10, 20]
+WALL = [[-0.3, -0.5], [0.1, -0.5], [0.1, 0.5], [-0.3, 0.5]]
+MOVABLE = {"shape": "cylinder", "radius_m": 0.1, "at": [0.0, 0.0], "movable": True, "mass_kg": 0.1}
+ARENA = {"size_m": [4.0, 4.0]}
+EPUCK_BODY = load_body("epuck")
+CYLINDER = {"shape": "cylinder", "radius_m": 0.1}
+BOX = {"shape": "box", "size_m": [0.3, 0.2], "heading_rad": 0.3}
+WEDGE = {"shape": "polygon", "points": [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]], "heading_rad": -0.4}
+SHAPES = [CYLINDER, BOX, WEDGE]
 
 
 def overlaps_of_a_crash(body: str, steps: int, poses: list[list[float]]) -> tuple[list[float], np.ndarray]:
@@ -51,9 +67,6 @@ def test_a_robot_that_drives_at_a_wall_stops_there(body: str, steps: int) -> Non
     assert -0.01 * kind.radius_m <= overlaps[-1]
     assert max(overlaps[-20:]) <= 0.02 * kind.radius_m
     assert onsets.tolist() == [0, 1]
-
-
-WALL = [[-0.3, -0.5], [0.1, -0.5], [0.1, 0.5], [-0.3, 0.5]]
 
 
 @pytest.mark.parametrize(
@@ -178,3 +191,228 @@ def test_a_dense_crowd_stays_apart_and_inside() -> None:
     distance = np.hypot(*(xy[:, None] - xy).transpose(2, 0, 1)) + 10.0 * np.eye(len(xy))
     assert 2 * r - distance.min() < 0.06 * r
     assert np.abs(xy).max() + r - 2.0 < 0.03 * r
+
+
+def engines(**tables: Any) -> tuple[str, ...]:
+    return World(posed([[-1.0, 0.0, 0.0]], **tables), [1], {}).engines
+
+
+def test_discs_move_robots_unless_an_obstacle_is_movable() -> None:
+    assert engines() == ("discs",)
+    assert engines(arena={**ARENA, "obstacles": [MOVABLE]}) == ("pymunk",)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_engine_that_is_asked_for_is_taken(engine: str) -> None:
+    assert engines(physics={"engine": engine}) == (engine,)
+
+
+@pytest.mark.parametrize(
+    ("physics", "arena", "text"),
+    [
+        (
+            {"engine": "discs"},
+            {"obstacles": [{"shape": "cylinder", "radius_m": 0.1, "at": [1.0, 1.0]}, MOVABLE]},
+            "physics.engine: expected auto or pymunk: discs moves no obstacles, and arena.obstacles.1 is movable",
+        ),
+        (
+            {"engine": "kinematic"},
+            {"obstacles": [MOVABLE]},
+            "arena.obstacles.0.movable: expected a robot with contacts that could push it: all robots are moved "
+            "without contacts",
+        ),
+        (
+            {},
+            {"boundary": "torus"},
+            "arena.boundary: expected walls or open: on a torus no robot has contacts, and epuck (robots.a) does; "
+            'physics.engine = "kinematic" takes them all off the floor',
+        ),
+        (
+            {},
+            {"obstacles": [{**MOVABLE, "mass_kg": -1.0}]},
+            "arena.obstacles.0.mass_kg: expected a number above 0 and at most 10000 (kg), got -1.0",
+        ),
+        (
+            {},
+            {"obstacles": [{key: value for key, value in MOVABLE.items() if key != "mass_kg"}]},
+            "arena.obstacles.0.mass_kg: is missing; expected the mass of what is movable (kg)",
+        ),
+        (
+            {},
+            {"obstacles": [{**MOVABLE, "movable": False}]},
+            "arena.obstacles.0.mass_kg: expected a mass only with movable = true",
+        ),
+    ],
+)
+def test_contradictions_are_refused_with_file_key_and_reason(
+    physics: dict[str, Any], arena: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(BadInput, match=f"^posed: {re.escape(text)}$"):
+        posed([[-1.0, 0.0, 0.0]], physics=physics, arena={**ARENA, **arena})
+
+
+@pytest.mark.parametrize("engine", ["discs", "pymunk"])
+def test_an_engine_that_could_move_nobody_is_refused(engine: str, tmp_path: Path) -> None:
+    drone = tmp_path / "drone.toml"
+    drone.write_text('like = "epuck"\nname = "drone"\naltitude_m = 1.0\n')
+    table = {"count": 1, "agent": "x"}
+    ghosts, medium, floor = ({**table, "body": body} for body in ("point", str(drone), "epuck"))
+    told = "expected auto or kinematic: no robot could be moved by"
+    with pytest.raises(BadInput, match=rf"physics\.engine: {told} {engine}: a has no contacts, b flies$"):
+        posed([], robots={"a": ghosts, "b": medium}, physics={"engine": engine})
+    posed([], robots={"a": ghosts, "b": floor}, physics={"engine": engine})
+
+
+def test_robots_without_contacts_may_be_faster_than_physics_steps_allow() -> None:
+    with pytest.raises(BadInput, match=r"physics\.steps: expected at least 2"):
+        posed([[-1.0, 0.0, 0.0]], physics={"steps": 1})
+    posed([[-1.0, 0.0, 0.0]], physics={"steps": 1, "engine": "kinematic"})
+
+
+def test_floor_and_air_stand_side_by_side_in_one_arena(tmp_path: Path) -> None:
+    """Each moves as it does with its own kind alone."""
+    drone = tmp_path / "drone.toml"
+    drone.write_text('like = "footbot"\nname = "drone"\naltitude_m = 1.0\ncontacts = false\n')
+    flock = {"body": "epuck", "count": 3, "agent": "x"}
+    poses = [[-0.5, 0.0, 0.0], [0.5, 0.0, np.pi], [0.0, 1.0, 0.0]]
+    above = {"how": "poses", "poses": [[-0.5, 0.0, 0.0], [0.5, 0.05, np.pi]]}
+    robots = {
+        "air": {"body": str(drone), "count": 2, "agent": "x", "place": above},
+        "floor": {**flock, "place": {"how": "poses", "poses": poses}},
+    }
+    both = World(posed([], robots=robots), [1, 2], {})
+    alone = {name: World(posed([], robots={name: table}), [1, 2], {}) for name, table in robots.items()}
+    assert both.engines == ("discs", "kinematic")
+    rows = {"air": [0, 1, 5, 6], "floor": [2, 3, 4, 7, 8, 9]}
+    for tick in range(60):
+        if tick == 40:
+            both.live(np.arange(10) != 3)
+            alone["floor"].live(np.arange(6) != 1)
+        onsets = both.move(commanded(both, 0.1, 0.05))
+        apart = [world.move(commanded(world, 0.1, 0.05)) for world in alone.values()]
+        assert np.array_equal(onsets, sum(apart))
+        for name, world in alone.items():
+            assert np.array_equal(both.pose[rows[name]], world.pose)
+            assert np.array_equal(both.velocity[rows[name]], world.velocity)
+            at = [row % 5 for row in rows[name][: len(rows[name]) // 2]]
+            assert np.array_equal(both._physics.touched[:, at], world._physics.touched)
+            assert np.array_equal(both._physics.travel_m[:, at], world._physics.travel_m)
+
+
+def world_with(*obstacles: dict[str, Any], poses: Any, mass_kg: float = 0.1, needs: Any = None) -> World:
+    """E-pucks among movable obstacles."""
+    tables = [{"movable": True, "mass_kg": mass_kg, **table} for table in obstacles]
+    arena = {"size_m": [4.0, 4.0], "obstacles": tables}
+    return World(posed(poses, arena=arena), [1], needs or {})
+
+
+def pose_of(world: World, which: int = 0) -> np.ndarray:
+    assert world.movable is not None
+    return world.movable[0, which]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_robot_pushes_what_it_has_the_force_for(shape: dict[str, Any]) -> None:
+    world = world_with({**shape, "at": [0.0, 0.0]}, poses=[[-0.5, 0.02, 0.0]])
+    start = pose_of(world).copy()
+    onsets = np.zeros((1, 2), np.int64)
+    for _ in range(70):
+        onsets += world.move(commanded(world, 0.1, 0.0))
+        if shape is CYLINDER:
+            apart = np.hypot(*(pose_of(world)[:2] - world.pose[0, :2]))
+            assert apart > 0.1 + EPUCK_BODY.radius_m - 1.2 * 0.1 * 0.02  # closing speed x step
+    assert pose_of(world)[0] > start[0] + 0.15
+    assert np.array_equal(onsets, [[0, 1]])
+    assert world.engines == ("pymunk",)
+
+
+def test_an_obstacle_whose_friction_is_stronger_than_the_robot_stays_where_it_is() -> None:
+    held_kg = EPUCK_BODY.drive.max_force_n / (FLOOR_FRICTION * GRAVITY_MPS2)
+    moved = [
+        world_with({**CYLINDER, "at": [0.0, 0.0]}, poses=[[-0.5, 0.0, 0.0]], mass_kg=share * held_kg)
+        for share in (0.9, 1.1)
+    ]
+    for world in moved:
+        for _ in range(100):
+            world.move(commanded(world, 0.1, 0.0))
+    assert pose_of(moved[0])[0] > 0.1
+    assert abs(pose_of(moved[1])[0]) < 2e-3
+
+
+def test_a_push_off_the_centre_turns_a_box_and_friction_stops_it() -> None:
+    world = world_with({**BOX, "heading_rad": 0.0, "at": [0.0, 0.0]}, poses=[[-0.4, 0.08, 0.0]])
+    for _ in range(60):
+        world.move(commanded(world, 0.1, 0.0))
+    assert pose_of(world)[2] < -0.1
+    for _ in range(5):
+        world.move(commanded(world, -0.1, 0.0))
+    at = pose_of(world).copy()
+    for _ in range(20):
+        world.move(commanded(world, -0.05, 0.0))
+    assert np.array_equal(pose_of(world), at)
+
+
+def test_an_undriven_obstacle_gains_no_energy() -> None:
+    """Once it is let go it slides no farther than its speed and the floor's friction allow."""
+    world = world_with({**CYLINDER, "at": [0.0, 0.0]}, poses=[[-0.3, 0.0, 0.0]], mass_kg=0.2)
+    for _ in range(30):
+        world.move(commanded(world, 0.12, 0.0))
+    start = pose_of(world)[0]
+    for _ in range(10):
+        world.move(commanded(world, -0.12, 0.0))
+    assert pose_of(world)[0] - start <= 0.12**2 / (2.0 * FLOOR_FRICTION * GRAVITY_MPS2) + 0.12 * 0.1
+
+
+@pytest.mark.parametrize("seeds", [[5], [4, 5, 6]])
+def test_the_arrays_that_sensors_and_radio_look_at_follow(seeds: list[int]) -> None:
+    tables = [
+        {"shape": "box", "size_m": [0.2, 0.2], "at": [1.5, 1.5]},
+        *({**shape, "place": "random", "count": 3, "movable": True, "mass_kg": 0.05} for shape in SHAPES),
+        {"shape": "cylinder", "radius_m": 0.1, "at": [-1.5, 1.5]},
+    ]
+    group = {"body": "epuck", "count": 40, "agent": "x"}
+    arena = {"size_m": [4.0, 4.0], "obstacles": tables}
+    world = World(posed([], arena=arena, robots={"a": group}), seeds, {})
+    assert world.movable is not None
+    start = world.movable
+    for tick in range(150):
+        world.move(wandering(world, tick))
+    assert (np.hypot(*(world.movable - start)[..., :2].reshape(-1, 2).T) > 0.01).sum() >= len(seeds)
+    static = world.static
+    now = tuple(
+        (own[0], *static.movable_at(arena, world.movable[arena]), own[-1]) for arena, own in enumerate(static.obstacles)
+    )
+    expected = obstacle_arrays(now)
+    for have, want in zip(world.obstacles, expected, strict=True):
+        assert np.allclose(have, want, atol=1e-12)
+    if len(seeds) > 1:
+        alone = World(posed([], arena=arena, robots={"a": group}), [5], {})
+        for tick in range(150):
+            alone.move(wandering(alone, tick))
+        assert alone.movable is not None
+        assert np.array_equal(alone.movable[0], world.movable[1])
+
+
+def test_a_robot_senses_the_obstacle_that_another_pushes_towards_it() -> None:
+    poses = [[-0.3, 0.0, 0.0], [0.5, 0.0, np.pi]]
+    world = world_with({**CYLINDER, "at": [0.0, 0.0]}, poses=poses, needs={"a": ["proximity"]})
+    before = world.sense(0)["a"].fields["proximity.value"][1].max()
+    for _ in range(120):
+        world.move(commanded(world, [0.1, 0.0], 0.0))
+    after = world.sense(1)["a"].fields["proximity.value"][1].max()
+    assert before < 0.2
+    assert after > 0.5
+
+
+def test_friction_turns_by_the_mean_distance_of_the_area() -> None:
+    world = world_with({**BOX, "at": [0.0, 0.0]}, {**CYLINDER, "at": [1.0, 1.0]}, poses=[[-1.0, 0.0, 0.0]])
+    box, cylinder = (load_of(obstacle) for obstacle in world.static.obstacles[0])
+    x, y = np.meshgrid(0.3 * (np.arange(600) + 0.5) / 600 - 0.15, 0.2 * (np.arange(400) + 0.5) / 400 - 0.1)
+    assert box.reach_m == pytest.approx(np.hypot(x, y).mean(), rel=1e-3)
+    assert cylinder.reach_m == pytest.approx(0.2 / 3.0)
+
+
+def test_a_polygon_s_mass_is_where_its_area_is() -> None:
+    world = world_with({**WEDGE, "at": [0.2, 0.1]}, poses=[[-1.0, 0.0, 0.0]])
+    load, corners = load_of(world.static.obstacles[0][0]), world.static.obstacles[0][0].corners_m
+    assert (load.x_m, load.y_m) == pytest.approx(tuple(corners.mean(axis=0)))  # a triangle's

@@ -1,4 +1,4 @@
-"""Maps become boxes that cover what is dark and no more; what can be neither map nor floor is refused at the door."""
+"""Layouts of the arena."""
 
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,55 @@ from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import SAMPLE, changed
+from tests.support.world.scenes import SAMPLE, changed
 
 GREY = np.full((20, 40), 254, np.uint8)
 GREY[:, 0] = GREY[0] = 0
 GREY[10:12, 5:30] = 100
+NO_ROOM = [
+    (
+        "robots.flock.place",
+        {"how": "disc", "radius_m": 0.8, "apart_m": 0.6},
+        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.apart_m",
+        3.0,
+        "arena.obstacles.0: no room for cylinder 3 of 4 with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.within",
+        {"how": "disc", "radius_m": 0.5, "at": [9.0, 0.0]},
+        "arena.obstacles.0: no room for cylinder 1 of 4 with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.lights.0.apart_m",
+        5.5,
+        "arena.lights.0: no room for light [12] of 2 with seed 1: none of 1000 places",
+    ),
+    (
+        "robots.flock.place.radius_m",
+        0.08,
+        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.obstacles.0.radius_m",
+        1.5,
+        "arena.obstacles.0: no room for cylinder 2 of 4 with seed 1: none of 1000 places",
+    ),
+    (
+        "arena.lights",
+        [{"intensity": 1.0, "at": [1.0, 1.04]}],
+        r"arena.lights.0: no room for light 1 of 1 with seed 1: at \(1, 1.04\) it is outside or in an obstacle",
+    ),
+    ("arena.lights", [{"intensity": 1.0, "at": [3.1, 0]}], r"at \(3.1, 0\) it is outside or in an obstacle"),
+    ("robots.flock.place", {"how": "grid", "spacing_m": 2.0}, "no room for flock-0 with seed 1: at "),
+    (
+        "robots.flock.place",
+        {"how": "poses", "poses": [[0, 0, 0]] * 12},
+        r"no room for flock-1 with seed 1: at \(0, 0\)",
+    ),
+]
 
 
 def written(folder: Path, arena: dict[str, Any]) -> Path:
@@ -196,3 +240,12 @@ def test_heights_of_obstacles_are_those_of_the_file() -> None:
     low = World(scenario_from(changed("arena.obstacles.1.height_m", 0.2), "f"), (1,), {}).static.obstacles[0]
     assert [obstacle.height_m for obstacle in low] == [np.inf] * 4 + [0.2] + [np.inf] * 2
     assert SAMPLE["arena"]["obstacles"][1].get("height_m") is None
+
+
+@pytest.mark.parametrize(("path", "value", "text"), NO_ROOM)
+def test_what_finds_no_room_is_named(path: str, value: Any, text: str) -> None:
+    mapping = changed(path, value)
+    if "robots" in path:
+        mapping["arena"]["obstacles"] = []
+    with pytest.raises(BadInput, match=f"^file.toml: .*{text}"):
+        World(scenario_from(mapping, "file.toml"), [1], {})

@@ -16,7 +16,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle, Static
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.samples import SAMPLE, changed
+from tests.support.world.scenes import SAMPLE, changed
 
 
 def built(mapping: dict[str, Any], *seeds: int) -> World:

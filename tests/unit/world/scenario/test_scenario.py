@@ -1,16 +1,23 @@
-"""A scenario is read whole, or refused with the file and the key; overrides change it by path."""
+"""Scenarios: read, checked, and written."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.partition import Partition
+from swarmwire.comms.events.robot_events import Kill
+from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.scenario import Scenario, mapping_of, same_content
+from swarmwire.world.scenario.schema import Node, plain, words
+from swarmwire.world.scenario.tables import MetricTable
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
-from tests.support.world.samples import SAMPLE, changed, without
+from tests.support.deploy.runs import LOSSY, ROOT
+from tests.support.world.scenes import SAMPLE, changed, without
 
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
 FLAT = [[0, 0], [1, 0], [2, 0]]
@@ -87,6 +94,31 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("run.watchdog_s", 0, "run.watchdog_s"),
     ("wind", [], "wind"),
 ]
+MINIMAL = """
+format = 1
+name = "small"
+duration_s = 1
+arena = { size_m = [2, 2], obstacles = [{ shape = "cylinder", radius_m = 0.1, at = [0.5, 0.5] }] }
+robots.flock = { body = "epuck", count = 2, agent = "a:B" }
+"""
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+SCHEMA: Node = {"$defs": {"Disc": {"type": "object", "properties": {"radius_m": {"type": "number"}}}}}
+FLOCK = {"group": "flock"}
+METRIC_FAULTS: list[tuple[str, Any, str]] = [
+    ("standard_metrics", 1, "standard_metrics"),
+    ("metrics", "order", "metrics"),
+    ("metrics", ["order", 5], "metrics.1"),
+    ("metrics", [""], "metrics.0"),
+    ("metrics", [{"gap_m": 1}], "metrics.0.metric"),
+    ("stop", 3, "stop"),
+    ("stop", [3], "stop.0"),
+    ("stop", {"above": 1}, "stop.metric"),
+    ("stop", {"metric": "order"}, "stop"),
+    ("stop", [{"metric": "order", "above": 1, "below": 2}], "stop.0"),
+    ("stop", {"metric": "order", "above": "x"}, "stop.above"),
+    ("stop", {"metric": "order", "abov": 1}, "stop.abov"),
+    ("stop", [{"metric": "order", "above": 1, "hold_s": -1}], "stop.0.hold_s"),
+]
 
 
 @pytest.mark.parametrize(("path", "value", "key"), FAULTS)
@@ -141,15 +173,6 @@ def written(folder: Path, text: str) -> Path:
     path = folder / "s.toml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-MINIMAL = """
-format = 1
-name = "small"
-duration_s = 1
-arena = { size_m = [2, 2], obstacles = [{ shape = "cylinder", radius_m = 0.1, at = [0.5, 0.5] }] }
-robots.flock = { body = "epuck", count = 2, agent = "a:B" }
-"""
 
 
 def test_a_file_is_read_and_overrides_are_toml_values_or_else_texts(tmp_path: Path) -> None:
@@ -213,3 +236,182 @@ def test_a_scenario_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="frozen"):
         scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen: that is what is tested
     assert isinstance(scenario, Scenario)
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_what_was_read_comes_back_as_it_was_written(path):
+    assert mapping_of(load_scenario(path)) == tomllib.loads(path.read_text())
+
+
+def test_overrides_are_part_of_it():
+    mapping = mapping_of(load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"]))
+    assert mapping["radio"]["loss"] == 0.25
+    assert mapping["run"] == {"on_runner_loss": "dead"}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_a_scenario_that_was_changed_in_python_says_what_it_is_now(path):
+    changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
+    mapping = mapping_of(changed)
+    assert mapping["duration_s"] == 1.5
+    assert same_content(scenario_from(mapping, str(path)), changed)  # beside the pictures that it names
+
+
+def test_the_mapping_is_the_callers_own():
+    scenario = load_scenario(LOSSY)
+    mapping_of(scenario)["robots"]["flock"]["count"] = 1
+    assert mapping_of(scenario)["robots"]["flock"]["count"] == 20
+
+
+@pytest.mark.parametrize(
+    ("node", "said"),
+    [
+        ({"type": "integer", "minimum": 1, "maximum": 1000}, "a whole number of at least 1 and at most 1000"),
+        ({"type": "number", "exclusiveMinimum": 0, "unit": "s"}, "a number above 0 (s)"),
+        ({"enum": ["walls", "open"]}, "one of walls, open"),
+        ({"const": 1}, "1"),
+        ({"type": "string", "minLength": 1}, "a text that is not empty"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "string"}]}, "true or false or a text"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "null"}]}, "true or false"),
+        ({"type": "array", "prefixItems": [{"type": "number"}, {"type": "number"}]}, "a list of 2 numbers"),
+        ({"$ref": "#/$defs/Disc"}, "a table"),
+    ],
+)
+def test_a_key_is_told_in_words(node, said):
+    assert words(node, SCHEMA) == said
+
+
+def test_a_reference_that_may_be_null_leads_to_its_table():
+    node = {"anyOf": [{"$ref": "#/$defs/Disc"}, {"type": "null"}], "default": None}
+    assert plain(node, SCHEMA) == SCHEMA["$defs"]["Disc"]
+
+
+def event(do: str = "kill", at_s: Any = 1.0, **keys: Any) -> dict[str, Any]:
+    return {"at_s": at_s, "do": do, **keys}
+
+
+def kill(**robots: Any) -> dict[str, Any]:
+    return event(robots=robots)
+
+
+def partition(*between: list[str]) -> dict[str, Any]:
+    return event("partition", between=list(between))
+
+
+EVENT_FAULTS: list[tuple[Any, str]] = [
+    (3, "events.0"),
+    ({"at_s": 1.0}, "events.0.do"),
+    (event("burn"), "events.0.do"),
+    ({"do": "revive", "robots": FLOCK}, "events.0.at_s"),
+    (event(at_s=-1.0, robots=FLOCK), "events.0.at_s"),
+    (event(robots=FLOCK, for_s=-1.0), "events.0.for_s"),
+    (event("revive", robots=FLOCK, for_s=1.0), "events.0.for_s"),
+    (event(), "events.0.robots"),
+    (kill(), "events.0.robots"),
+    (kill(group="flok"), "events.0.robots.group"),
+    (kill(names=["flock-12"]), "events.0.robots.names"),
+    (kill(names=["flock-01"]), "events.0.robots.names"),
+    (kill(names=["flock"]), "events.0.robots.names"),
+    (kill(names=[]), "events.0.robots.names"),
+    (kill(names=["flock-1"], count=1), "events.0.robots"),
+    (kill(share=0.5, count=1), "events.0.robots"),
+    (kill(group="flock", share=0.0), "events.0.robots.share"),
+    (kill(group="flock", share=1.1), "events.0.robots.share"),
+    (kill(count=0), "events.0.robots.count"),
+    (partition(["flock"]), "events.0.between"),
+    (partition(["flock"], []), "events.0.between.1"),
+    (partition(["flock"], ["small"]), "events.0.between.1"),
+    (partition(["flock"], ["flock-3", "big"]), "events.0.between.1"),
+    (event("partition"), "events.0"),
+    (event("partition", halves="x", isolate=["big"]), "events.0"),
+    (event("partition", halves="z"), "events.0.halves"),
+    (event("partition", isolate=[]), "events.0.isolate"),
+    (event("partition", bridge=["tall"]), "events.0.bridge"),
+    (event("partition", region={}), "events.0.region"),
+    (event("partition", region={"radius_m": 1.0, "size_m": [1.0, 1.0]}), "events.0.region"),
+    (event("partition", region={"size_m": [1.0, 0.0]}), "events.0.region.size_m"),
+    (event("partition", region={"radius_m": -1.0}), "events.0.region.radius_m"),
+    (event("partition", isolate=["big"], one_way=True), "events.0.one_way"),
+    (event("partition", between=[["flock-0"], ["flock-1"], ["big"]], one_way=True), "events.0.one_way"),
+    (event("blackout", robots={"group": "x"}), "events.0.robots.group"),
+]
+
+
+def ramp(what: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
+    return event("ramp", what=what, to=to, **keys)
+
+
+OF_RADIOS: list[tuple[Any, str]] = [
+    (event("gain", robots=FLOCK), "events.0"),
+    (event("gain", robots=FLOCK, send_db=-3.0), "events.0.do"),
+    (event("gain", robots=FLOCK, send_db=1e3), "events.0.send_db"),
+    (event("jammer", at=[0.0, 0.0]), "events.0.power_dbm"),
+    (event("jammer", power_dbm=0.0), "events.0"),
+    (event("jammer", at=[0.0, 0.0], robots=FLOCK, power_dbm=0.0), "events.0"),
+    (event("jammer", at=[0.0, 0.0], power_dbm=0.0, duty=0.0), "events.0.duty"),
+    (event("jammer", at=[0.0, 0.0], power_dbm=0.0, period_s=1e-6), "events.0.period_s"),
+    (event("jammer", at=[0.0], power_dbm=0.0), "events.0.at.1"),
+    (event("jammer", at=[0.0, 0.0], power_dbm=0.0), "events.0.do"),
+    (event("ramp", to=0.5), "events.0.what"),
+    (ramp("loss"), "events.0.what"),
+    (ramp("radio.lose"), "events.0.what"),
+    (ramp("radio.loss.x"), "events.0.what"),
+    (ramp("radio.frame"), "events.0.what"),
+    (ramp("radio.measures"), "events.0.what"),
+    (ramp("radio.line_of_sight"), "events.0.what"),
+    (ramp("radio.bursts.bad_s"), "events.0.what"),
+    (ramp("radio.send_offset"), "events.0.what"),
+    (ramp("radio.loss", 1.5), "events.0.to"),
+    (ramp("radio.latency_s", -1.0), "events.0.to"),
+    (ramp("radio.queue_limit", 2.5), "events.0.to"),
+    (ramp("radio.loss", over_s=-1.0), "events.0.over_s"),
+]
+
+
+@pytest.mark.parametrize(("table", "key"), EVENT_FAULTS + OF_RADIOS)
+def test_a_fault_is_refused_with_its_key_in_an_event(table: Any, key: str):
+    with pytest.raises(BadInput) as caught:
+        scenario_from(changed("events", [table]), "f.toml")
+    assert (caught.value.where, caught.value.key) == ("f.toml", key)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"]), ramp("radio.loss")])
+def test_without_a_radio_there_is_nothing_to_disturb(table: Any):
+    mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
+    with pytest.raises(BadInput) as caught:
+        scenario_from(mute, "f")
+    assert caught.value.key == "events.0.do"
+
+
+def test_events_are_read_as_what_they_are_also_after_the_end():
+    tables = [event(at_s=1e6, robots={**FLOCK, "share": 0.05}, for_s=20.0), partition(["flock-1", "big"], ["flock-0"])]
+    assert scenario_from(changed("events", tables), "f").events == (
+        Kill(at_s=1e6, for_s=20.0, robots=Selection(group="flock", share=0.05)),
+        Partition(at_s=1.0, between=(("flock-1", "big"), ("flock-0",))),
+    )
+
+
+@pytest.mark.parametrize(("path", "value", "key"), METRIC_FAULTS)
+def test_a_fault_of_what_is_measured_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        scenario_from(changed(path, value), "file.toml")
+    assert (caught.value.where, caught.value.key) == ("file.toml", key)
+
+
+def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_none() -> None:
+    order = {"metric": "order", "at_least": 1, "hold_s": 2}
+    [(path, table)] = scenario_from(changed("stop", order), "file.toml").stops().items()
+    assert (path, table.metric, table.comparison, table.hold_s) == ("stop", "order", ("at_least", 1.0), 2.0)
+    assert list(scenario_from(changed("stop", [order, order]), "file.toml").stops()) == ["stop.0", "stop.1"]
+    assert scenario_from(changed("stop", []), "file.toml").stops() == {}
+    assert scenario_from(changed("stop", order), "file.toml", ["stop=[]"]).stops() == {}
+
+
+def test_a_metrics_parameters_stand_beside_its_name_and_can_be_set() -> None:
+    given = changed("metrics", ["order", {"metric": "fragmentations", "hold_s": 2.0}])
+    scenario = scenario_from(given, "file.toml", ["metrics.1.hold_s=3.0"])
+    assert scenario.metrics == ("order", MetricTable(metric="fragmentations", hold_s=3.0))
+    assert [item.params for item in scenario.metrics if isinstance(item, MetricTable)] == [{"hold_s": 3.0}]
+    again = mapping_of(scenario.model_copy(update={"duration_s": 2.0}))
+    assert again["metrics"] == ["order", {"metric": "fragmentations", "hold_s": 3.0}]

@@ -1,7 +1,4 @@
-"""Over signals, how time, world or backend are divided changes nothing.
-
-Each fate is computed once more from its draws.
-"""
+"""Each fate over signals is computed once more from its draws; the cut-off decides who disturbs."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,72 +8,30 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.draws import derive_key, purpose, uniform
-from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxResult
+from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
-from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
-from tests.support.comms.radio.runs import Run, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio import (
+    METHODS,
+    Run,
+    at,
+    drawing,
+    everybody,
+    make_medium,
+    packets,
+    run,
+    scattered,
+    with_access,
+)
 
 ROBOTS = 8
 
 
-def story(told: Run, arena: int = 0) -> list[tuple[object, ...]]:
-    """Everything received and every other fate in one arena."""
-    rows: list[tuple[object, ...]] = []
-    for one in told.news:
-        h, f = one.received, one.finished
-        for i in np.flatnonzero(h.receiver // ROBOTS == arena):
-            given = tuple(column[i] for column in h.given.values())
-            rows.append((h.receiver[i] % ROBOTS, h.sender[i], h.sequence[i], h.received_at_ns[i], *given))
-        columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
-        rows += [tuple(column[i] for column in columns) for i in np.flatnonzero(f.arena == arena)]
-    return sorted(rows)
-
-
-def traffic(arenas: int) -> SentPackets:
-    """Each robot sends two broadcasts and one packet to its neighbour."""
-    sender = np.repeat(np.arange(arenas * ROBOTS), 3)
-    to = np.where(np.arange(len(sender)) % 3 == 2, (sender + 1) % ROBOTS, BROADCAST)
-    return packets(sender, to)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_time_may_pass_in_any_pieces(method: str):
-    pose = scattered(ROBOTS) * [10.0, 10.0, 1.0]
-    stories = []
-    for pieces in (1, 2, 97):
-        medium = make_medium(drawing(method), ROBOTS)
-        told = Run(medium)
-        for tick in range(4):
-            told.news.append(medium.step(tick * 10**8, pose + 0.01 * tick))
-            medium.send(tick * 10**8, tick, traffic(1))
-            for piece in range(1, pieces + 1):
-                medium.advance(tick * 10**8 + 10**8 * piece // pieces)
-        told.news.append(medium.step(4 * 10**8, pose))
-        stories.append(story(told))
-    assert len(stories[0]) > 200
-    assert stories[0] == stories[1] == stories[2]
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_an_arena_alone_gives_the_same_as_beside_others(method: str):
-    seeds = (11, 12, 13)
-    pose = scattered(3 * ROBOTS) * [20.0, 20.0, 1.0]
-    beside = run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: traffic(3), 4, 2)
-    for arena, seed in enumerate(seeds):
-        own = pose[arena * ROBOTS : (arena + 1) * ROBOTS]
-        alone = run(make_medium(drawing(method), ROBOTS, [seed]), own, lambda _: traffic(1), 4, 2)
-        assert story(alone) == story(beside, arena)
-
-
-def test_the_order_among_senders_is_indifferent():
-    pose, sent = scattered(ROBOTS) * [20.0, 20.0, 1.0], traffic(1)
-    index = np.arange(len(sent)).reshape(ROBOTS, 3)[::-1].ravel()
-    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
-    radio = drawing("csma-802154")
-    runs = [run(make_medium(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
-    assert story(runs[0]) == story(runs[1])
+def links_of(told: Run) -> list[tuple[int, ...]]:
+    """Every link's fate, with when."""
+    columns = ("receiver", "sender", "sequence", "fate", "on_air_at_ns", "final_at_ns")
+    return sorted(zip(*(told.finished(name).tolist() for name in columns), strict=True))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -89,8 +44,9 @@ def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
         run(make_medium(radio, ROBOTS), pose, lambda _, k=k: packets([*range(ROBOTS - 1)] + [ROBOTS - 1] * k), 4, 2)
         for k in (5, 0)
     )
-    assert story(without)
-    assert [row for row in story(with_it) if row[1] != ROBOTS - 1 and row[0] != ROBOTS - 1] == story(without)
+    rows = links_of(without)
+    assert rows
+    assert [row for row in links_of(with_it) if ROBOTS - 1 not in row[:2]] == rows
 
 
 def test_the_cut_off_decides_from_where_on_a_robot_disturbs():

@@ -1,6 +1,6 @@
-"""What jammers do to packets: against noise of the same power, against the clock, and to who listens first."""
+"""Jammers, and retries of the MAC."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,15 +9,21 @@ import pytest
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.packets import Fate, SentPackets
+from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
-from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import RATE_HZ, Run, at, everybody, make_medium, packets, scattered
+from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
 
 NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the path loss is constant
+# Senders that collide now and then, around a receiver that hears some of them barely.
+CROWD = at((0, 0), (70, 0), (0, -75), (-60, 60), (40, 0), (0, 30))
+TO_FIRST = packets([1, 2, 3, 4, 5] * 3, 0, size=40)
+# A frame of 117 bytes lasts 78 ms: attempts and ticks overlap.
+SLOW = replace(with_access("csma-802154"), bit_rate_bps=12_000, send_offset="tick")
+Plan = Callable[[int], dict[str, list[float]]]
 
 
 def jammers(*rows: dict[str, Any]) -> Jammers:
@@ -43,11 +49,6 @@ def ran(
 
 def received(told: Run) -> list[tuple[int, ...]]:
     return list(zip(*(told.received(name).tolist() for name in ("receiver", "sender", "sequence")), strict=True))
-
-
-# Senders that collide now and then, around a receiver that hears some of them barely.
-CROWD = at((0, 0), (70, 0), (0, -75), (-60, 60), (40, 0), (0, 30))
-TO_FIRST = packets([1, 2, 3, 4, 5] * 3, 0, size=40)
 
 
 @pytest.mark.parametrize("rise_db", [0.5, 1.5, 3.0, 10.0])
@@ -184,3 +185,78 @@ def test_an_arena_with_jammers_is_the_same_alone_and_among_others(method: str):
     alone = arena(0, [5])
     assert alone
     assert arena(2, [1, 9, 5]) == alone
+
+
+def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks: int = 12) -> Run:
+    """Robot 0 sends to robot 1 in the first ticks, while disruptions go by plan(tick)."""
+    medium = make_medium(radio, 2)
+    out = Run(medium)
+    for tick in range(ticks):
+        now = Disruption.none(2)
+        for name, value in plan(tick).items():
+            setattr(now, name, np.array(value, getattr(now, name).dtype))
+        out.news.append(medium.step(tick * TICK_NS, at((0, 0), (metres, 0)), now))
+        if tick < sends:
+            one = packets([0], 1, 100)
+            medium.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
+    out.last = medium.end()
+    return out
+
+
+def departures(out: Run) -> list[tuple[int, int]]:
+    """Sequence and fate of each packet that left its radio."""
+    return [(int(s), int(f)) for one in out.news for s, f in zip(one.departed.sequence, one.departed.fate, strict=True)]
+
+
+def results(out: Run) -> list[tuple[int, int]]:
+    """Id and result of each transmit status."""
+    return [(int(i), int(r)) for one in out.news for i, r in zip(one.tx_status.id, one.tx_status.result, strict=True)]
+
+
+@pytest.mark.parametrize("end", ["alive", "radio_on"])
+def test_a_packet_that_was_received_is_not_refused_as_well_when_its_sender_ends(end: str):
+    """Robot 0 is deaf to the acknowledgement, tries again, and dies, or its radio goes off."""
+    out = told(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
+    assert out.fates() == {"RECEIVED": 1}
+    assert departures(out) == [(0, int(Fate.RECEIVED))]
+    assert out.tally.in_range.tolist() == [1]
+
+
+def test_a_packet_that_was_lost_on_air_is_lost_though_its_sender_dies_before_the_next_attempt():
+    out = told(replace(SLOW, loss=1.0), lambda tick: {"alive": [tick < 2, True]})
+    assert out.fates() == {"LOST": 1}
+
+
+def test_a_packet_that_was_on_air_out_of_reach_stays_so_when_the_radio_goes_off():
+    out = told(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
+    assert out.fates() == {"OUT_OF_RANGE": 1}
+    assert departures(out) == [(0, int(Fate.RECEIVED))]
+
+
+def test_at_low_bit_rates_the_sender_waits_as_long_as_an_acknowledgement_takes():
+    out = told(SLOW, lambda _: {})
+    assert results(out) == [(0, TxResult.ACKNOWLEDGED)]
+
+
+def test_a_robot_that_was_revived_is_not_told_of_a_packet_from_before():
+    """A frame of 234 ms; the robot is dead in one tick of it."""
+    out = told(replace(SLOW, bit_rate_bps=4_000), lambda tick: {"alive": [tick != 1, True]})
+    assert out.fates() == {"RECEIVED": 1}
+    assert results(out) == []
+
+
+def test_newest_only_keeps_one_packet_also_if_an_attempt_fails_meanwhile():
+    backlog = {"backlog": [NEWEST, NEWEST]}
+    out = told(replace(SLOW, loss=1.0), lambda tick: {**backlog, "radio_on": [not 1 <= tick <= 3, True]}, sends=2)
+    assert [sequence for sequence, _ in departures(out)] == [0, 1]
+    assert out.fates() == {"LOST": 2}
+    first, second = (next(k for k, one in enumerate(out.news) if s in one.departed.sequence) for s in (0, 1))
+    assert first <= 3 < second
+
+
+def test_a_broadcast_that_nobody_could_hear_departs_all_the_same():
+    medium = make_medium(with_access("csma-802154"), 1)
+    medium.step(0, at((0, 0)))
+    medium.send(0, 0, packets([0], -1, 10))
+    news = medium.step(TICK_NS, at((0, 0)))
+    assert news.departed.sequence.tolist() == [0]

@@ -1,17 +1,41 @@
-"""What signals do to one another and to noise, against formulas."""
+"""Reception with signals: which packets arrive, and what is counted."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.config.phy import Fading, Reception, Shadowing
+from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
+from swarmwire.comms.radio.config.phy import Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
+from swarmwire.comms.radio.model import Decided
+from swarmwire.comms.radio.phy import model
+from swarmwire.comms.radio.phy.model import Reporter
+from swarmwire.comms.radio.phy.results import ResultBuffer
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
-from tests.support.comms.radio.phy.radios import METHODS, with_access
-from tests.support.comms.radio.runs import at, everybody, living, make_medium, packets, run, scattered
+from tests.support.comms.radio import (
+    ALL_GIVEN,
+    METHODS,
+    OBSTACLES,
+    TICK_NS,
+    Run,
+    at,
+    everybody,
+    living,
+    make_medium,
+    packets,
+    run,
+    scattered,
+    signal_radios,
+    with_access,
+)
+
+ROBOTS = 12
 
 
 @pytest.mark.parametrize("distance_m", [60.0, 95.0, 105.0, 115.0, 120.0])
@@ -147,3 +171,160 @@ def test_bursts_take_packets_of_disks_and_signals_alike():
         bursty = replace(radio, bursts=Bursts(0.1, 0.3))
         told = run(make_medium(bursty, 20), scattered(20), everybody(20), 20, 1)
         assert told.tally.fates[0, Fate.BURST] / told.tally.in_range[0] == pytest.approx(0.25, abs=0.05)
+
+
+@given(signal_radios(), st.integers(2, 8), st.integers(0, 1000))
+def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int, seed: int):
+    rng = np.random.default_rng(seed)
+    medium = make_medium(radio, robots)
+    pose, tally = scattered(robots, seed) * [10.0, 10.0, 1.0], []
+    disruption = [random_disruption(robots, rng) for _ in range(6)]
+    for tick in range(6):
+        other = replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0))
+        new_radio = other if rng.random() < 0.3 else None
+        tally.append(medium.step(tick * 10**8, pose, disruption[tick], new_radio).tally)
+        living = np.flatnonzero(disruption[tick].alive)
+        if len(living):
+            medium.send(tick * 10**8, tick, packets(rng.choice(living, 2 * robots)))
+    tally.append(medium.end())
+    assert sum(t.fates.sum() for t in tally) == sum(t.intended.sum() for t in tally)
+    assert min(t.fates.min() for t in tally) >= 0
+
+
+def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
+    """Some are dead, some have their radio off, some are kept apart."""
+    sides = rng.integers(0, 3, (1, robots))
+    one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
+    backlog = rng.integers(0, 3, robots)
+    gain_db = rng.normal(0.0, 3.0, (2, robots))
+    jammers = random_jammers(robots, rng)
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db, jammers)
+
+
+def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
+    """Up to three in the one arena, some of them carried."""
+    k = int(rng.integers(0, 4))
+    period_ns = rng.integers(10**5, 10**8, k)
+    return Jammers(
+        arena=np.zeros(k, np.int64),
+        carrier=rng.integers(NO_ROBOTS, robots, k),
+        x_m=rng.normal(0.0, 20.0, k),
+        y_m=rng.normal(0.0, 20.0, k),
+        power_dbm=rng.uniform(-60.0, 20.0, k),
+        on_ns=rng.integers(1, period_ns + 1),
+        period_ns=period_ns,
+        phase_ns=rng.integers(0, period_ns),
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
+    """Two frames of each robot, the run over at their first bits."""
+    medium = make_medium(with_access(method), 3)
+    pose = at((0, 0), (1, 0), (2, 0))
+    medium.step(0, pose)
+    medium.send(0, 0, packets([0, 0, 1, 1, 2], [BROADCAST] * 4 + [1]))
+    first = medium.step(1000, pose)
+    last = medium.end()
+    assert first.tally.intended.tolist() == [9]
+    assert last.fates[0, Fate.IN_FLIGHT] == 9
+
+
+def test_a_full_queue_counts_whom_it_kept_waiting():
+    """Five frames of 90 ms, room for one: three are refused, each with its two receivers in range."""
+    radio = replace(with_access("aloha"), bit_rate_bps=2400, queue_limit=1)
+    told = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
+    assert told.fates() == {"RECEIVED": 4, "QUEUE_FULL": 6}
+    assert told.tally.in_range.tolist() == [10]
+
+
+def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
+    pose = at((-1, -2), (-1, 2), (-2.8, -2))
+    for asked, fates in ((True, {"RECEIVED": 4, "BLOCKED": 2}), (False, {"RECEIVED": 6})):
+        radio = replace(with_access("none"), line_of_sight=asked)
+        told = run(make_medium(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
+        assert told.fates() == fates
+
+
+def test_a_packet_given_up_in_a_later_tick_than_its_last_attempt_still_has_its_place():
+    """Every packet is lost, and waits for its acknowledgement across the ends of ticks."""
+    radio = replace(
+        with_access("csma-802154"),
+        bit_rate_bps=20_000,
+        loss=1.0,
+        jitter_s=0.1,
+        measures=ALL_GIVEN,
+        send_offset="uniform",
+    )
+    to = (np.arange(6) + 1) % 6
+    told = run(make_medium(radio, 6), scattered(6), lambda _: packets(np.arange(6), to), 60, 1)
+    assert told.fates()["LOST"] > 100
+
+
+def crowded() -> Run:
+    """Five packets of each robot in each of three ticks."""
+    radio = replace(with_access("aloha"), queue_limit=9)
+    return run(make_medium(radio, ROBOTS), scattered(ROBOTS), lambda _: packets(np.repeat(range(ROBOTS), 5)), 3, 2)
+
+
+def finished(told: Run) -> list[tuple[int, ...]]:
+    """Every link's fate, with when."""
+    columns = ("sender", "sequence", "receiver", "fate", "on_air_at_ns", "final_at_ns")
+    return sorted(zip(*(told.finished(name).tolist() for name in columns), strict=True))
+
+
+def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyPatch):
+    at_once, goes, decided = finished(crowded()), set[int](), Reporter.decided
+
+    def counted(self: Reporter, parts: list[ResultBuffer], *more: Any) -> Decided:
+        goes.add(len(parts))
+        return decided(self, parts, *more)
+
+    monkeypatch.setattr(Reporter, "decided", counted)
+    for room in (1, 200, 300, 400):
+        monkeypatch.setattr(model, "MIN_CAPACITY", room)
+        assert finished(crowded()) == at_once
+    assert goes >= {1, 2, 3}
+
+
+@pytest.mark.parametrize("queue_limit", [0, 9])
+def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
+    """Robot 2 is dead; of what a full queue refuses, too, and then it would have been in range."""
+    radio = replace(with_access("aloha"), queue_limit=queue_limit, send_offset="tick")
+    medium, pose = make_medium(radio, 4), at((0, 0), (1, 0), (0, 1), (500, 0))
+    told = Run(medium)
+    medium.step(0, pose, living([True, True, False, True]))
+    medium.send(0, 0, packets([0, 0, 0, 0], [-1, -1, 2, 1]))
+    told.news.append(medium.step(5 * TICK_NS, pose))
+    told.last = medium.end()
+    refused = {
+        0: {"RECEIVED": 1, "OUT_OF_RANGE": 1, "QUEUE_FULL": 4},
+        9: {"RECEIVED": 3, "OUT_OF_RANGE": 2, "RECEIVER_DEAD": 1},
+    }
+    assert told.fates() == refused[queue_limit]
+    assert told.tally.intended.tolist() == [6]
+    assert told.tally.in_range.tolist() == [4]
+
+
+def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
+    """Frames of 90 ms: at 100 ms the second is on air, and the third waits."""
+    medium = make_medium(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2)
+    told, pose = Run(medium), at((0, 0), (1, 0))
+    medium.step(0, pose)
+    medium.send(0, 0, packets([0, 0, 0]))
+    told.news += [medium.step(TICK_NS, pose, living([False, True])), medium.step(5 * TICK_NS, pose)]
+    assert told.fates() == {"RECEIVED": 2, "SENDER_DEAD": 1}
+    assert told.tally.in_range.tolist() == [3]
+
+
+def test_ranges_are_those_at_which_frames_went_on_air():
+    """Two frames that end in the same tick; one went on air in the tick before, when the robots were nearer."""
+    radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, measures=Measures(RangeMeasure(0.0)))
+    medium = make_medium(radio, 2)
+    told = Run(medium)
+    for tick, (x_m, sender, size) in enumerate([(1.0, 0, 90), (2.0, 1, 10), (4.0, 0, 10)]):
+        told.news.append(medium.step(tick * TICK_NS, at((0, 0), (x_m, 0))))
+        medium.send(tick * TICK_NS, tick, packets([sender], size=size))
+    told.news.append(medium.step(4 * TICK_NS, at((0, 0), (4, 0))))
+    assert [len(one.received.receiver) for one in told.news] == [0, 0, 2, 1]
+    assert told.given("range_m").tolist() == pytest.approx([2.0, 1.0, 4.0])  # by receiver

@@ -13,8 +13,7 @@ from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, Sent
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
-from tests.support.comms.radio.phy.radios import METHODS, drawing, with_access
-from tests.support.comms.radio.runs import Run, at, make_medium, packets, run, scattered
+from tests.support.comms.radio import METHODS, Run, at, drawing, make_medium, packets, run, scattered, with_access
 
 ROBOTS = 8
 ACKNOWLEDGING = ("csma-802154", "dcf")

@@ -12,9 +12,7 @@ from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import Admission
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.phy.radios import with_access
-from tests.support.comms.radio.runs import TICK_NS, Run, at, make_medium, packets, run
-from tests.support.comms.radio.traffic import run_disrupted
+from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run, run_disrupted, with_access
 
 TRIO = at((0, 0), (1, 0), (9, 0))
 SLOW = Radio(2.0, bit_rate_bps=4000, send_offset="tick")  # 10 bytes take 20 ms

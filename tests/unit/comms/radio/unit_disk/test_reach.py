@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, R
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
-from tests.support.comms.radio.runs import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
+from tests.support.comms.radio import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
 
 MEASURES = Measures(RangeMeasure(), BearingMeasure())
 BETWEEN = {

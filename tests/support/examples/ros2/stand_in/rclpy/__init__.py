@@ -6,8 +6,7 @@ ROS_STAND_IN is "rmw" or "bridge" and the endpoint to reach, with a space betwee
 import os
 import sys
 
-from rclpy.node import Node
-from rclpy.wire import Wire
+from rclpy.node import Node, Wire
 
 
 def init() -> None:

@@ -1,0 +1,225 @@
+"""The folder of a campaign while it is written: finished tasks at once, one table of all runs at the end.
+
+    campaign.json, scenario/       from what it is made; written first
+    parts/part-N.parquet           rows of a finished task, numbered as they came
+    series/part-RUN.parquet        its tick series, written before its rows, named after the first run in it
+    summary.parquet                all rows, by run; then the parts go (of runs that are tried again, parts come first)
+    series/worker-N.parquet        all tick series, by run: a few files, each a stretch of runs
+
+Each file is written aside and renamed, so a file under its own name is complete.
+"""
+
+import fcntl
+import os
+import shutil
+from collections.abc import Collection, Generator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.deploy.campaign.columns import COUNTS, Columns, Row
+from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.metrics.atomic import atomic_write
+from swarmwire.metrics.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
+from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.run_folder.writer import PARQUET
+from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
+
+if TYPE_CHECKING:
+    import polars as pl
+
+RUNS = "runs"
+NUMBERED = "part-" + "[0-9]" * 8 + ".parquet"
+ROWS_LOST = "without the file --resume runs again what it held"
+SERIES_LOST = "without the file its runs stay in the table, but not their series"
+
+
+class StorageFailed(SwarmwireError):
+    """The folder of a campaign or of a tuning cannot be written any more."""
+
+
+@contextmanager
+def storing(folder: Path, command: str = "sweep") -> Generator[None]:
+    """Turn errors of the disk in the block into StorageFailed, one line; `command --resume` continues the folder."""
+    try:
+        yield
+    except (OSError, *corruption_errors()) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire {command} --resume {folder}"
+        raise StorageFailed(text) from error
+
+
+@contextmanager
+def locked(folder: Path, what: str) -> Generator[None]:
+    """Keep the folder of `what` for this process while the block lasts; BadInput if another process has it."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system releases it, however the process ends
+        yield
+    except BlockingIOError:
+        raise BadInput(str(folder), "", f"another process is at work on this {what}") from None
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def new_folder(folder: Path, what: str) -> Generator[Path]:
+    """Make the folder of a campaign or a tuning, and yield the empty folder for its scenario.
+
+    BadInput unless `folder` is new or empty, and all can be written.
+    """
+    scenario_folder = folder / SCENARIO_FOLDER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise BadInput("--out", str(folder), f"expected a new or empty folder; to go on with a {what}: --resume")
+        scenario_folder.mkdir()  # of several that found it empty, the system lets one alone make it
+        yield scenario_folder
+    except OSError as error:
+        raise BadInput("--out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
+
+
+class CampaignFolder:
+    """The folder of one campaign, to write into and to resume. StorageFailed if the disk refuses.
+
+    Attributes:
+        path: the folder.
+        campaign: what stands in its `campaign.json`.
+    """
+
+    def __init__(self, path: Path, campaign: Campaign) -> None:
+        self.path, self.campaign, self._columns = path, campaign, Columns(campaign)
+
+    @property
+    def scenario(self) -> Path:
+        """The scenario's file, as tasks name it."""
+        return (self.path / SCENARIO_FOLDER / SCENARIO).absolute()
+
+    def run_folder(self, run: int) -> Path:
+        """The folder of a run that is recorded in full."""
+        return (self.path / RUNS / f"run-{run:06d}").absolute()
+
+    def clear(self) -> None:
+        """Remove what a killed campaign left half done."""
+        with storing(self.path):
+            for folder in (self.path, self.path / PARTS, self.path / SERIES, self.path / RUNS):
+                for aside in folder.glob(".aside-*"):
+                    shutil.rmtree(aside) if aside.is_dir() else aside.unlink()
+            _remove_stale_series(self.path / SERIES, self.ended())
+
+    def keep(self, result: TaskResult) -> None:
+        """Write the rows and the series of a finished task."""
+        points = self.campaign.points
+        rows: list[Row] = [{**row, **points[row["point"]]} for row in result.rows]
+        with storing(self.path):
+            if result.series is not None:
+                first = next(row["run"] for row in rows if row["ended"] != FAILED)
+                _write(self.path / SERIES / f"part-{first:08d}.parquet", result.series)
+            _write(self._next_part(), _parquet(self._columns.frame(rows)))
+
+    def rows(self) -> "pl.DataFrame":
+        """All rows that are there, by run; BadInput names a file that is damaged, or of another campaign."""
+        whole = self.path / SUMMARY
+        files = [*([whole] if whole.exists() else []), *_parts(self.path / PARTS)]
+        none = self._columns.frame([])
+        tables = [_table(file, none.schema, self.campaign.runs) for file in files]
+        try:
+            return self._columns.joined([none, *tables])
+        except corruption_errors():
+            refuse_corrupt(files, ROWS_LOST)
+            raise
+
+    def ended(self) -> dict[int, str]:
+        """By run that has a row: how it ended."""
+        rows = self.rows()
+        return dict(zip(rows["run"], rows["ended"], strict=True))
+
+    def finish(self, files: int) -> None:
+        """Make the table of all runs, and at most so many new files of the series."""
+        with storing(self.path):
+            _join_series(self.path / SERIES, files)
+            parts = _parts(self.path / PARTS)
+            if parts:
+                _write(self.path / SUMMARY, _parquet(self.rows()))
+            for part in parts:
+                part.unlink()
+            if (self.path / PARTS).is_dir() and not any((self.path / PARTS).iterdir()):
+                (self.path / PARTS).rmdir()
+
+    def _next_part(self) -> Path:
+        """A name after all that are there: where two have a row of a run, that of the later counts."""
+        last = max(map(_number, _parts(self.path / PARTS)), default=-1)
+        return self.path / PARTS / f"part-{last + 1:08d}.parquet"
+
+
+def _parts(folder: Path) -> list[Path]:
+    return sorted(folder.glob(NUMBERED))
+
+
+def _number(part: Path) -> int:
+    return int(part.stem.partition("-")[2])
+
+
+def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
+    """The rows in a file; BadInput unless it has this campaign's columns and runs."""
+    import polars as pl
+
+    frame = read_parquet(file, cure=ROWS_LOST)
+    counts = dict.fromkeys((name for name in frame.columns if name.startswith(COUNTS)), pl.Int64())
+    for name, kind in {**schema, **counts}.items():
+        if frame.schema.get(name) != kind:
+            raise BadInput(str(file), name, f"expected this column of the campaign's table, as {kind}; {ROWS_LOST}")
+    if not frame["run"].is_between(0, runs - 1).fill_null(value=False).all():
+        raise BadInput(str(file), "run", f"expected runs from 0 to {runs - 1}; {ROWS_LOST}")
+    if frame["ended"].null_count():
+        raise BadInput(str(file), "ended", f"expected how each run ended; {ROWS_LOST}")
+    return frame
+
+
+def _remove_stale_series(folder: Path, done: Collection[int]) -> None:
+    """Remove parts of tasks whose rows were never written (runs that are not in `done`), or that were joined."""
+    parts = _parts(folder)
+    joined: set[int] = {run for file in folder.glob("worker-*.parquet") for run in _runs(file)} if parts else set()
+    for part in parts:
+        if _number(part) not in done or _number(part) in joined:
+            part.unlink()
+
+
+def _join_series(folder: Path, files: int) -> None:
+    """Make at most so many files of all parts, `worker-N.parquet`, each a stretch of runs; read part by part."""
+    import polars as pl
+
+    parts = _parts(folder)
+    for part in parts:
+        _runs(part)  # names a damaged file before anything is joined
+    first, count = len(list(folder.glob("worker-*.parquet"))), min(files, len(parts))
+    for number in range(count):
+        share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
+        with atomic_write(folder / f"worker-{first + number}.parquet") as aside:
+            try:
+                pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
+            except corruption_errors():
+                refuse_corrupt(share, SERIES_LOST)
+                raise
+        for part in share:
+            part.unlink()
+
+
+def _runs(file: Path) -> set[int]:
+    """The runs whose series a file holds; BadInput if it is damaged."""
+    return set(read_parquet(file, ["run"], SERIES_LOST)["run"])
+
+
+def _parquet(frame: "pl.DataFrame") -> bytes:
+    # In memory first: a full disk is then an OSError of `_write`, not an error of polars.
+    file = BytesIO()
+    frame.write_parquet(file, **PARQUET)
+    return file.getvalue()
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.parent.mkdir(exist_ok=True)
+    with atomic_write(path) as aside:
+        aside.write_bytes(data)

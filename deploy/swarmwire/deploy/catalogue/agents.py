@@ -1,0 +1,128 @@
+"""Agents: behaviours, the field types of their messages, and the real robots they can drive or be mirrored by."""
+
+from abc import ABC
+from pathlib import Path
+from typing import Any, Generic, get_args
+
+import numpy as np
+
+from swarmwire import agent
+from swarmwire.agent import Agent, VectorAgent
+from swarmwire.agent import behaviours as shipped
+from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
+from swarmwire.agent.drivers.driver import GROUP as DRIVERS
+from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
+from swarmwire.agent.parameters import REQUIRED, TYPES, parameters_of
+from swarmwire.agent.parameters import Parameter as Declared
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import installed_points, resolve
+from swarmwire.deploy.catalogue.docstrings import comments_of, first_line, texts_of
+from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
+from swarmwire.world.gateways.gateway import GROUP as GATEWAYS
+from swarmwire.world.gateways.gateway import Gateway, gateway_kind, gateway_names
+
+BASES = (Agent, VectorAgent, ABC, Generic, object)
+
+
+def behaviours() -> list[Entry]:
+    """The agents that come with swarmwire."""
+    return [behaviour(f"{shipped.__name__}:{name}") for name in shipped.__all__]
+
+
+def behaviour(spec: str) -> Entry:
+    """The agent class of "module:Class" or "file.py:Class", a file's path seen from here; BadInput if there is none."""
+    try:
+        kind = load_agent(resolve(spec, Path.cwd()))
+    except NoAgent as error:
+        raise BadInput(spec, "", str(error)) from error
+    return _behaviour(kind, spec)
+
+
+def _behaviour(kind: AgentClass, spec: str) -> Entry:
+    declared = parameters_of(kind)
+    comments = comments_of(kind, declared)
+    parameters = tuple(_parameter(of, comments.get(name, "")) for name, of in declared.items())
+    text = texts_of(kind, BASES)
+    vector = issubclass(kind, VectorAgent)
+    return Entry(
+        kind="behaviour",
+        name=kind.__name__,
+        help=first_line(text),
+        facts=(
+            ("in a scenario", f'agent = "{spec}" in [robots.GROUP]'),
+            ("decides for", "n robots at a time (VectorAgent)" if vector else "one robot (Agent)"),
+            ("needs", ", ".join(kind.needs) or "nothing"),
+        ),
+        tables=(ParameterTable("parameters", parameters),) if parameters else (),
+        text=text,
+    )
+
+
+def _parameter(of: Declared, comment: str) -> Parameter:
+    required = of.default is REQUIRED
+    each = ", or a list with one for each robot" if of.per_robot else ""
+    value = None if required else of.default
+    return Parameter(of.name, comment, unit_of(of.name), value, required, TYPES[of.type] + each)
+
+
+def message_fields() -> list[Entry]:
+    """The types of a message's fields."""
+    hints = {name: get_args(getattr(agent, name)) for name in agent.__all__}
+    found: dict[str, np.dtype[Any]]
+    found = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
+    return [
+        Entry("field", name, _range(of), (("in a message", f"value: {name}"), ("bytes on air", str(of.itemsize))))
+        for name, of in found.items()
+    ]
+
+
+def _range(of: "np.dtype[Any]") -> str:
+    if of.kind == "f":
+        return f"a number, to {np.finfo(of).precision} digits"
+    span = np.iinfo(of)
+    return f"a whole number, {span.min} to {span.max}"
+
+
+def drivers() -> list[Entry]:
+    """The drivers that are installed."""
+    return [_driver(name) for name in driver_names()]
+
+
+def gateways() -> list[Entry]:
+    """The gateways that are installed."""
+    return [_gateway(name) for name in gateway_names()]
+
+
+def _driver(name: str) -> Entry:
+    try:
+        kind = load_driver(name, "", "")
+    except BadInput as fault:
+        return _missing("driver", name, fault, DRIVERS)
+    facts = (
+        ("on a robot", f'swarmwire-agent run --driver {name}, or driver = {{ name = "{name}" }} in robot.toml'),
+        ("body", f"{kind.body_name}, unless its user names another"),
+    )
+    return _protocol("driver", name, kind, facts)
+
+
+def _gateway(name: str) -> Entry:
+    try:
+        kind = gateway_kind(name, "")
+    except BadInput as fault:
+        return _missing("gateway", name, fault, GATEWAYS)
+    facts = (
+        ("in a run", f"swarmwire run --gateway {name}"),
+        ("sensors that it tells", ", ".join(sorted(kind.sensors))),
+    )
+    return _protocol("gateway", name, kind, facts)
+
+
+def _protocol(what: str, name: str, kind: type[Driver] | type[Gateway], facts: tuple[tuple[str, str], ...]) -> Entry:
+    text, options = texts_of(kind, (Driver, Gateway, ABC, object)), parameters_of_dataclass(kind.options)
+    tables = (ParameterTable("options", options),) if options else ()
+    return Entry(what, name, first_line(text), facts, tables, text=text)
+
+
+def _missing(what: str, name: str, fault: BadInput, group: str) -> Entry:
+    point = installed_points(group)[name][0]
+    return Entry(what, name, f"cannot be used: {fault.expected}", (("entry point", f"{point.value}, of {group}"),))

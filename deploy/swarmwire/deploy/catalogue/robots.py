@@ -1,0 +1,202 @@
+"""Robots: bodies with their data sheets, the drives, keys and sensors that such a sheet may have."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, fields, replace
+from functools import cached_property
+from inspect import getmembers
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from swarmwire.agent import Packet, Robot
+from swarmwire.agent.robot import RadioPort
+from swarmwire.agent.step_context import TX_STATUS
+from swarmwire.comms.bodies.body import Body, body_names, load_body
+from swarmwire.comms.bodies.custom import CustomSensorSpec
+from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.config import bounds_of
+from swarmwire.comms.packets import TxResult
+from swarmwire.comms.radio.config.impairments import Measures
+from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
+from swarmwire.deploy.catalogue.docstrings import first_line, flowing
+from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
+from swarmwire.world.custom.actuators import custom_actuator
+from swarmwire.world.scenario.bodies import read_body
+from swarmwire.world.sensors.loading import custom_sensor
+
+GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
+
+
+def bodies() -> list[Entry]:
+    """The bodies that come with swarmwire."""
+    return [_body(load_body(name), name) for name in body_names()]
+
+
+def body_of(path: Path) -> Entry:
+    """The body of a sheet of the user's own; BadInput names it and what is wrong with it."""
+    return _body(read_body(path, str(path), ""), str(path))
+
+
+def _body(body: Body, named: str) -> Entry:
+    sheet = asdict(body)
+    geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
+    leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
+    sensors = [table for name, of in body.sensors.items() for table in _fitted(name, of)]
+    actuators = [_own(f"actuator: {name}", of.kind, custom_actuator(of)) for name, of in body.actuators.items()]
+    return Entry(
+        kind="body",
+        name=body.name,
+        help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; sensors: {', '.join(body.sensors)}",
+        facts=(
+            ("in a scenario", f'body = "{named}" in [robots.GROUP]'),
+            ("fastest ahead", f"{body.max_linear_mps:.4g} m/s"),
+            ("fastest turn", f"{body.max_angular_radps:.4g} rad/s"),
+            ("source", body.source),
+        ),
+        tables=(
+            ParameterTable("geometry", tuple(_with_values(geometry, sheet)), "value"),
+            _sheet("drive", type(body.drive), sheet["drive"]),
+            *leds,
+            *sensors,
+            *actuators,
+        ),
+    )
+
+
+def _sheet(title: str, kind: type[Any], values: dict[str, Any]) -> ParameterTable:
+    return ParameterTable(title, tuple(_with_values(parameters_of_dataclass(kind), values)), "value")
+
+
+def _fitted(name: str, sheet: SensorSpec) -> tuple[ParameterTable, ParameterTable]:
+    """The keys of a body's sensor, and the fields of its readings."""
+    title, reading = f"sensor: {name}", f"reading: {name}"
+    if not isinstance(sheet, CustomSensorSpec):
+        return _sheet(title, type(sheet), asdict(sheet)), reading_table(sheet.reading_fields(), reading)
+    shared, own = _with_values(parameters_of_dataclass(RangedSensorSpec), asdict(sheet)), custom_sensor(sheet)
+    return _own(title, sheet.kind, own, shared), reading_table(own.fields, reading)
+
+
+def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:
+    """What `kind` leads to, the keys shared with others, and those of the class of the user's own."""
+    told = next(bounds_of(of).help for of in fields(CustomSensorSpec) if of.name == "kind")
+    limits = {of.name: bounds_of(of) for of in fields(made)}
+    keys = [Parameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()]
+    return ParameterTable(title, (Parameter("kind", told, value=kind), *shared, *keys), "value")
+
+
+def _with_values(parameters: "list[Parameter] | tuple[Parameter, ...]", values: dict[str, Any]) -> list[Parameter]:
+    """The parameters with a sheet's figures as values; those of nested tables by their path."""
+    return [replace(key, value=_at(values, key.name), required=False) for key in parameters]
+
+
+def _at(values: dict[str, Any], path: str) -> Any:
+    value: Any = values
+    for name in path.split("."):
+        value = value[name]
+    return None if isinstance(value, dict) else value
+
+
+def drives() -> list[Entry]:
+    """All kinds of drive, with the keys of their tables."""
+    return [
+        Entry(
+            kind="drive",
+            name=name,
+            help=first_line(kind.__doc__),
+            facts=(("in a body's sheet", f'kind = "{name}" in [drive]'),),
+            tables=(ParameterTable("keys", parameters_of_dataclass(kind)),),
+            text=flowing(kind.__doc__),
+        )
+        for name, kind in DRIVES.items()
+    ]
+
+
+TABLES = ("drive", "leds", "sensors", "actuators")  # have entries of their own, or one below
+
+
+def sheet_keys() -> list[Entry]:
+    """The keys of every sheet, then the table of LEDs."""
+    keys = [key for key in parameters_of_dataclass(Body) if key.name.partition(".")[0] not in TABLES]
+    keys.insert(
+        0, Parameter("like", "body that this one starts from", expected="a body's name, or the path of a sheet")
+    )
+    places = [
+        Entry(
+            kind="body-key",
+            name=key.name,
+            help=key.help,
+            facts=(("in a body's sheet", f"{key.name}, before the first table"),),
+            tables=(ParameterTable("key", (key,)),),
+        )
+        for key in keys
+    ]
+    leds = Entry(
+        kind="body-key",
+        name="leds",
+        help=first_line(Leds.__doc__),
+        facts=(("in a body's sheet", "the table [leds]"),),
+        tables=(ParameterTable("keys of leds", parameters_of_dataclass(Leds)),),
+        text=flowing(Leds.__doc__),
+    )
+    return [*places, leds]
+
+
+def sensors() -> list[Entry]:
+    """Those of bodies, then those of packets."""
+    return [*_of_bodies(), *_of_packets(), _of_tx_status()]
+
+
+def _of_bodies() -> Iterator[Entry]:
+    bodies = [load_body(name) for name in body_names()]
+    for name, sheet in SENSOR_SPECS.items():
+        have = ", ".join(body.name for body in bodies if name in body.sensors)
+        told = first_line(getattr(Robot, name).__doc__)
+        where = "bodies", have or "none that comes with swarmwire"
+        yield _sensor(
+            name,
+            sheet,
+            f"robot.{name}: {told}",
+            where,
+            reading_table(sheet.example().reading_fields(), kind=getattr(Sensors, name).many),
+        )
+
+
+def _of_packets() -> Iterator[Entry]:
+    hints = get_type_hints(Measures)
+    for of in fields(Measures):
+        kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
+        (column,) = Measures(**{of.name: kind()}).columns
+        told = first_line(getattr(Packet, column).__doc__)
+        yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] measures.{of.name}"))
+
+
+def _of_tx_status() -> Entry:
+    results = tuple((result.name, result.meaning) for result in TxResult)
+    facts = (
+        ("in an agent", f'needs = ("{TX_STATUS}", …)'),
+        ("read as", f"robot.radio.tx_status: {first_line(RadioPort.tx_status.__doc__)}"),
+        ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
+    )
+    told = "The sender learns what became of a packet to one robot, as far as its own radio knows."
+    return Entry(kind="sensor", name=TX_STATUS, help=told, facts=(*facts, *results))
+
+
+def reading_table(fields: Iterable[Field], title: str = "reading", kind: type[Any] | None = None) -> ParameterTable:
+    """The fields of a reading: unit, value of a lost reading, meaning and shape; and what its class derives of them."""
+    rows = [Parameter(of.name, of.meaning, of.unit, of.blank, expected=of.shape) for of in fields]
+    for name, of in getmembers(kind):
+        if isinstance(of, property | cached_property):
+            rows.append(Parameter(name, first_line(of.__doc__), unit_of(name)))
+    return ParameterTable(title, tuple(rows), "lost")
+
+
+def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str], *tables: ParameterTable) -> Entry:
+    parameters = parameters_of_dataclass(sheet)
+    return Entry(
+        kind="sensor",
+        name=name,
+        help=first_line(sheet.__doc__),
+        facts=(("in an agent", f'needs = ("{name}", …)'), ("read as", read), where),
+        tables=(*tables, *((ParameterTable("data sheet", parameters),) if parameters else ())),
+        text=flowing(sheet.__doc__),
+    )

@@ -1,0 +1,239 @@
+"""Scenarios: their keys, the radio's presets, stages and fates, the engines, events and metrics."""
+
+import json
+import sys
+from abc import ABC
+from dataclasses import fields, replace
+from functools import cache
+from math import isinf
+from typing import Any, cast
+
+import numpy as np
+
+from swarmwire.comms.config import bounds_of
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.event import Event
+from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.radio.config.presets import PRESETS, Preset
+from swarmwire.comms.radio.config.radio import airtime_ns
+from swarmwire.comms.radio.phy.propagation import range_of
+from swarmwire.comms.radio.stages.chain import ORDER
+from swarmwire.comms.radio.stages.loss import LossModel
+from swarmwire.comms.radio.stages.stage import Stage
+from swarmwire.deploy.catalogue.docstrings import first_line, flowing, texts_of
+from swarmwire.deploy.catalogue.schema import (
+    Entry,
+    Parameter,
+    ParameterTable,
+    parameters_of_dataclass,
+    parameters_of_schema,
+)
+from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.registry import GROUP, METRICS, PlugIn, plug_ins
+from swarmwire.world.engines.physics import ENGINES
+from swarmwire.world.scenario_file import scenario_schema
+
+
+def keys() -> list[Entry]:
+    """All keys but those of the radio."""
+    return [_key(of, "key") for of in all_keys() if not _of_radio(of)]
+
+
+def radio_keys() -> list[Entry]:
+    """The keys of the radio."""
+    return [_key(of, "radio") for of in all_keys() if _of_radio(of)]
+
+
+@cache
+def all_keys() -> tuple[Parameter, ...]:
+    """Every key of a scenario, each after the table that holds it."""
+    return parameters_of_schema(scenario_schema())
+
+
+def _of_radio(key: Parameter) -> bool:
+    return key.name == "radio" or key.name.startswith("radio.")
+
+
+def _key(key: Parameter, kind: str) -> Entry:
+    inner = f"{key.name}."
+    below = tuple(replace(of, name=of.name.removeprefix(inner)) for of in all_keys() if of.name.startswith(inner))
+    table = ParameterTable(f"keys of {key.name}", below) if below else ParameterTable("key", (key,))
+    text = [key.text, *(of.text for of in below if "." not in of.name and "`:" in of.text)]  # of the table's forms, too
+    return Entry(
+        kind=kind,
+        name=key.name,
+        help=key.help,
+        facts=(("in a scenario", _place(key, bool(below))),),
+        tables=(table,),
+        text="\n\n".join(filter(None, text)),
+    )
+
+
+def _place(key: Parameter, is_table: bool) -> str:
+    """Where the file has it, as TOML writes that."""
+    if is_table:
+        in_list = key.expected.startswith("a list")
+        return f"the tables {_header(f'{key.name}.*')}" if in_list else f"the table {_header(key.name)}"
+    table, _, name = key.name.rpartition(".")
+    return f"{name} in {_header(table)}" if table else f"{name}, before the first table"
+
+
+def _header(path: str) -> str:
+    """The header of a table: "[robots.GROUP]", or "[[events]]" for one of a list."""
+    lists = {of.name for of in all_keys() if of.expected.startswith("a list")}
+    parts = path.split(".")
+    places = [part == "*" and ".".join(parts[:depth]) in lists for depth, part in enumerate(parts)]
+    shown = ".".join("GROUP" if part == "*" else part for part, place in zip(parts, places, strict=True) if not place)
+    return f"[[{shown}]]" if places[-1] else f"[{shown}]"
+
+
+def presets() -> list[Entry]:
+    """All presets, with the values that they give."""
+    return [_preset(name, preset) for name, preset in PRESETS.items()]
+
+
+def _preset(name: str, preset: Preset) -> Entry:
+    radio = radio_of(name, [])
+    reach_m = range_of(radio)
+    longest_ms = float(airtime_ns(radio, np.array([radio.overhead_bytes + radio.max_payload_bytes]))[0]) / 1e6
+    facts = (
+        ("in a scenario", f'[radio] preset = "{name}"'),
+        ("source", preset.source),
+        *((("but", preset.otherwise),) if preset.otherwise else ()),
+        *((("reach", f"{float(f'{reach_m:.3g}'):g} m by path loss alone"),) if reach_m is not None else ()),
+        ("longest frame", f"{longest_ms:.3g} ms"),
+        *((f"radio.{path}", str(value)) for path, value in _flat(preset.radio)),
+    )
+    return Entry(kind="preset", name=name, help=preset.told, facts=facts)
+
+
+def _flat(table: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        is_table = isinstance(value, dict) and bool(cast("dict[str, Any]", value))
+        found += _flat(cast("dict[str, Any]", value), f"{path}{key}.") if is_table else [(path + key, value)]
+    return found
+
+
+def radio_stages() -> list[Entry]:
+    """The stages of the chain, in order."""
+    return [_stage(kind, place) for place, kind in enumerate(ORDER, start=1)]
+
+
+def _stage(kind: type[Stage | LossModel], place: int) -> Entry:
+    tables = tuple(f"radio.{key}." for key in kind.keys)
+    keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
+    return Entry(
+        kind="stage",
+        name=kind.name,
+        help=first_line(kind.__doc__),
+        facts=(("place", f"{place} of {len(ORDER)}"), ("in the chain", first_line(kind.of.__doc__))),
+        tables=(ParameterTable("keys", keys),) if keys else (),
+        text=flowing(kind.__doc__),
+    )
+
+
+def fates() -> list[Entry]:
+    """All fates, in the order of the tally's columns."""
+    return [
+        Entry(
+            kind="fate",
+            name=fate.name.lower(),
+            help=fate.meaning,
+            facts=(("in summary.json", f"radio.fates.{fate.name.lower()}: intended receivers; all fates add up"),),
+        )
+        for fate in Fate
+    ]
+
+
+AUTO = "discs, or pymunk where an obstacle is movable; robots that fly or have no contacts are kinematic"
+
+
+def engines() -> list[Entry]:
+    """What a scenario may name: the choice between engines, then each of them."""
+    told = {name: sys.modules[kind.__module__].__doc__ for name, kind in ENGINES.items()}
+    return [_engine("auto", AUTO), *(_engine(name, first_line(of)) for name, of in told.items())]
+
+
+def _engine(name: str, told: str) -> Entry:
+    return Entry("engine", name, told, (("in a scenario", f'engine = "{name}" in [physics]'),))
+
+
+def events() -> list[Entry]:
+    """The actions of the registry."""
+    return [_event(kind) for kind in ACTIONS]
+
+
+def _event(kind: type[Event]) -> Entry:
+    do: Any = next(of for of in fields(kind) if of.name == "do")
+    return Entry(
+        kind="event",
+        name=do.default,
+        help=bounds_of(do).help,
+        facts=(
+            ("in a scenario", f'do = "{do.default}" in [[events]]'),
+            ("needs a radio", "with signals" if kind.needs_signals else "yes" if kind.needs_radio else "no"),
+        ),
+        tables=(ParameterTable("keys", parameters_of_dataclass(kind)),),
+        text=flowing(kind.__doc__),
+    )
+
+
+METRIC_KINDS = {
+    "level": "level: a state at each tick",
+    "count": "count: what happened within a tick, added up over the run",
+    "time": "time: when something happened, in s from the start of the run; none if it did not",
+}
+
+
+def metrics() -> list[Entry]:
+    """The metrics of the registry, then those of packages; one that does not import says so."""
+    own = [_metric(kind, "standard" if kind.standard else "") for kind in METRICS.values()]
+    return [*own, *(_plug_in(of) for of in plug_ins().values() if of.name not in METRICS)]
+
+
+def _plug_in(of: PlugIn) -> Entry:
+    try:
+        return _metric(of.kind("", ""), "plug-in", ("brought by", f"{of.package}, as {of.spec}"))
+    except BadInput as fault:
+        where = (("brought by", f"{of.package}, as {of.spec}, in the entry points {GROUP}"),)
+        return Entry("metric", of.name, f"cannot be measured: {fault.expected}", facts=where, mark="plug-in")
+
+
+def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> Entry:
+    parameters = parameters_of_dataclass(kind)
+    return Entry(
+        kind="metric",
+        name=kind.name,
+        help=kind.help,
+        facts=(
+            ("measured", _measured(kind, mark)),
+            ("in summary.json", f"metrics.{kind.name}: final, mean, min and max over the ticks"),
+            ("kind", METRIC_KINDS[kind.kind]),
+            ("unit", kind.unit or "none"),
+            ("bounds", _bounds(*kind.bounds)),
+            *facts,
+        ),
+        tables=(ParameterTable("parameters", parameters),) if parameters else (),
+        mark=mark,
+        text=texts_of(kind, (Metric, ABC, object)),
+    )
+
+
+def _measured(kind: type[Metric], mark: str) -> str:
+    """When it is, and how a scenario lists it."""
+    name, parameters = f'"{kind.name}"', parameters_of_dataclass(kind)
+    given = [f"{of.name} = {'…' if of.value is None else json.dumps(of.value)}" for of in parameters]
+    table = f"{{ {', '.join([f'metric = {name}', *given])} }}"
+    if mark == "standard":
+        return "in every run" + (f"; with other parameters where metrics = [{table}] says so" if given else "")
+    plain = f"where a scenario says metrics = [{name}], or [stop] names it"
+    return plain + (f"; with parameters, metrics = [{table}]" if given else "")
+
+
+def _bounds(least: float, largest: float | None) -> str:
+    if largest is not None:
+        return f"{least:g} to {largest:g}"
+    return "none" if isinf(least) else f"{least:g} and more"

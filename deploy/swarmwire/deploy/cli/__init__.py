@@ -1,0 +1,5 @@
+"""The command line `swarmwire`."""
+
+from swarmwire.deploy.cli.app import program
+
+__all__ = ["program"]

@@ -1,0 +1,183 @@
+"""`swarmwire certs`: a CA of your own, and one certificate for each member of a swarm's network."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import CERTIFICATES
+from swarmwire.deploy.cli.options import AsJson, AuthorityFolder
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.certificates.register import CertificateRequest, Issued
+
+
+certs_app = typer.Typer(
+    help="Certificates of a swarm's network: a CA of your own, and one certificate for each member.",
+    no_args_is_help=True,
+)
+
+
+@certs_app.command("init")
+def init_command(
+    folder: AuthorityFolder,
+    renew: Annotated[
+        bool, typer.Option("--renew", help="Make another CA in its place; the old folder is kept under another name.")
+    ] = False,
+) -> None:
+    """Begin a CA, good for ten years, in a new folder that you alone may enter.
+
+    Its key, ca.key, signs who belongs to the swarm: keep the folder where no robot and no repository gets at it. For
+    example:
+
+      swarmwire certs init lab-ca
+    """
+    CERTIFICATES.need("certs")
+    from swarmwire.deploy.certificates.folder import begin_authority, renew_authority
+
+    if renew:
+        typer.echo(f"kept: {renew_authority(folder, WallClock())}")
+        typer.echo("every member of the network needs a new certificate and the new ca.pem")
+    else:
+        begin_authority(folder, WallClock())
+    typer.echo(f"written: {folder / 'ca.pem'}, for everybody, and {folder / 'ca.key'}, for nobody else")
+
+
+@certs_app.command("issue")
+def issue_command(
+    folder: AuthorityFolder,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Whose: names of robots, runners, …; tracker, operator, world.", metavar="NAME…"),
+    ] = None,
+    hosts: Annotated[
+        list[str] | None,
+        typer.Option("--host", help="An IP address or host name at which they listen. Repeatable.", metavar="ADDRESS"),
+    ] = None,
+    fleet: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead of names: all of this fleet.toml, tracker and operator who lack a good one.", metavar="FILE"
+        ),
+    ] = None,
+    days: Annotated[int, typer.Option(min=1, max=3650, help="How long they hold.")] = 365,
+    purpose: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            help="robot, tracker, operator, runner, observer, router or world. Default: as the name's last one, or "
+            "the name, if it is in this list, or robot.",
+            metavar="PURPOSE",
+        ),
+    ] = None,
+    renew: Annotated[
+        bool, typer.Option("--renew", help="Also for names whose certificate is good; the old one holds to its end.")
+    ] = False,
+) -> None:
+    """Issue certificates: NAME.pem, and NAME.key, which its owner alone may read.
+
+    Each program that connects to an endpoint checks that its address is in the certificate. For example:
+
+      swarmwire certs issue lab-ca flock-0 --host 10.0.0.10
+
+      swarmwire certs issue lab-ca --fleet fleet.toml
+
+      swarmwire certs issue lab-ca laptop-1 laptop-2 --for runner
+    """
+    CERTIFICATES.need("certs")
+    from swarmwire.deploy.certificates.folder import issue
+    from swarmwire.deploy.certificates.register import text_of
+
+    if fleet is not None:
+        if names or hosts or purpose:
+            raise BadInput("--fleet", "", "expected no NAME, --host or --for with it")
+        requests, renew = _lacking(folder, fleet), True
+    else:
+        requests = _named(names or [], hosts or [], purpose)
+    for issued in issue(folder, requests, days, WallClock(), renew=renew):
+        typer.echo(
+            f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}"
+        )
+    if not requests:
+        typer.echo("every member of the fleet has a good certificate")
+
+
+def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
+    from swarmwire.deploy.certificates.register import certificate_request
+
+    if not names:
+        raise BadInput("NAME", "", "expected at least one name, or --fleet")
+    return [certificate_request(name, hosts, purpose) for name in names]
+
+
+def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
+    from swarmwire.deploy.certificates.register import Register, date_now
+    from swarmwire.deploy.fleet.fleet import read_fleet
+
+    return read_fleet(fleet).lacking_certificates(Register.read(folder), date_now(WallClock()))
+
+
+@certs_app.command("revoke")
+def revoke_command(
+    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Whose certificates.", metavar="NAME")]
+) -> None:
+    """Revoke a name for good: under this CA it never gets a certificate again.
+
+    Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are deployed and restarted;
+    a run with gateways reads it beside its --ca. For example, a robot that was stolen:
+
+      swarmwire certs revoke lab-ca flock-3
+    """
+    CERTIFICATES.need("certs")
+    from swarmwire.deploy.certificates.folder import revoke
+    from swarmwire.deploy.certificates.register import REVOKED, Register
+
+    revoke(folder, name, WallClock())
+    names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())
+    typer.echo(f"written: {folder / REVOKED}; in the robots' settings: revoked = [{names}]")
+
+
+COLUMNS = ("name", "for", "addresses", "serial", "valid until", "state")
+ENDING = ("ends soon", "ended")
+SERIAL_DIGITS = 12  # of up to 40, which --json tells
+
+
+@certs_app.command("list")
+def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> None:
+    """List certificates, and warn of those that end within 30 days.
+
+    For example:
+
+      swarmwire certs list lab-ca
+    """
+    from swarmwire.deploy.certificates.register import Register, date_now
+
+    states = list(Register.read(folder).states(date_now(WallClock())))
+    if as_json:
+        from msgspec import to_builtins
+
+        typer.echo(json.dumps([to_builtins(of) | {"state": state} for of, state in states], indent=2))
+        return
+    _print_issued(states)
+    ending = [of.name for of, state in states if state in ENDING]
+    if states[0][1] in ENDING:
+        typer.echo(f"warning: all must be renewed with their CA: swarmwire certs init --renew {folder}", err=True)
+    elif ending:
+        typer.echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
+
+
+def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
+    from rich.console import Console
+
+    from swarmwire.deploy.certificates.register import text_of
+    from swarmwire.deploy.terminal.tables import print_rows
+
+    rows = [
+        (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], text_of(of.valid_until), state)
+        for of, state in states
+    ]
+    print_rows(COLUMNS, rows, Console(highlight=False))

@@ -1,0 +1,154 @@
+"""`swarmwire compare`, `report` and `sim-to-real`: what campaigns, runs and robots' logs say."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+
+if TYPE_CHECKING:
+    from swarmwire.metrics.report.page import Report
+
+HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
+
+
+def compare_command(
+    a: Annotated[str, typer.Argument(help=HELP, metavar="A")],
+    b: Annotated[str, typer.Argument(help=HELP, metavar="B")],
+    response: Annotated[
+        list[str] | None,
+        typer.Option(help="A column of responses, or a metric for its last value. Repeatable.", metavar="NAME"),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Compare where this parameter has this value. Repeatable.", metavar="PATH=VALUE"),
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="Write the numbers to this file, too.", metavar="FILE.csv")] = None,
+) -> None:
+    """Compare two campaigns: medians, their difference and how sure it is, at each design point that both have.
+
+    Points that agree in every parameter that both vary are compared, and seeds that both ran one by one. Unless
+    responses are named they are all times, the last values of metrics, and the link PDR. For example:
+
+      swarmwire compare runs/plain runs/smoothed --response order
+
+      swarmwire compare runs/loss@radio.loss=0 runs/loss@radio.loss=0.4
+    """
+    # Imported here: polars and scipy take a second, which --help should not.
+    from rich.console import Console
+
+    from swarmwire.deploy.terminal.tables import print_comparison
+    from swarmwire.metrics.campaign.compare import compare, write_comparison
+    from swarmwire.metrics.campaign.folder import at as at_points
+    from swarmwire.metrics.campaign.folder import select
+
+    first, second = at_points([select(a), select(b)], at or [])
+    found = compare(first, second, response or [])
+    print_comparison(found, Console(highlight=False))
+    if to is not None:
+        write_comparison(found, to)
+        typer.echo(f"written: {to}")
+
+
+def report_command(
+    folder: Annotated[Path, typer.Argument(help="The folder of a campaign or of a run.", metavar="DIR")],
+    response: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of a campaign: a column, or a metric for its last value. Repeatable. Default: eight at most.",
+            metavar="NAME",
+        ),
+    ] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option(help="The page; figures go to a folder beside it. Default: report.html in DIR.", metavar="FILE"),
+    ] = None,
+) -> None:
+    """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
+
+    Also of what is not finished. Unless responses are named they are times, last values of metrics and the link PDR, of
+    those that differ between runs; tables that are folded hold the others. For example:
+
+      swarmwire report campaigns/loss --response aggregation_time_s --response order
+    """
+    # Imported here: matplotlib and scipy take a second, which --help should not.
+    from swarmwire.metrics.report.page import PAGE, write_report
+
+    written = write_report(_report(folder, response or []), to or folder / PAGE)
+    typer.echo(f"written: {written[0]}")
+    if len(written) > 1:
+        typer.echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
+
+
+def _report(folder: Path, responses: list[str]) -> "Report":
+    """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
+    from swarmwire.metrics.campaign.folder import CampaignFolder
+    from swarmwire.metrics.campaign.spec import ABOUT
+    from swarmwire.metrics.report.campaign import campaign_report
+    from swarmwire.metrics.report.run import run_report
+    from swarmwire.metrics.run_folder.layout import STATIC
+
+    if (folder / ABOUT).exists():
+        return campaign_report(CampaignFolder(folder), responses)
+    if not (folder / STATIC).exists():
+        raise BadInput(str(folder), "", f"expected the folder of a campaign ({ABOUT}) or of a run ({STATIC})")
+    if responses:
+        raise BadInput("--response", responses[0], "expected a campaign: a run has all its metrics in its report")
+    return run_report(folder)
+
+
+def sim_to_real_command(
+    emulated: Annotated[
+        str,
+        typer.Argument(
+            help="The folder of a run, or of a campaign for the spread over its seeds (FOLDER@radio.loss=0.4: a part).",
+            metavar="EMULATED_RUN",
+        ),
+    ],
+    log: Annotated[
+        Path, typer.Argument(help="Folder with a folder per robot, or that of one robot.", metavar="REAL_LOG")
+    ],
+    to: Annotated[
+        Path | None, typer.Option(help="A page with the distributions, too; figures go beside it.", metavar="FILE.html")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the numbers to this file, too.", metavar="FILE.csv")] = None,
+) -> None:
+    """Compare a log of real robots with emulated runs: the same metrics side by side, and how far apart they are.
+
+    With a campaign each metric is within the spread if the log is no farther from the runs than the runs are from one
+    another. What a log cannot know (contacts, times on air, who is within range) is left out. For example:
+
+      swarmwire robots logs fleet.toml --fetch logs/monday
+
+      swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
+    """
+    # Imported here: polars, scipy and numba take a second, which --help should not.
+    from rich.console import Console
+
+    from swarmwire.deploy.sim_to_real import differing_settings, read_emulation
+    from swarmwire.deploy.terminal.tables import print_sim_to_real
+    from swarmwire.metrics.atomic import check_output_path
+    from swarmwire.metrics.real_log.real_logs import read_real_logs
+    from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
+    from swarmwire.metrics.sim_to_real.report import write_sim_to_real
+    from swarmwire.metrics.sim_to_real.runs import measured_log
+
+    for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
+        if path is not None:
+            check_output_path(path, suffixes)
+    logs, emulation = read_real_logs(log), read_emulation(emulated)
+    shortest_s = min(run.duration_s for run in emulation.runs.runs)
+    measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
+    found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
+    told = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
+    print_sim_to_real(found, told, Console(highlight=False))
+    if to is not None:
+        from swarmwire.metrics.report.page import write_report
+        from swarmwire.metrics.sim_to_real.report import sim_to_real_report
+
+        write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), to)
+        typer.echo(f"written: {to}")
+    if csv is not None:
+        write_sim_to_real(found, csv)
+        typer.echo(f"written: {csv}")

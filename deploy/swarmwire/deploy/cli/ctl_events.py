@@ -1,0 +1,325 @@
+"""Commands of `swarmwire ctl` that give a run an event: for its robots, its radio, or any that a scenario can have."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli.ctl import Chosen, control_of, tell
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.live.remote_control import RemoteControl
+
+
+Which = Annotated[
+    list[str],
+    typer.Argument(
+        help="Names (flock-3), a group (flock), a number of them (5), a share (20%), or all.", metavar="ROBOTS"
+    ),
+]
+ForS = Annotated[
+    float | None, typer.Option("--for", help="Undone after so many simulated seconds. Default: not.", metavar="S")
+]
+
+events_app = typer.Typer()
+
+
+@events_app.command("kill")
+def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> None:
+    """Kill robots: they stop where they stand, and say nothing.
+
+    For example two by name, or five drawn for 20 s:
+
+      swarmwire ctl kill flock-3 flock-7
+
+      swarmwire ctl kill 5 --for 20
+
+      swarmwire ctl kill scouts 50%
+    """
+    give(context.obj, {"do": "kill", "robots": selection_of(robots), "for_s": for_s})
+
+
+@events_app.command("revive")
+def revive_command(context: typer.Context, robots: Which) -> None:
+    """Have robots that were killed act again, with a fresh memory.
+
+    For example all of them:
+
+      swarmwire ctl revive all
+    """
+    give(context.obj, {"do": "revive", "robots": selection_of(robots)})
+
+
+@events_app.command("impulse")
+def impulse_command(
+    context: typer.Context,
+    robots: Which,
+    speed_mps: Annotated[float, typer.Option("--speed", help="Added to their velocity, m/s.", metavar="M/S")],
+    direction_rad: Annotated[
+        float, typer.Option("--direction", help="Where to, in the arena: 0 along x, 1.57 along y.", metavar="RAD")
+    ] = 0.0,
+) -> None:
+    """Push robots: their velocity changes at once; then it is up to their motors.
+
+    For example along y:
+
+      swarmwire ctl impulse flock-3 --speed 0.5 --direction 1.57
+    """
+    table = {"do": "impulse", "robots": selection_of(robots), "speed_mps": speed_mps, "direction_rad": direction_rad}
+    give(context.obj, table)
+
+
+RADIO = "radio."
+
+
+@events_app.command("partition")
+def partition_command(
+    context: typer.Context,
+    halves: Annotated[
+        str | None,
+        typer.Argument(help="x: robots left of the middle against all others; y: those below.", metavar="[x|y]"),
+    ] = None,
+    between: Annotated[
+        list[str] | None,
+        typer.Option(help="A set of groups and robots, a,b-3; twice or more: the sets.", metavar="NAMES"),
+    ] = None,
+    isolate: Annotated[
+        str | None, typer.Option(help="Groups and robots, a,b-3, each of which is alone.", metavar="NAMES")
+    ] = None,
+    one_way: Annotated[
+        bool, typer.Option("--one-way", help="Of two sets the second does not hear the first, which hears it.")
+    ] = False,
+    for_s: ForS = None,
+) -> None:
+    """Let sets of robots not hear one another, until `end` or after a time.
+
+    For example:
+
+      swarmwire ctl partition x
+
+      swarmwire ctl partition --between flock-0,flock-1 --between scouts --for 30
+
+      swarmwire ctl partition --isolate flock-3
+    """
+    table: dict[str, Any] = {
+        "do": "partition",
+        "halves": halves,
+        "between": None if between is None else [_names(item) for item in between],
+        "isolate": None if isolate is None else _names(isolate),
+        "one_way": one_way or None,
+        "for_s": for_s,
+    }
+    give(context.obj, table)
+
+
+@events_app.command("jam")
+def jam_command(
+    context: typer.Context,
+    robots: Annotated[
+        list[str] | None, typer.Argument(help="Who carry a jammer each, as for kill.", metavar="[ROBOTS]")
+    ] = None,
+    at: Annotated[
+        str | None, typer.Option(help="Where it stands, in m from the arena's middle.", metavar="X,Y")
+    ] = None,
+    power_dbm: Annotated[float, typer.Option("--power", help="What it radiates, dBm.", metavar="DBM")] = 20.0,
+    duty: Annotated[float | None, typer.Option(help="The share of time for which it is on. Default: 1.")] = None,
+    for_s: ForS = None,
+) -> None:
+    """Put up a jammer, in runs whose radio has signals, until `end` or after a time.
+
+    For example in the middle:
+
+      swarmwire ctl jam --at 0,0 --power 10
+
+      swarmwire ctl jam flock-3 --for 30
+    """
+    table: dict[str, Any] = {
+        "do": "jammer",
+        "at": None if at is None else _place(at),
+        "robots": selection_of(robots) if robots else None,
+        "power_dbm": power_dbm,
+        "duty": duty,
+        "for_s": for_s,
+    }
+    give(context.obj, table)
+
+
+@events_app.command("set")
+def set_command(
+    context: typer.Context,
+    settings: Annotated[list[str], typer.Argument(help="Numbers of the radio, such as loss=0.5.", metavar="KEY=VALUE")],
+    over_s: Annotated[
+        float, typer.Option("--over", help="How long the way there takes, simulated seconds.", min=0, metavar="S")
+    ] = 0.0,
+) -> None:
+    """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` prints them.
+
+    For example:
+
+      swarmwire ctl set loss=0.6 latency_s=0.2
+
+      swarmwire ctl set range_m=0.5 --over 20
+    """
+    tables = [_ramp(setting, over_s) for setting in settings]
+    with control_of(context.obj) as control:
+        for table in tables:
+            give_to(control, table)
+
+
+def _ramp(setting: str, over_s: float) -> dict[str, Any]:
+    key, equals, value = setting.partition("=")
+    try:
+        to = float(value)
+    except ValueError:
+        equals, to = "", 0.0
+    if not equals or not key:
+        raise BadInput("KEY=VALUE", "", f"expected a number for a key of [radio], such as loss=0.5; got {setting!r}")
+    return {"do": "ramp", "what": RADIO + key.strip().removeprefix(RADIO), "to": to, "over_s": over_s}
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _place(text: str) -> list[float]:
+    try:
+        x_m, y_m = map(float, text.split(","))
+    except ValueError:
+        raise BadInput("--at", "", f"expected two numbers such as 1.5,-2; got {text!r}") from None
+    return [x_m, y_m]
+
+
+COLUMNS = ("number", "tick", "event", "")
+
+
+@events_app.command("event")
+def event_command(
+    context: typer.Context,
+    table: Annotated[
+        str, typer.Argument(help="A table as that of an event in a scenario, without at_s.", metavar="'{ do = …, … }'")
+    ],
+) -> None:
+    """Have any event happen at the start of the next tick; `swarmwire list events` names them.
+
+    For example:
+
+      swarmwire ctl event '{ do = "fail", part = "motors", robots = { count = 3 }, for_s = 10 }'
+
+      swarmwire ctl event '{ do = "partition", halves = "y", bridge = ["flock-0"] }'
+    """
+    give(context.obj, _table(table))
+
+
+@events_app.command("events")
+def events_command(context: typer.Context) -> None:
+    """List the run's events, the scenario's and those given: number, tick, what, and whether it is over.
+
+    For example:
+
+      swarmwire ctl events
+    """
+    from rich.console import Console
+
+    from swarmwire.deploy.terminal.tables import print_rows
+
+    with control_of(context.obj) as control:
+        events = control.status()["events"]
+    if not events:
+        typer.echo("no events")
+        return
+    rows = [
+        (
+            str(event["number"]),
+            "to come"
+            if event["tick"] is None and not event["over"]
+            else str(event["tick"] if event["tick"] is not None else ""),
+            event["text"],
+            "over" if event["over"] else "",
+        )
+        for event in events
+    ]
+    print_rows(COLUMNS, rows, Console(highlight=False))
+
+
+@events_app.command("end")
+def end_command(
+    context: typer.Context,
+    number: Annotated[
+        int, typer.Argument(help="Of the event, as `swarmwire ctl events` prints it.", min=0, metavar="NUMBER")
+    ],
+) -> None:
+    """Undo an event that lasts, such as a kill, a partition, a jammer or a number that was set.
+
+    For example:
+
+      swarmwire ctl end 3
+    """
+    with control_of(context.obj) as control:
+        tell(control.end(number))
+
+
+def _table(text: str) -> dict[str, Any]:
+    from swarmwire.comms.config import from_toml
+
+    try:
+        found = from_toml(f"event = {text}")
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput("event", "", f"expected a TOML table on one line: {error}") from None
+    table: object = found["event"]
+    if len(found) != 1 or not isinstance(table, dict) or "do" not in table:
+        raise BadInput("event", "", 'expected a table with do, such as { do = "kill", robots = { count = 3 } }')
+    return cast("dict[str, Any]", table)
+
+
+ALL = "all"
+
+
+def selection_of(words: Sequence[str]) -> dict[str, Any]:
+    """The selection of names, or of a group, a number or a share, or of both; BadInput for anything else.
+
+    >>> selection_of(["flock-3", "flock-7"]), selection_of(["flock", "20%"]), selection_of(["all"])
+    ({'names': ['flock-3', 'flock-7']}, {'group': 'flock', 'share': 0.2}, {'share': 1.0})
+    """
+    given = [part for word in words for part in word.split(",") if part]
+    if given == [ALL]:
+        return {"share": 1.0}
+    if given and all(_is_name(word) for word in given):
+        return {"names": given}
+    amounts = [word for word in given if word[:1].isdigit()]
+    groups = [word for word in given if word not in amounts]
+    if len(amounts) > 1 or len(groups) > 1 or any(map(_is_name, groups)):
+        expected = "expected names such as flock-3, or a group, a number or share of it such as 5 or 20%, or all"
+        raise BadInput("ROBOTS", "", f"{expected}; got {' '.join(words)}")
+    selection: dict[str, Any] = {"group": groups[0]} if groups else {}
+    return selection | (_amount(amounts[0]) if amounts else {})
+
+
+def _is_name(word: str) -> bool:
+    group, dash, number = word.rpartition("-")
+    return bool(group and dash) and number.isdecimal()
+
+
+def _amount(word: str) -> dict[str, Any]:
+    try:
+        return {"share": float(word[:-1]) / 100.0} if word.endswith("%") else {"count": int(word)}
+    except ValueError:
+        raise BadInput("ROBOTS", "", f"expected a number such as 5, or a share such as 20%; got {word!r}") from None
+
+
+def give(chosen: Chosen, table: Mapping[str, Any]) -> None:
+    """Have the run take an event, and say how to end it if it lasts."""
+    with control_of(chosen) as control:
+        give_to(control, table)
+
+
+def give_to(control: "RemoteControl", table: Mapping[str, Any]) -> None:
+    """The same, of a run that is already spoken to."""
+    number = control.event(without_none(table))
+    typer.echo(f"event {number}: {table['do']}, from the next tick on")
+
+
+def without_none(table: Mapping[str, Any]) -> dict[str, Any]:
+    """An event's table with what is said alone."""
+    return {name: value for name, value in table.items() if value is not None}

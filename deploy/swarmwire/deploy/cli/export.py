@@ -1,0 +1,154 @@
+"""`swarmwire export` and `draw`: files of a run, and pictures of what has not run."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli.options import USUAL_SIZE_PX, Overrides, Seed
+from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
+
+DEFAULT_NAME = "picture.png"
+FILES = "; ".join(f"{', '.join(of.suffixes)}: {of.help}" for of in EXPORTERS if of in DEFAULTS)
+KINDS = "; ".join(f"{of.name} ({', '.join(of.suffixes)}): {of.help}" for of in EXPORTERS if of not in DEFAULTS)
+
+Run = Annotated[Path, typer.Argument(help="A run folder, of a run that goes on or was killed too.", metavar="RUN")]
+To = Annotated[
+    Path | None,
+    typer.Option(help=f"The file, whose suffix selects its content. {FILES}. Default: picture.png in RUN."),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option(help=f"Another content for the same suffix. {KINDS}. Default: arena."),
+]
+At = Annotated[
+    float | None, typer.Option("--at", help="Time of a picture, in s. Default: the end of the run.", metavar="S")
+]
+From = Annotated[float | None, typer.Option("--from", help="Start of what is exported, in s.", metavar="S")]
+Until = Annotated[float | None, typer.Option("--until", help="End of what is exported, in s.", metavar="S")]
+FramesPerS = Annotated[
+    float | None,
+    typer.Option(help="Frames per second of a film. Default: 10 (GIF), 25 (MP4), or one per tick if that is less."),
+]
+Speed = Annotated[
+    float | None,
+    typer.Option(help="Simulated seconds per second of a film. Default: 1, or more, for 300 frames at most."),
+]
+Arena = Annotated[int | None, typer.Option(help="Which of several arenas. Default: 0.")]
+Metric = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="A metric beside the arena, or a column of the table. Repeatable. Default: up to three, or all.",
+        metavar="NAME",
+    ),
+]
+Size = Annotated[
+    int | None, typer.Option(help="Longer side in pixels. Default: 1280 (pictures), 480 (GIF), 960 (MP4).")
+]
+
+
+def export_command(
+    run: Run,
+    to: To = None,
+    kind: Kind = None,
+    at_s: At = None,
+    from_s: From = None,
+    until_s: Until = None,
+    fps: FramesPerS = None,
+    speed: Speed = None,
+    arena: Arena = None,
+    metric: Metric = None,
+    size: Size = None,
+) -> None:
+    """Export a run as a picture, a film, a capture of its radio or a table; the suffix of the file decides.
+
+    Pictures and films need no screen. They show the arena, and metrics beside it; lines join robots that are in radio
+    range and sight of one another, regardless of partitions and failed radios. A capture needs a run with packets
+    recorded (--packets all).
+
+      swarmwire export runs/first --to first.gif
+      swarmwire export runs/first --to at-4s.png --at 4
+    """
+    console = Console(highlight=False)
+    target = to or run / DEFAULT_NAME
+    options = ExportOptions(at_s, from_s, until_s, fps, speed, arena, metric or None, size, console)
+    note = export(run, target, options, kind) or f"{target.stat().st_size / 1e6:.2g} MB"
+    console.print(f"written: {target} ({note})", soft_wrap=True)
+
+
+_ONLY_IN_BODIES = ("like", "drive", "radius_m")
+
+
+def draw_command(
+    subject: Annotated[
+        str,
+        typer.Argument(help="A scenario or a body's data sheet, both TOML files, or a body's name.", metavar="WHAT"),
+    ],
+    to: Annotated[
+        Path | None, typer.Option(help="The picture: .png, .svg or .pdf. Default: NAME.png in this folder.")
+    ] = None,
+    seed: Seed = None,
+    size: Annotated[int, typer.Option(help="Longer side in pixels.")] = USUAL_SIZE_PX,
+    overrides: Overrides = None,
+) -> None:
+    """Draw a scenario as it starts, or a body with its sensors, without running anything.
+
+    A scenario: arena, obstacles, lights, every robot where the seed puts it, and how far the radio reaches.
+    A body: to scale and from above, with wheels, rays and photocells, its figures and their source.
+    """
+    path = Path(subject)
+    if path.suffix != ".toml":
+        written = to or Path(f"{subject}.png")
+        _refuse_settings(seed, overrides)
+        _draw_named_body(subject, written, size)
+    else:
+        written = to or Path(f"{path.stem}.png")
+        if _is_sheet(path):
+            _refuse_settings(seed, overrides)
+            _draw_sheet(path, written, size)
+        else:
+            _draw_scenario(path, seed, overrides or [], written, size)
+    typer.echo(f"written: {written}")
+
+
+def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path, size_px: int) -> None:
+    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.metrics.drawing.scenario import draw_scenario
+
+    simulation = Simulation(path, seed=seed, overrides=overrides)
+    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to, size_px)
+
+
+def _draw_named_body(name: str, to: Path, size_px: int) -> None:
+    from swarmwire.comms.bodies.body import body_names, load_body
+    from swarmwire.metrics.drawing.bodies import draw_body
+
+    if name not in body_names():
+        raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
+    draw_body(load_body(name), to, size_px)
+
+
+def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
+    from swarmwire.metrics.drawing.bodies import draw_body
+    from swarmwire.world.scenario.bodies import read_body
+
+    draw_body(read_body(path, str(path), ""), to, size_px)
+
+
+def _is_sheet(path: Path) -> bool:
+    """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
+    from swarmwire.comms.config import from_toml
+
+    try:
+        found = from_toml(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return False
+    return "robots" not in found and any(key in found for key in _ONLY_IN_BODIES)
+
+
+def _refuse_settings(seed: int | None, overrides: list[str] | None) -> None:
+    for option, given in (("--seed", seed is not None), ("--set", bool(overrides))):
+        if given:
+            raise BadInput(option, "", "expected a scenario; a body has nothing to set")

@@ -1,0 +1,189 @@
+"""`swarmwire check`, `list`, `describe`, `schema`, `new` and `verify`: what there is, and whether it is in order."""
+
+import json
+import re
+from dataclasses import asdict
+from importlib.resources import files
+from keyword import iskeyword
+from pathlib import Path
+from string import Template
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile
+
+
+def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
+    """Check a scenario without running it: keys, values, agents, what they need, and room for everything."""
+    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.world.scenario_file import load_scenario
+
+    checked = load_scenario(scenario, overrides or [])
+    simulation = Simulation(checked)
+    static, engines = simulation.static, " and ".join(simulation.world.engines)
+    groups = ", ".join(f"{group.stop - group.start} x {group.body.name} ({group.name})" for group in static.groups)
+    last_s = (simulation.ticks - 1) / static.rate_hz  # start of the last tick
+    late = [f"events.{place}" for place, event in enumerate(checked.events) if event.at_s > last_s]
+    too_late = f"; too late to happen: {', '.join(late)}" if late else ""
+    length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"
+    typer.echo(f"OK {scenario}: {groups}, {length}, engine {engines}{too_late}")
+
+
+def list_command(
+    kind: Annotated[
+        str | None,
+        typer.Argument(help="bodies, sensors, behaviours, events, metrics, …; all kinds if left out.", metavar="KIND"),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List what a scenario or an agent may name: the kinds, or all things of one kind.
+
+    For example all events, and then one of them:
+
+      swarmwire list events
+
+      swarmwire describe kill
+    """
+    # Imported here: pydantic, numba and scipy take a second, which --help should not.
+    from swarmwire.deploy.catalogue.kinds import KINDS, kind_named, print_kinds, print_list
+
+    console = Console(highlight=False)
+    found = None if kind is None else kind_named(kind)
+    if as_json:
+        things = {of.name: [asdict(entry) for entry in of.entries()] for of in ([found] if found else KINDS)}
+        typer.echo(json.dumps(things, indent=2))
+    elif found:
+        print_list(found, console)
+    else:
+        print_kinds(console)
+
+
+def describe_command(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A name that `swarmwire list` prints, an agent class or a body's sheet of your own.", metavar="NAME"
+        ),
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Describe one thing: what it is, its parameters with unit, default and bounds, and where its figures come from.
+
+    For example a body, a key of a scenario, one of two things of the same name, an agent and a body of your own:
+
+      swarmwire describe epuck
+
+      swarmwire describe radio.loss
+
+      swarmwire describe event:blackout
+
+      swarmwire describe my_agent.py:Mine
+
+      swarmwire describe mine.toml
+    """
+    # Imported here: pydantic, numba and scipy take a second, which --help should not.
+    from swarmwire.deploy.catalogue.kinds import find, print_entry
+
+    entry = find(name)
+    if as_json:
+        typer.echo(json.dumps(asdict(entry), indent=2))
+    else:
+        print_entry(entry, Console(highlight=False))
+
+
+def schema_command() -> None:
+    """Print the JSON schema of a scenario, for editors and programs."""
+    from swarmwire.world.scenario_file import scenario_schema
+
+    typer.echo(json.dumps(scenario_schema(), indent=2))
+
+
+def new_command(
+    name: Annotated[
+        str, typer.Argument(help="The new folder: small letters, digits and _, such as my_swarm.", metavar="NAME")
+    ],
+    within: Annotated[Path, typer.Option("--in", help="The folder in which to make it.", metavar="DIR")] = Path(),
+) -> None:
+    """Make a folder to start from: an agent, a scenario with a lossy radio, a test that passes, and a README.
+
+    For example, and then a first run of it:
+
+      swarmwire new my_swarm
+
+      swarmwire run my_swarm/scenario.toml
+    """
+    made = new_swarm(name, within)
+    folder = made[0].parent
+    typer.echo(f"made {folder}: {', '.join(path.name for path in made)}")
+    typer.echo(f"run it:    swarmwire run {folder / 'scenario.toml'}")
+    typer.echo(f"check it:  swarmwire check {folder / 'scenario.toml'}")
+    typer.echo(f"test it:   python -m pytest {folder}")
+
+
+STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # red for the others
+
+
+def verify_command(
+    folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="RUN")],
+) -> None:
+    """Check a run folder: read all of it, compare it with its summary, and say what is missing.
+
+    Exit code 0: intact; 1: incomplete or damaged (what a killed run left can still be read); 2: no run folder.
+    """
+    from swarmwire.metrics.run_folder.verify import verify
+
+    findings = verify(folder)
+    console = Console(highlight=False)
+    table = Table(title=Text(str(folder)), title_justify="left", title_style="bold")
+    for column in ("part", "state", ""):
+        table.add_column(column, overflow="fold")
+    for finding in findings:
+        style = STYLES.get(finding.state, "red")
+        table.add_row(Text(finding.part), Text(finding.state, style=style), Text(finding.text))
+    console.print(table)
+    bad = [finding for finding in findings if not finding.good]
+    if bad:
+        console.print("not intact: " + ", ".join(f"{finding.part} {finding.state}" for finding in bad), soft_wrap=True)
+        raise typer.Exit(FAILED)
+    console.print("intact: everything is there, readable, and as the summary says")
+
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+
+
+def new_swarm(name: str, within: Path) -> list[Path]:
+    """Make the folder `name` in `within`; its files. BadInput for a bad name, or where the folder cannot be made."""
+    if not NAME.fullmatch(name) or iskeyword(name):
+        expected = f"expected at most 40 small letters, digits and _ that start with a letter, got {name!r}"
+        raise BadInput("NAME", "", expected)
+    folder = within / name
+    texts = {file: _text(template, name) for template, file in _files(name).items()}
+    try:
+        folder.mkdir()
+        for file, text in texts.items():
+            (folder / file).write_text(text, encoding="utf-8")
+    except FileExistsError:
+        raise BadInput(str(folder), "", "expected a name that is free: something is there already") from None
+    except OSError as error:
+        raise BadInput(str(folder), "", f"expected a folder that can be made: {error.strerror}") from error
+    return [folder / file for file in texts]
+
+
+def _files(name: str) -> dict[str, str]:
+    """By file of the template: its name in the new folder."""
+    return {
+        "agent.py": "agent.py",
+        "scenario.toml": "scenario.toml",
+        "test_swarm.py": f"test_{name}.py",
+        "README.md": "README.md",
+    }
+
+
+def _text(template: str, name: str) -> str:
+    path = files("swarmwire.deploy").joinpath("swarm_template", template)
+    return Template(path.read_text(encoding="utf-8")).substitute(name=name)

@@ -1,0 +1,225 @@
+"""Arguments and options that several commands take, and how commands end: each is defined here once.
+
+Options stand in the order in which help shows them: what is run and how, what is recorded, where it is watched, access
+to a network, and robots that answer as real ones.
+"""
+
+import select
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.errors import Interrupted
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.controls import Interrupt
+
+USUAL_SIZE_PX = 1280  # of pictures, along the longer side
+ACCESS = "Beyond this machine"
+GATEWAYS = "Robots that answer as real ones"
+
+ScenarioFile = Annotated[Path, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")]
+FleetFile = Annotated[Path, typer.Argument(help="The fleet, a TOML file.", metavar="FLEET")]
+AuthorityFolder = Annotated[Path, typer.Argument(help="The folder of the CA.", metavar="DIR")]
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Set a value by its path, e.g. robots.flock.params.separation_m=0.3. Repeatable.",
+        metavar="PATH=VALUE",
+    ),
+]
+Seed = Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")]
+Seeds = Annotated[
+    str | None,
+    typer.Option(help="One arena per seed, side by side: 9 (1 to 9), 4:10 (4 to 9) or 1,5,7.", metavar="SEEDS"),
+]
+Runners = Annotated[
+    str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
+]
+RealTime = Annotated[
+    str | None,
+    typer.Option(help="Run at this many simulated seconds per second, and wait for no runner.", metavar="FACTOR"),
+]
+Subtick = Annotated[
+    float | None,
+    typer.Option(
+        help="In real time, wake every so many seconds between ticks, 0.001 or more, and let packets cross then.",
+        metavar="SECONDS",
+    ),
+]
+Socket = Annotated[
+    Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
+]
+
+Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
+Packets = Annotated[
+    str,
+    typer.Option(
+        help='Packets to record in packets.parquet: "off", "all", or a share of them, such as 0.1.',
+        metavar="off|all|SHARE",
+    ),
+]
+Links = Annotated[
+    bool, typer.Option("--links", help="Record radio_links.parquet: packets by sender, receiver and fate.")
+]
+Rrd = Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")]
+Select = Annotated[
+    str | None,
+    typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
+]
+
+View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
+Ui = Annotated[
+    bool,
+    typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused."),
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of the page for a browser. Default: a free one.", min=1, max=65535)
+]
+WithParent = Annotated[bool, typer.Option("--with-parent", hidden=True, help="End when standard input is closed.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Size = Annotated[int, typer.Option(help="Longer side of the picture in pixels.")]
+
+OfRobots = Annotated[
+    list[str] | None,
+    typer.Option("--robots", help="Only these robots: flock-0,flock-3. Repeatable. Default: all.", metavar="NAMES"),
+]
+OfGroups = Annotated[
+    list[str] | None, typer.Option("--group", help="Only the robots of these groups. Repeatable.", metavar="NAMES")
+]
+
+
+def _names(option: str, who: str) -> typer.models.OptionInfo:
+    return typer.Option(
+        option,
+        help=f"A name on a certificate: {who}. With --certs the register has these names. Repeatable.",
+        metavar="NAME",
+        rich_help_panel=ACCESS,
+    )
+
+
+Endpoint = Annotated[
+    str | None,
+    typer.Option(
+        help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=ACCESS
+    ),
+]
+Certs = Annotated[
+    Path | None,
+    typer.Option(
+        "--certs",
+        help="A folder with ca.pem, a certificate with its key, and the register of `swarmwire certs`, which has who "
+        "may take part and who is revoked.",
+        metavar="DIR",
+        rich_help_panel=ACCESS,
+    ),
+]
+Name = Annotated[
+    str | None,
+    typer.Option(
+        "--name", help="Whose certificate, if the folder has several.", metavar="NAME", rich_help_panel=ACCESS
+    ),
+]
+Ca = Annotated[
+    Path | None,
+    typer.Option(
+        help="Instead of --certs: who signed the certificates; with --certificate and --key.", rich_help_panel=ACCESS
+    ),
+]
+Certificate = Annotated[Path | None, typer.Option(help="The own certificate.", rich_help_panel=ACCESS)]
+Key = Annotated[Path | None, typer.Option(help="Its key, which its owner alone may read.", rich_help_panel=ACCESS)]
+RunnerNames = Annotated[list[str] | None, _names("--runner", "who may run robots' agents")]
+ObserverNames = Annotated[list[str] | None, _names("--observer", "who may look on")]
+OperatorNames = Annotated[list[str] | None, _names("--operator", "who may look on and control")]
+RouterNames = Annotated[list[str] | None, _names("--router", "who passes on what others may send")]
+WorldNames = Annotated[list[str] | None, _names("--world", "who is taken for the world")]
+Revoked = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--revoked",
+        help="A name whose certificate no longer counts, beside those that the register (certs.json beside the CA's "
+        "certificate) names. Repeatable.",
+        metavar="NAME",
+        rich_help_panel=ACCESS,
+    ),
+]
+Insecure = Annotated[
+    bool,
+    typer.Option(
+        "--insecure",
+        help="Go beyond this machine without certificates: anybody there can take part, overhear and drive robots.",
+        rich_help_panel=ACCESS,
+    ),
+]
+
+Gateway = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="All robots, or those of GROUP, answer as real ones: as epuck2 or ros2 (swarmwire list gateways), at "
+        "ADDRESS, or where the gateway chooses. Repeatable.",
+        metavar="[GROUP=]KIND[@ADDRESS]",
+        rich_help_panel=GATEWAYS,
+    ),
+]
+GatewaySet = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Set an option of the gateways that have it, or of GROUP's; swarmwire describe gateway:KIND names them. "
+        "Repeatable.",
+        metavar="[GROUP.]OPTION=VALUE",
+        rich_help_panel=GATEWAYS,
+    ),
+]
+NetworkEndpoint = Annotated[
+    str | None,
+    typer.Option(
+        "--network",
+        help="Where the run sends its robots' agents their poses, and lends them its radio. Default: "
+        "tcp/127.0.0.1:0, a free port of this machine.",
+        metavar="ENDPOINT",
+        rich_help_panel=GATEWAYS,
+    ),
+]
+Swarm = Annotated[
+    str | None,
+    typer.Option(help="Name of the swarm in that network. Default: swarm.", metavar="NAME", rich_help_panel=GATEWAYS),
+]
+
+
+FAILED = 1  # the run failed: an agent's error, a runner lost
+DIFFERENT = 1  # a repetition came out differently, or there is nothing to compare it with
+BAD_INPUT = 2
+HUNG_UP = 129  # the terminal is gone, with a summary
+INTERRUPTED = 130  # Ctrl-C, with a summary
+
+
+def program() -> Path:
+    """This program as people can type it here: it need not be on their path, as with `uv run`."""
+    called = Path(sys.argv[0])
+    if called.name != "swarmwire":  # python -m
+        return Path("swarmwire")
+    return called.relative_to(Path.cwd()) if called.is_relative_to(Path.cwd()) else called
+
+
+@contextmanager
+def leaving_when_hung_up(interrupt: "Interrupt") -> Generator[None]:
+    """Leave the command after the block if SIGHUP came in it, without a word: to print would fail."""
+    try:
+        yield
+    except Interrupted:  # before the first tick
+        if not interrupt.hung_up:
+            raise
+    if interrupt.hung_up:
+        raise typer.Exit(HUNG_UP)
+
+
+def standard_input_closed() -> bool:
+    """Whether standard input is at its end; a view that belongs to a run ends with the run's process."""
+    return bool(select.select([sys.stdin], [], [], 0)[0])

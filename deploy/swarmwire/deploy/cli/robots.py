@@ -1,0 +1,320 @@
+"""`swarmwire robots`: what runs on a fleet of real robots, over SSH, on all at the same time."""
+
+import json
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+from rich.console import Console
+
+from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.extras import FLEET
+from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, OfRobots
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.fleet.connecting import NewHost
+    from swarmwire.deploy.fleet.deploy import Contents
+    from swarmwire.deploy.fleet.fleet import Fleet, Robot
+    from swarmwire.deploy.fleet.result import Result, Watcher
+    from swarmwire.deploy.fleet.units import RobotState
+
+
+robots_app = typer.Typer(
+    help="A fleet of real robots, as a fleet.toml lists it: what runs on them, over SSH, all at the same time.",
+    no_args_is_help=True,
+)
+
+
+def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
+    """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
+    FLEET.need("robots")
+    from swarmwire.deploy.fleet.fleet import read_fleet
+
+    fleet = read_fleet(file)
+    return fleet, fleet.chosen(_names(robots), _names(groups))
+
+
+def _names(given: Sequence[str] | None) -> list[str]:
+    """Of texts such as "a,b"."""
+    return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
+
+
+T = TypeVar("T")
+
+
+def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
+    """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays."""
+    import asyncio  # here, as --help should not wait for it
+
+    from swarmwire.deploy.fleet.result import shown_on
+
+    async def run() -> T:
+        with shown_on(Console(stderr=True)) as watcher:
+            return await work(watcher)
+
+    try:
+        return asyncio.run(run())
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted: robots that were not done are as they were before") from None
+
+
+def tell(results: "Sequence[Result]") -> None:
+    """Print a line per robot; exit code 1 if one of them failed."""
+    from swarmwire.deploy.fleet.result import result_lines
+
+    for line in result_lines(results):
+        typer.echo(line)
+    failed = sum(not result.good for result in results)
+    if failed:
+        typer.echo(f"{failed} of {len(results)} failed", err=True)
+        raise typer.Exit(FAILED)
+
+
+@robots_app.command("check")
+def check_command(
+    file: FleetFile,
+    robots: OfRobots = None,
+    groups: OfGroups = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Show the keys of hosts that are new, and add them to known_hosts.")
+    ] = False,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Check only what can be known here: settings, agents, what they need.")
+    ] = False,
+) -> None:
+    """Check whether a deployment would work: settings, agents and their needs; each host, its Python, disk and clock.
+
+    Nothing is changed on robots. Hosts are known by their keys: with --trust keys of new ones are kept; compare
+    what is shown with `ssh-keygen -lf /etc/ssh/ssh_host_ed25519_key.pub` on the robot. A key that has changed is
+    refused either way.
+
+    Exit code 0: all is well; 1: not with every robot; 2: the fleet's file is wrong. For example, before the
+    first deployment:
+
+      swarmwire robots check fleet.toml --trust
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.connecting import trust_new
+    from swarmwire.deploy.fleet.deploy import check, contents_of
+
+    if trust and offline:
+        raise BadInput("--trust", "", "expected either --trust or --offline")
+    silent = set[tuple[str, int]]()
+    if trust:
+        hosts = [robot.host for robot in mine]
+        found = act(lambda _: trust_new(hosts, fleet.known_hosts))
+        _print_new_hosts(found, fleet.known_hosts)
+        silent = {(new.host.address, new.host.port) for new in found if not new.line}
+    contents = contents_of(fleet, mine)
+    if offline:
+        tell([told_here(robot.name, contents) for robot in mine])
+        return
+    there = [robot for robot in mine if (robot.host.address, robot.host.port) not in silent]
+    results = {of.robot: of for of in act(lambda watcher: check(fleet, there, contents.faults, watcher))}
+    tell([results.get(robot.name) or unanswered(robot) for robot in mine])
+
+
+def unanswered(robot: "Robot") -> "Result":
+    """The line of a robot whose host has shown no key."""
+    from swarmwire.deploy.fleet.result import Result
+
+    return Result(robot.name, False, f"{robot.host} does not answer", "is it switched on, and its address right?")
+
+
+def told_here(robot: str, contents: "Contents") -> "Result":
+    """A robot's line without its host."""
+    from swarmwire.deploy.fleet.result import Result
+
+    fault = contents.faults.get(robot)
+    return Result(robot, fault is None, str(fault) if fault else contents.told[robot])
+
+
+def _print_new_hosts(found: "list[NewHost]", known_hosts: Path) -> None:
+    for new in found:
+        told = f"{new.fingerprint}, added to {known_hosts}" if new.line else "did not answer"
+        typer.echo(f"new: {new.host.address}:{new.host.port}: {told}")
+
+
+@robots_app.command("deploy")
+def deploy_command(
+    file: FleetFile,
+    robots: OfRobots = None,
+    groups: OfGroups = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Start robots anew that run an older release. Default: they go on.")
+    ] = False,
+    wheels: Annotated[
+        Path | None,
+        typer.Option(help="A folder with the wheels that robots need, instead of the package index.", metavar="DIR"),
+    ] = None,
+) -> None:
+    """Bring agents, settings and all packages that they need to robots, as releases that are switched to at once.
+
+    Each is tried out on its robot first. What fails on one robot leaves that one as it was, and others go on; to do
+    it again does only what is missing. Robots keep their last three releases.
+
+    Exit code 0: all robots have it; 1: not every robot; 2: refused before anything was sent. For example:
+
+      swarmwire robots deploy fleet.toml --group red --restart
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.deploy import contents_of, deploy
+    from swarmwire.deploy.fleet.packages import LockedEnvironments
+
+    contents = contents_of(fleet, mine)
+    for error in contents.faults.values():
+        raise error
+    index = ("--no-index", "--find-links", str(wheels.resolve())) if wheels else ()
+    environments = LockedEnvironments(index=index)
+    tell(act(lambda watcher: deploy(fleet, mine, contents.entries, environments, watcher, restart=restart)))
+
+
+@robots_app.command("start")
+def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
+    """Start robots' agents; those that run go on.
+
+    Exit code 1: one of them did not start. For example:
+
+      swarmwire robots start fleet.toml --group red
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.units import start
+
+    tell(act(lambda watcher: start(fleet, mine, watcher)))
+
+
+@robots_app.command("stop")
+def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
+    """Stop robots' agents, and with them their motors.
+
+    Exit code 1: one of them is not known to have stopped. For example:
+
+      swarmwire robots stop fleet.toml --robots flock-0,flock-3
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.units import stop
+
+    tell(act(lambda watcher: stop(fleet, mine, watcher)))
+
+
+@robots_app.command("rollback")
+def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
+    """Go back to the release before; robots that run are started anew.
+
+    Exit code 1: not for every robot. For example:
+
+      swarmwire robots rollback fleet.toml --robots flock-3
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.units import rollback
+
+    tell(act(lambda watcher: rollback(fleet, mine, watcher)))
+
+
+@robots_app.command("estop")
+def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
+    """Stop robots at once, over the swarm's network and by SSH at the same time.
+
+    A line per robot shows by which way it was confirmed. Exit code 1: one of them is not confirmed, so switch it off
+    by hand. For example, all robots:
+
+      swarmwire robots estop fleet.toml
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.units import estop
+
+    tell(act(lambda watcher: estop(fleet, mine, watcher)))
+
+
+COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent")
+
+
+@robots_app.command("status")
+def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None, as_json: AsJson = False) -> None:
+    """Print what each robot runs, since when, and the last report of its agent.
+
+    Exit code 1: something is wrong. For example:
+
+      swarmwire robots status fleet.toml
+    """
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.units import status
+
+    states = act(lambda watcher: status(fleet, mine, watcher))
+    if as_json:
+        typer.echo(json.dumps([asdict(state) for state in states]))
+    else:
+        _print_states(states)
+    if not all(state.good for state in states):
+        raise typer.Exit(FAILED)
+
+
+def _print_states(states: "list[RobotState]") -> None:
+    """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
+    from rich.console import Console
+
+    from swarmwire.deploy.fleet.result import Result, result_lines
+    from swarmwire.deploy.terminal.tables import print_rows
+
+    rows = [_row(state) for state in states if not state.fault]
+    if rows:
+        print_rows(COLUMNS, rows, Console(highlight=False))
+    faults = [Result(state.robot, False, state.fault) for state in states if state.fault]
+    if faults:
+        typer.echo("\n".join(result_lines(faults)))
+
+
+def _row(state: "RobotState") -> tuple[str, ...]:
+    agent = state.agent
+    charge = agent.get("charge")
+    return (
+        state.robot,
+        state.unit + (f", {state.restarts} restarts" if state.restarts else ""),
+        state.release,
+        state.since,
+        str(agent.get("tick", "")),
+        str(agent.get("late_ticks", "")),
+        f"{charge:.0%}" if isinstance(charge, float) else "",
+        str(agent.get("state", "")),
+    )
+
+
+@robots_app.command("logs")
+def logs_command(
+    file: FleetFile,
+    robots: OfRobots = None,
+    groups: OfGroups = None,
+    lines: Annotated[int, typer.Option(min=0, help="Of each robot, the last ones.")] = 10,
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what they print, until Ctrl-C.")] = False,
+    fetch: Annotated[
+        Path | None,
+        typer.Option(help="Bring the log of each robot's last start to this folder, for parity.", metavar="DIR"),
+    ] = None,
+) -> None:
+    """Show what robots' agents print, or fetch their logs.
+
+    Exit code 1: not of every robot. For example:
+
+      swarmwire robots logs fleet.toml --robots flock-0 --follow
+
+      swarmwire robots logs fleet.toml --fetch logs/monday
+    """
+    if follow and fetch is not None:
+        raise BadInput("--fetch", "", "expected either --follow or --fetch")
+    fleet, mine = chosen(file, robots, groups)
+    from swarmwire.deploy.fleet.logs import fetch_logs, show_logs
+
+    if fetch is not None:
+        tell(act(lambda _: fetch_logs(fleet, mine, fetch)))
+        return
+    width = max(len(robot.name) for robot in mine)
+    results = act(
+        lambda _: show_logs(
+            fleet, mine, lines, lambda robot, line: typer.echo(f"{robot:{width}}  {line}"), follow=follow
+        )
+    )
+    failed = [result for result in results if not result.good]
+    if failed:
+        tell(failed)

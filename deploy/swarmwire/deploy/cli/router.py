@@ -1,0 +1,122 @@
+"""`swarmwire router`."""
+
+import json
+from collections import Counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.cli.options import (
+    Ca,
+    Certificate,
+    Certs,
+    Insecure,
+    Key,
+    Name,
+    Revoked,
+    RouterNames,
+    RunnerNames,
+    WorldNames,
+)
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.certificates.member import Member
+
+POLL_S = 0.2  # how often it is looked up whether it is to end
+
+
+def router_command(
+    listen: Annotated[
+        list[str],
+        typer.Option("--listen", help="Where runners and further routers call. Repeatable.", metavar="ENDPOINT"),
+    ],
+    connect: Annotated[
+        list[str],
+        typer.Option("--connect", help="The world or the router before this one. Repeatable.", metavar="ENDPOINT"),
+    ],
+    certs: Certs = None,
+    name: Name = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    runners: RunnerNames = None,
+    routers: RouterNames = None,
+    worlds: WorldNames = None,
+    revoked: Revoked = None,
+    insecure: Insecure = False,
+    as_settings: Annotated[
+        bool, typer.Option("--print", help="Print the settings, for zenohd -c FILE, and end.")
+    ] = False,
+) -> None:
+    """Forward messages between runners and a world that cannot reach each other.
+
+    It lets through what each may send, as a world does, and goes on until it is interrupted; whom it calls may come
+    later, or again. Routers before and behind it are named alike. For example:
+
+      swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs
+    """
+    from swarmwire.comms.wire.access_control import RunAccess, router_access
+    from swarmwire.comms.wire.sessions import router_config
+    from swarmwire.deploy.certificates.member import member
+    from swarmwire.deploy.certificates.register import ROUTER
+
+    named = RunAccess(runners=tuple(runners or ()), routers=tuple(routers or ()))
+    if worlds:
+        named = RunAccess(named.runners, routers=named.routers, worlds=tuple(worlds))
+    of = member(
+        ROUTER,
+        certs=certs,
+        name=name,
+        files=(ca, certificate, key),
+        access=named,
+        revoked=revoked or (),
+        insecure=insecure,
+    )
+    _check(of, [*listen, *connect])
+    access = None if of.access is None else router_access(of.access)
+    if as_settings:
+        typer.echo(json.dumps(router_config(listen, connect, network=of.network, access=access), indent=2))
+        return
+    warning = of.warning([*listen, *connect])
+    if warning is not None:
+        typer.echo(f"warning: {warning}", err=True)
+    _route(of, listen, connect, access)
+
+
+def _check(of: "Member", endpoints: list[str]) -> None:
+    for endpoint in endpoints:
+        of.network.check_endpoint(endpoint, "", "--listen, --connect")
+
+
+def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str, object] | None) -> None:
+    """Be a router until a signal comes."""
+    import zenoh
+
+    from swarmwire.comms.clock import WallClock, to_ns
+    from swarmwire.comms.wire.sessions import closed_after, listens_at, open_router
+    from swarmwire.deploy.controls import Interrupt
+
+    clock = WallClock()
+    with Interrupt() as interrupt:
+        try:
+            session = open_router(listen, connect, of.network, access)
+        except zenoh.ZError as error:
+            reason = str(error).split(" at ")[0]
+            raise BadInput("--listen", ", ".join(listen), f"expected endpoints that are free: {reason}") from error
+        with closed_after(session):
+            typer.echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
+            linked = Counter[str]()
+            while not interrupt.asked:
+                linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
+                clock.sleep_until(clock.now_ns() + to_ns(POLL_S))
+    if not interrupt.hung_up:
+        typer.echo("router: ended")
+
+
+def _told(before: "Counter[str]", now: "Counter[str]") -> "Counter[str]":
+    """The links that there are now, once people know what has changed."""
+    for word, changed in (("linked with", now - before), ("lost", before - now)):
+        for name in changed.elements():
+            typer.echo(f"router: {word} {name}")
+    return now

@@ -1,0 +1,226 @@
+"""`swarmwire run` and `repeat`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import UI
+from swarmwire.deploy.cli.options import (
+    DIFFERENT,
+    INTERRUPTED,
+    Ca,
+    Certificate,
+    Gateway,
+    GatewaySet,
+    Insecure,
+    Key,
+    Links,
+    NetworkEndpoint,
+    Out,
+    Overrides,
+    Packets,
+    Quiet,
+    RealTime,
+    Revoked,
+    Rrd,
+    Runners,
+    ScenarioFile,
+    Seed,
+    Seeds,
+    Select,
+    Socket,
+    Subtick,
+    Swarm,
+    Ui,
+    View,
+    leaving_when_hung_up,
+    program,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swarmwire.comms.interfaces import Observer
+    from swarmwire.deploy.config import RunConfig
+    from swarmwire.deploy.repetition import Repetition
+    from swarmwire.deploy.result import Result
+
+
+def run_command(
+    scenario: ScenarioFile,
+    runners: Runners = "none",
+    out: Out = None,
+    seed: Seed = None,
+    seeds: Seeds = None,
+    overrides: Overrides = None,
+    socket: Socket = None,
+    realtime: RealTime = None,
+    subtick: Subtick = None,
+    packets: Packets = "off",
+    links: Links = False,
+    rrd: Rrd = True,
+    select: Select = None,
+    view: View = False,
+    ui: Ui = False,
+    gateway: Gateway = None,
+    gateway_set: GatewaySet = None,
+    network: NetworkEndpoint = None,
+    swarm: Swarm = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    revoked: Revoked = None,
+    insecure: Insecure = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
+
+    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
+
+    With --gateway robots answer as real ones would, in real time, to programs that drive them: swarmwire-agent, whose
+    settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
+    --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
+    """
+    # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.config import Recording, RunConfig, choose_seeds, packet_share
+    from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
+    from swarmwire.deploy.record.folder import default_folder
+    from swarmwire.world.scenario_file import load_scenario
+
+    if ui:
+        UI.need("--ui")
+    checked = load_scenario(scenario, overrides or [])
+    for name in revoked or []:
+        if name not in checked.robot_names():
+            raise BadInput("--revoked", name, "expected a robot of the scenario")
+    member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
+    chosen = choose_seeds(checked, seed, seeds)
+    config = RunConfig(
+        checked,
+        seeds=chosen,
+        runners=runners,
+        out=out or default_folder(scenario.stem, chosen),
+        socket=socket,
+        realtime=realtime,
+        subtick=subtick,
+        gateways=gateways_of_options(gateway or [], gateway_set or [], swarm, member),
+        record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
+    )
+    run_shown(config, Console(quiet=quiet, highlight=False), view=view, ui=ui)
+
+
+def run_shown(
+    config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
+) -> None:
+    """Run a scenario into its folder, shown while it goes on and afterwards."""
+    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.live.live_view import LiveView, PageBeside
+    from swarmwire.deploy.live.remote_control import Announced
+    from swarmwire.deploy.simulation import Simulation, finished
+    from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
+    from swarmwire.deploy.terminal.report import print_result
+
+    folder = Path(config.out or "")
+    with compiling_told(console):
+        simulation = Simulation(config)
+        with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
+            beside = [(live, "view")] * view + [(page, "page")] * ui
+            shown = [Announced(folder), RobotsTold(simulation, console), run_progress(simulation, console)]
+            for observer in (*observers, *shown, *(opened for opened, _ in beside)):
+                simulation.watch(observer)
+            with leaving_when_hung_up(simulation.interrupt):
+                result = finished(simulation)
+            print_result(result, simulation.metrics.metrics, console)
+            if simulation.record_failed:
+                raise simulation.record_failed
+            _say_where(result, folder, console)
+            for opened, name in beside:
+                if opened.pid is not None:
+                    console.print(f"the {name} stays open: close it, or press Ctrl-C, to end it")
+            live.wait()
+            page.wait()
+    if result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _say_where(result: "Result", folder: Path, console: Console) -> None:
+    recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
+    console.print(f"written: {folder}{recorded}", soft_wrap=True)
+    console.print(f"look at it: {program()} view {folder}", soft_wrap=True)
+    console.print(f"as a film: {program()} export {folder} --to film.gif", soft_wrap=True)
+
+
+def repeat_command(
+    folder: Annotated[Path, typer.Argument(help="The run folder, or a campaign's folder.", metavar="RUN")],
+    run: Annotated[int | None, typer.Option(help="Which run of a campaign, by its number.", metavar="NUMBER")] = None,
+    runners: Runners = "none",
+    out: Annotated[
+        Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
+    ] = None,
+    packets: Packets = "off",
+    links: Links = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a run again from its folder alone, and check whether it comes out the same, bit for bit.
+
+    Of a campaign's folder it is the run that --run names.
+
+    Exit code 0: the same, as far as can be compared; 1: different, or there is nothing to compare with; 2: the folder
+    holds no run that can be repeated.
+    """
+    # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.config import Recording, packet_share
+    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.repetition import CampaignRun, RepeatedRun
+    from swarmwire.deploy.terminal.progress import run_progress
+    from swarmwire.metrics.campaign.spec import ABOUT
+
+    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
+    record = Recording(packets=packet_share(packets), links=links)
+    if record.packets and out is None:
+        raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")
+    if record.links and out is None:
+        raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
+    if run is not None:
+        repeated = CampaignRun(folder, run, runners=runners, out=out, record=record)
+    elif (folder / ABOUT).exists():
+        raise BadInput(str(folder), "", "expected --run NUMBER with it: this is a campaign's folder")
+    else:
+        repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
+    simulation = repeated.simulation
+    simulation.watch(run_progress(simulation, console))
+    with leaving_when_hung_up(simulation.interrupt), compiling_told(console):
+        repetition = repeated.run()
+    for arena in repetition.result.arenas:
+        console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")
+    console.print(_verdict(repetition), markup=False)
+    if repetition.changes:
+        console.print(f"changed since the {'run' if run is None else 'campaign began'}:")
+    elif repetition.same is False and run is None:
+        console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
+    for change in repetition.changes:
+        console.print(f"  {change}", markup=False)
+    if out is not None:
+        console.print(f"written: {out}")
+    if repetition.result.ended == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+    if not repetition.same:
+        raise typer.Exit(DIFFERENT)
+
+
+def _verdict(repetition: "Repetition") -> str:
+    why_not_all = repetition.why_not_all
+    if repetition.same is None:
+        return f"nothing to compare with: {why_not_all}"
+    if not repetition.same:
+        at = repetition.first_difference
+        return "a different run" + ("" if at is None else f" from tick {at} on")
+    if why_not_all:
+        return f"the same, bit for bit, in the {repetition.compared} ticks that can be compared: {why_not_all}"
+    if repetition.ended is None:
+        return "the same run, bit for bit"
+    early = "" if repetition.ended in ("duration", "stopped") else f", where it ended early: {repetition.ended}"
+    return f"the same run, bit for bit: {repetition.result.ticks} ticks{early}"

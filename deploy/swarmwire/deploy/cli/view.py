@@ -1,0 +1,126 @@
+"""`swarmwire view` and `ui`: look at a run, and control it in a browser."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import UI, VIEW
+from swarmwire.deploy.cli.ctl import Chosen
+from swarmwire.deploy.cli.options import (
+    Ca,
+    Certificate,
+    Certs,
+    Endpoint,
+    Insecure,
+    Key,
+    Name,
+    Port,
+    WithParent,
+    standard_input_closed,
+)
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.live.viewer import ViewOptions
+
+
+def view_command(
+    run: Annotated[Path, typer.Argument(help="A run folder, or a recording (.rrd).", metavar="RUN")],
+    web: Annotated[bool, typer.Option("--web", help="In a browser, also if there is a screen.")] = False,
+    port: Port = None,
+    with_parent: WithParent = False,
+) -> None:
+    """Look at a run: live while it goes on, its recording afterwards. Ctrl-C, or closing the window, ends the view.
+
+    Opens a window if there is a screen; else prints an address for a browser on this machine.
+    """
+    # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.live.viewer import ViewOptions, has_screen
+
+    VIEW.need("view")
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
+    with Interrupt() as interrupt:
+        options = ViewOptions(
+            clock=WallClock(),
+            say=lambda text: typer.echo(text, err=True),
+            stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
+            web=web or port is not None or not has_screen(),
+            port=port,
+        )
+        _show(run, options)
+
+
+def _show(run: Path, options: "ViewOptions") -> None:
+    """Show a run that goes on; if it is over by now, or was before, its recording."""
+    from swarmwire.deploy.live.following import RunGone, read_live
+    from swarmwire.deploy.live.viewer import show_live, show_recording
+    from swarmwire.metrics.run_folder.layout import RECORDING
+
+    live = read_live(run) if run.is_dir() else None
+    recording = run / RECORDING if run.is_dir() else run
+    if live is not None:
+        try:
+            show_live(live, options)
+        except RunGone:
+            if not recording.is_file():
+                raise
+        else:
+            return
+    if not recording.is_file():
+        raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording")
+    show_recording(recording, options)
+
+
+ELSEWHERE = 0  # in place of a process of this machine
+
+
+def ui_command(
+    run: Annotated[
+        str | None,
+        typer.Argument(
+            help="The id of a run that goes on, or its folder. Default: the only one there is.", metavar="RUN"
+        ),
+    ] = None,
+    endpoint: Endpoint = None,
+    certs: Certs = None,
+    name: Name = None,
+    ca: Ca = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    insecure: Insecure = False,
+    port: Port = None,
+    with_parent: WithParent = False,
+) -> None:
+    """Open the page of a run that goes on: look at it, pause and step it, break and mend it. Ctrl-C ends the page.
+
+    The page is for browsers of this machine alone, and open to anybody who has its address with the token in it.
+    """
+    UI.need("ui")
+    VIEW.need("ui")
+    # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
+    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.live.following import Live
+    from swarmwire.deploy.live.remote_control import find_run, only_run_at
+    from swarmwire.deploy.live.viewer import ViewOptions
+    from swarmwire.deploy.page.showing_page import show_page
+
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
+    chosen = Chosen(run, endpoint, certs, name, (ca, certificate, key), insecure)
+    network = chosen.network()
+    if endpoint is None:
+        found = find_run(run)
+        live = Live(found.endpoint, found.run, found.pid)
+    else:
+        live = Live(endpoint, run or only_run_at(endpoint, network), ELSEWHERE)
+    with Interrupt() as interrupt:
+        options = ViewOptions(
+            clock=WallClock(),
+            say=lambda text: typer.echo(text, err=True),
+            stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
+            port=port,
+        )
+        show_page(live, options, network, begin=with_parent)

@@ -1,1 +1,0 @@
-"""The commands of `swarmwire`, one a file; `cli` lists them."""

@@ -1,1 +1,0 @@
-"""`swarmwire certs`: its commands, one a file."""

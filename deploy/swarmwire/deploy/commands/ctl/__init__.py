@@ -1,1 +1,0 @@
-"""`swarmwire ctl`: runs that go on, watched and changed from another terminal."""

@@ -1,1 +1,0 @@
-"""`swarmwire radio`: its commands, one a file."""

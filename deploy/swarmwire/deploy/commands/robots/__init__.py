@@ -1,1 +1,0 @@
-"""`swarmwire robots`: its commands, one a file."""

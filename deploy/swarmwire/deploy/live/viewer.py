@@ -1,0 +1,232 @@
+"""Rerun's viewer as a process of its own, in a window or a browser: it shows a recording, or a run while it goes on."""
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
+from typing import IO
+from urllib.parse import quote
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S, Clock
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.run_views import ObservedTick
+from swarmwire.comms.truth import PacketCounts
+from swarmwire.deploy.live.following import Following, Live, following
+from swarmwire.metrics.viewer.recording import RerunLive
+from swarmwire.metrics.viewer.screenshot import end, ending_with_this, free_port, is_open, program
+
+PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
+START_NS = 30 * NS_PER_S  # how long it may take to listen
+START_PAUSE_NS = NS_PER_S // 20
+LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
+HEAD = b"RRF2"  # how a recording begins
+FOOT = b"RRF2FOOT\x01\x00\x00\x00"  # and how a complete one ends
+
+
+class Viewer:
+    """A viewer that listens on this machine alone."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", port: int, web_port: int | None, log: IO[bytes]) -> None:
+        self.process, self._port, self._web_port, self._log = process, port, web_port, log
+
+    @property
+    def url(self) -> str:
+        """Where it takes what is drawn."""
+        return f"rerun+http://127.0.0.1:{self._port}/proxy"
+
+    @property
+    def page(self) -> str | None:
+        """The address for a browser; None: it has a window."""
+        return None if self.web is None else f"{self.web}/?url={quote(self.url, safe='')}"
+
+    @property
+    def web(self) -> str | None:
+        """The origin of its pages; None: it has a window."""
+        return None if self._web_port is None else f"http://127.0.0.1:{self._web_port}"
+
+    @property
+    def alive(self) -> bool:
+        """Whether it runs: whoever closes the window ends it."""
+        return self.process.poll() is None
+
+    def wait(self, clock: Clock) -> None:
+        """Return once it listens; SwarmwireError if it does not."""
+        until_ns = clock.now_ns() + START_NS
+        while not all(is_open(port) for port in (self._port, self._web_port) if port is not None):
+            if not self.alive or clock.now_ns() > until_ns:
+                raise SwarmwireError(f"rerun's viewer did not start; --web shows the run in a browser\n{self.told}")
+            clock.sleep_until(clock.now_ns() + START_PAUSE_NS)
+
+    @property
+    def told(self) -> str:
+        """The end of what it printed."""
+        self._log.seek(0)
+        return self._log.read().decode(errors="replace")[-2000:].strip()
+
+
+@contextmanager
+def viewer(clock: Clock, recording: Path | None, web: bool, web_port: int | None = None) -> Generator[Viewer]:
+    """A viewer, with this recording or for what is to come, which has ended after the block."""
+    port = free_port()
+    if web_port is not None and is_open(web_port):
+        raise BadInput("--port", str(web_port), "expected a port that is free")
+    page = (web_port or free_port()) if web else None
+    options = ["--bind", "127.0.0.1", "--port", str(port)]
+    options += ["--serve-web", "--web-viewer-port", str(page)] if page else ["--hide-welcome-screen"]
+    limits = ["--memory-limit", LIVE_MEMORY, "--server-memory-limit", LIVE_MEMORY]
+    options += limits if recording is None else [str(recording)]
+    with TemporaryFile() as log:  # without a name: whoever kills this process leaves none behind
+        environment = {**os.environ, "RUST_LOG": "warn", "NO_COLOR": "1"}
+        command = ending_with_this([str(program()), *options])
+        started = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        try:
+            shown = Viewer(started, port, page, log)
+            shown.wait(clock)
+            yield shown
+        finally:
+            end(started)
+
+
+def has_screen() -> bool:
+    """Whether a window can be opened here."""
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+@contextmanager
+def whole(recording: Path) -> Generator[Path]:
+    """The recording, or a temporary copy that the viewer can open; BadInput if there is nothing to see in it."""
+    if not recording.is_file():
+        raise BadInput(str(recording), "", "there is no such recording")
+    with recording.open("rb") as file:
+        head = file.read(len(HEAD))
+        file.seek(-min(len(FOOT), os.fstat(file.fileno()).st_size), os.SEEK_END)
+        foot = file.read()
+    if head != HEAD:
+        raise BadInput(str(recording), "", "expected a recording (.rrd) with at least a tick in it")
+    if foot == FOOT:
+        yield recording
+        return
+    with TemporaryDirectory(prefix="swarmwire-view-") as directory:
+        copy = Path(directory, recording.name)
+        done = subprocess.run(
+            [program(), "rrd", "optimize", recording, "-o", copy], capture_output=True, text=True, check=False
+        )
+        if done.returncode or not copy.is_file():
+            raise BadInput(str(recording), "", f"expected a recording that can be read: {done.stderr[-500:].strip()}")
+        yield copy
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """How a run is shown, and for how long."""
+
+    clock: Clock
+    say: Callable[[str], None]  # to the person who looks on
+    stopped: Callable[[], bool]  # whether that person has enough
+    web: bool = False  # pages for a browser instead of a window
+    port: int | None = None  # of the pages; None: any that is free
+
+    def viewer(self, recording: Path | None) -> AbstractContextManager[Viewer]:
+        """The viewer, with this recording or for what is to come."""
+        return viewer(self.clock, recording, self.web, self.port)
+
+    def pause(self) -> None:
+        """A moment, before it is looked again whether something has happened."""
+        self.clock.sleep_until(self.clock.now_ns() + PAUSE_NS)
+
+
+def show_recording(recording: Path, options: ViewOptions) -> None:
+    """Show a recording, also of a run that was killed, until the viewer is closed or `options.stopped()`."""
+    with whole(recording) as complete, options.viewer(complete) as shown:
+        _say_where(shown, options)
+        while shown.alive and not options.stopped():
+            options.pause()
+
+
+def show_live(live: Live, options: ViewOptions) -> None:
+    """Show a run while it goes on and what there was to see afterwards, until the viewer is closed or stopped.
+
+    RunGone if the run does not answer.
+    """
+    with following(live) as run, options.viewer(None) as shown:
+        _say_where(shown, options)
+        drawer = Drawer(run, shown.url, options)
+        drawer.start()
+        told = False
+        while shown.alive and not options.stopped() and drawer.fault is None:
+            if run.over and not told:
+                told = True
+                options.say(f"the run is over{_missed(run)}; Ctrl-C ends the view")
+            options.pause()
+    if drawer.fault is not None:
+        raise drawer.fault
+
+
+class Drawer(threading.Thread):
+    """Draws glimpses of a run until it is over.
+
+    In a thread that nobody waits for: drawing stands still while the viewer does, and ends with it.
+    """
+
+    def __init__(
+        self, run: Following, url: str, options: ViewOptions, page: Callable[[ObservedTick], None] | None = None
+    ) -> None:
+        """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
+        super().__init__(name="drawer", daemon=True)
+        self._run, self._way, self._page, self._evened = run, options, page, Evened()
+        self._drawing = RerunLive(url, run, options.clock, selected=run.scene.selected, page=page is not None)
+        self.fault: Exception | None = None
+
+    def run(self) -> None:
+        """Draw."""
+        try:
+            self._drawing.begin(self._run.scene.static)
+            while not self._run.over:
+                if not self._draw():
+                    self._way.pause()
+            self._drawing.end(None)
+        except Exception as error:  # noqa: BLE001 - the thread that waits for the viewer raises it
+            self.fault = error
+
+    def _draw(self) -> bool:
+        glimpse = self._run.next()
+        if glimpse is None:
+            return False
+        if self._page is not None:
+            self._page(glimpse)
+        truth = glimpse.truth
+        tally = None if truth.tally is None else self._evened.per_tick(truth.tally, glimpse.ticks)
+        self._drawing.see(replace(truth, tally=tally))
+        return True
+
+
+class Evened:
+    """Mean tallies per tick in whole numbers: what rounding leaves over comes with a later one."""
+
+    def __init__(self) -> None:
+        self._owed: FloatArray | None = None
+
+    def per_tick(self, tally: PacketCounts, ticks: int) -> PacketCounts:
+        """The tally of one of these ticks."""
+        counts: IntArray = np.vstack([tally.sent, tally.intended, tally.in_range, tally.fates.T])
+        owed = counts / ticks + (0.0 if self._owed is None else self._owed)
+        whole = np.floor(owed + 1e-9).astype(np.int64)  # thirds add up to a little less than one
+        self._owed = owed - whole
+        return PacketCounts(whole[0], whole[1], whole[2], whole[3:].T)
+
+
+def _say_where(shown: Viewer, options: ViewOptions) -> None:
+    if shown.page is not None:
+        options.say(f"open {shown.page} in a browser; Ctrl-C ends the view")
+
+
+def _missed(run: Following) -> str:
+    return f" ({run.lost} frames did not arrive in time)" if run.lost else ""

@@ -1,1 +1,0 @@
-"""Radios without a run: probed, fitted to logs, replayed from measurements."""

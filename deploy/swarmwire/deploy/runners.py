@@ -1,0 +1,134 @@
+"""Runner processes on this machine: where they meet the world, and the agent host that forks them."""
+
+import os
+import secrets
+import selectors
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
+
+STALE_S = 60.0  # of a socket at which nobody listens: one that was just made may be about to
+ANSWER_S = 0.5  # of the system, for whoever listens
+SOCKET = "world"  # in a private directory
+MAX_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
+
+
+def new_run_id() -> str:
+    """A name for one execution, which nobody else has."""
+    return secrets.token_hex(4)
+
+
+@contextmanager
+def local_endpoint(path: Path | None) -> Generator[str]:
+    """An endpoint at `path`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
+    if path is not None:
+        check_socket(path)
+        yield unix_endpoint(str(path.absolute()))
+        return
+    base = tempfile.gettempdir()
+    base = base if len(base) < 60 else "/tmp"
+    _remove_stale(Path(base))
+    with tempfile.TemporaryDirectory(prefix=PRIVATE, dir=base) as directory:
+        yield unix_endpoint(f"{directory}/{SOCKET}")
+
+
+def _remove_stale(base: Path) -> None:
+    """Take away the directories of this user's runs that were killed, and so could not do it themselves."""
+    before_ns = WallClock().utc_ns() - to_ns(STALE_S)
+    for path in base.glob(f"{PRIVATE}*/{SOCKET}"):
+        with suppress(OSError):  # not this user's, or gone by now
+            about = path.lstat()
+            is_old = path.is_socket() and about.st_uid == os.getuid() and about.st_mtime_ns < before_ns
+            if is_old and not _is_listened_at(path):
+                shutil.rmtree(path.parent)
+
+
+def _is_listened_at(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(ANSWER_S)
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            return False
+        except (TimeoutError, BlockingIOError):  # it is frozen, and many have called
+            return True
+        return True
+
+
+def check_socket(path: Path) -> None:
+    """Return if a unix socket can be made there; else BadInput. One that nobody listens at may be in its place."""
+    path = path.absolute()
+    if not path.parent.is_dir():
+        raise BadInput("--socket", str(path), "expected a path in a directory that exists")
+    if len(os.fsencode(path)) > MAX_PATH:
+        raise BadInput("--socket", str(path), f"expected a path of at most {MAX_PATH} bytes")
+    if not path.exists():
+        return
+    if not path.is_socket():
+        raise BadInput("--socket", str(path), "expected a path that is free; something else is there")
+    if _is_listened_at(path):  # else it is stale
+        raise BadInput("--socket", str(path), "expected a path that is free; the socket is in use")
+
+
+LEAVE_S = 3.0
+
+
+class RunnerProcesses:
+    """The processes of all runners of one run; none of them outlives `stop` or this process."""
+
+    program = "swarmwire.agent.agent_host"  # that forks them
+
+    def __init__(
+        self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool = False
+    ) -> None:
+        """`waited_for` says whether the world waits for each answer, so that nothing is gained by a quick start."""
+        command = [sys.executable, "-m", self.program, endpoint, run_id, ",".join(agents), *names]
+        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS
+        # thread: a runner's arrays are small, idle threads double its memory. What this process can import, they can.
+        self._agent_host = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+        if waited_for and hasattr(os, "SCHED_BATCH"):
+            # Hundreds of processes on a few cores then take turns, and do not break off one another as each is asked:
+            # a tenth less of processor time. The agent host's children have it from the agent host.
+            with suppress(OSError):
+                os.sched_setscheduler(self._agent_host.pid, os.SCHED_BATCH, os.sched_param(0))
+        self._reports = selectors.DefaultSelector()
+        if self._agent_host.stdout is not None:
+            self._reports.register(self._agent_host.stdout, selectors.EVENT_READ)
+
+    def trouble(self) -> str | None:
+        """What happened to a runner that ended badly, in words; None while all is well."""
+        if self._agent_host.poll() is not None:
+            return f"the runners' processes ended early (exit code {self._agent_host.returncode})"
+        stdout = self._agent_host.stdout
+        if stdout is not None and self._reports.select(timeout=0):
+            name, _, code = stdout.readline().decode().strip().partition(" ")
+            return f"the process of runner {name} ended with exit code {code}"
+        return None
+
+    def stop(self) -> None:
+        """Wait a moment for the runners to leave, then end those that are left."""
+        self._reports.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._agent_host.wait(LEAVE_S)
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._agent_host.pid, signal.SIGKILL)
+        self._agent_host.wait()
+        for stream in (self._agent_host.stdin, self._agent_host.stdout):
+            if stream is not None:
+                stream.close()

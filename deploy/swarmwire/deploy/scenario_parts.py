@@ -1,0 +1,212 @@
+"""The parts that a scenario names, checked and made: agents, metrics, stop conditions, radio, measured links."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
+from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import resolve
+from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
+from swarmwire.metrics.measure import Condition
+from swarmwire.metrics.registry import MetricEntry, MetricSelection, select_metrics
+from swarmwire.metrics.table_file import MeasuredTable
+from swarmwire.world.scenario.bodies import bodies_of
+from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.scenario.tables import MetricTable
+from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.world import World
+
+
+def agent_specs(scenario: Scenario) -> dict[str, str]:
+    """By group: the agent's spec, with the path of a file beside the scenario made absolute."""
+    beside = Path(scenario.source).parent
+    return {name: resolve(group.agent, beside) for name, group in scenario.robots.items()}
+
+
+def check_agents(scenario: Scenario, specs: Mapping[str, str]) -> dict[str, AgentClass]:
+    """By group: the agent's class, fit for its robots; BadInput names the first that is not."""
+    return {name: _checked(scenario, name, spec) for name, spec in specs.items()}
+
+
+def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
+    group, where = scenario.robots[name], scenario.source
+    try:
+        kind = load_agent(spec)
+        checked(kind, group.params, group.count)
+    except NoAgent as error:
+        raise BadInput(where, f"robots.{name}.agent", str(error)) from error
+    except BadParameter as error:
+        raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
+    body = bodies_of(scenario, where)[name]
+    of_radio = scenario.radio.tells if scenario.radio else ()
+    for need in kind.needs:
+        if need.startswith("radio."):
+            if need not in of_radio:
+                text = f"{kind.__name__} needs {need!r}, which {_untold(need, scenario)}"
+                raise BadInput(where, f"robots.{name}.agent", text)
+        elif need not in body.sensors:
+            text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.sensors)}"
+            raise BadInput(where, f"robots.{name}.agent", text)
+    return kind
+
+
+def _untold(need: str, scenario: Scenario) -> str:
+    if need == "radio.tx_status":
+        return "only a radio that acknowledges tells: expected radio.access.method csma-802154 or dcf, acknowledged"
+    if scenario.radio is None:
+        return "only a radio tells: there is no [radio]"
+    return f"the radio does not measure: [radio.measures] has {', '.join(scenario.radio.measures.needs) or 'nothing'}"
+
+
+def measuring(scenario: Scenario) -> MetricSelection:
+    """The metrics of a run of this scenario; BadInput for what is no metric, or does not take its parameters."""
+    beside = Path(scenario.source).parent
+    items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
+    stops = [MetricEntry(f"{key}.metric", table.metric, None) for key, table in scenario.stops().items()]
+    return select_metrics([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
+
+
+def conditions(scenario: Scenario) -> list[Condition]:
+    """What ends an arena before its time, in the scenario's order."""
+    return [Condition(table.metric, *table.comparison, table.hold_s) for table in scenario.stops().values()]
+
+
+def _item(place: int, item: str | MetricTable, beside: Path) -> MetricEntry:
+    if isinstance(item, MetricTable):
+        return MetricEntry(f"metrics.{place}.metric", resolve(item.metric, beside), item.params)
+    return MetricEntry(f"metrics.{place}", resolve(item, beside), {})
+
+
+def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None) -> RadioMedium | None:
+    """A new medium of the scenario's radio, if it has one; `traces` are those of its file."""
+    static, radio = world.static, scenario.radio
+    if radio is None:
+        return None
+    return RadioMedium(
+        radio,
+        world.keys,
+        static.robots,
+        static.arena_size_m,
+        world.obstacles,  # which follow those that are pushed
+        static.rate_hz,
+        static.act_every_ticks,
+        np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]),
+        traces,
+        Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
+        static.boundary,
+    )
+
+
+MAX_TRACE_S = 1e9  # whose nanoseconds fit an integer
+TRACE_COLUMNS = {"time": "t_s", "sender": "tx", "receiver": "rx"}
+
+
+def scenario_traces(scenario: Scenario) -> LinkTraces | None:
+    """What the file of the scenario's `[radio.trace]` holds; None without one. BadInput if it cannot be replayed."""
+    path = trace_path(scenario)
+    if path is None:
+        return None
+    if not path.is_file():
+        raise BadInput(scenario.source, "radio.trace.file", f"expected a file beside the scenario: there is no {path}")
+    traces = read_link_traces(path, scenario.robot_names())
+    if traces.rssi_dbm is not None and scenario.radio is not None and not scenario.radio.is_phy:
+        raise BadInput(str(path), "rssi_dbm", "expected a radio with a PHY: a disk knows no strength")
+    return traces
+
+
+def trace_path(scenario: Scenario) -> Path | None:
+    """Where the file of the scenario's `[radio.trace]` is; None without one."""
+    trace = scenario.radio.trace if scenario.radio else None
+    return (Path(scenario.source).parent / trace.file).resolve() if trace else None
+
+
+def read_link_traces(path: Path, robots: Sequence[str]) -> LinkTraces:
+    """The traces in a file, for robots with these names in the order of their index in the arena.
+
+    Columns: t_s, since the start of the run; tx and rx, names of robots; and at least one of delivery_ratio, rssi_dbm,
+    delay_s, of which each row has one or more. BadInput for unknown robots, times that do not rise on a link, and
+    values that cannot be.
+    """
+    table = MeasuredTable(path)
+    table.need(tuple(TRACE_COLUMNS.values()))
+    measured: list[Quantity] = [name for name in POSSIBLE if name in table.columns]
+    if not measured:
+        raise table.refused("", f"expected at least one of the columns {', '.join(POSSIBLE)}, got none")
+    time_s = table.numbers("t_s")
+    table.refuse_where(~(np.abs(time_s) < MAX_TRACE_S), "t_s", "expected a time in s")
+    time_ns = np.round(time_s * NS_PER_S).astype(np.int64)
+    sender, receiver = (_robot_index(table, column, robots) for column in ("tx", "rx"))
+    values: dict[Quantity, FloatArray] = {quantity: table.numbers(quantity) for quantity in measured}
+    nothing = np.all([np.isnan(value) for value in values.values()], axis=0)
+    table.refuse_where(nothing, " or ".join(measured), "expected a value")
+    return LinkTraces(
+        **{
+            quantity: _link_trace(table, quantity, len(robots), time_ns, sender, receiver, value)
+            for quantity, value in values.items()
+            if not np.isnan(value).all()
+        }
+    )
+
+
+def _link_trace(
+    table: MeasuredTable,
+    quantity: Quantity,
+    robots: int,
+    time_ns: IntArray,
+    sender: IntArray,
+    receiver: IntArray,
+    value: FloatArray,
+) -> LinkTrace:
+    """The trace of the rows that have a value of this quantity."""
+    rows = np.flatnonzero(~np.isnan(value))
+    try:
+        return link_trace(quantity, robots, time_ns[rows], sender[rows], receiver[rows], value[rows])
+    except RefusedRow as refused:
+        column = TRACE_COLUMNS.get(refused.column, quantity)
+        raise table.refused(f"row {rows[refused.row] + 1}, {column}", refused.expected) from None
+
+
+def _robot_index(table: MeasuredTable, column: str, robots: Sequence[str]) -> IntArray:
+    place = {name: i for i, name in enumerate(robots)}
+    names = table.texts(column)
+    index = np.array([place.get(name, -1) for name in names], np.int64)
+    if (index < 0).any():
+        unknown = names[int(np.argmax(index < 0))]
+        first, last = (robots[0], robots[-1]) if robots else ("", "")
+        table.refuse_where(index < 0, column, f"expected a robot of the scenario, {first} … {last}, got {unknown}")
+    return index
+
+
+def radio_of(preset: str, settings: Sequence[str]) -> Radio:
+    """The radio of a preset after settings such as "radio.loss=0.1"; BadInput if there is none, or for a bad value."""
+    if preset not in PRESETS:
+        raise BadInput("radio", "", f"expected {did_you_mean(PRESETS, preset)}; got {preset!r}")
+    radio = checked_radio({"preset": preset}, "radio", settings)
+    if radio.trace is not None:
+        raise BadInput("radio", "radio.trace", "expected none: links are measured between robots of a scenario")
+    return radio
+
+
+def checked_radio(table: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Radio:
+    """The radio of a table after overrides such as "radio.loss=0.1"; BadInput as for a scenario."""
+    around = {
+        "format": 1,
+        "name": "a radio",
+        "duration_s": 1.0,
+        "arena": {"size_m": [2.0, 2.0]},
+        "robots": {"nodes": {"body": "epuck", "count": 1, "agent": "none:None"}},
+    }
+    radio = scenario_from({**around, "radio": table}, where, overrides).radio
+    assert radio is not None
+    return radio

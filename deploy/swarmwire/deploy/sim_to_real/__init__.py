@@ -1,1 +1,0 @@
-"""Emulated runs and robots' logs, found in folders and brought together."""

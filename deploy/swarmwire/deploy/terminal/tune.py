@@ -1,0 +1,186 @@
+"""A tuning as people see it in a terminal: while it goes on, and what came of it."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from swarmwire.comms.clock import Clock, WallClock
+from swarmwire.deploy.terminal.sweep import Meter
+from swarmwire.deploy.tuning.best import FILE, FreshCheck, best_of, gained
+from swarmwire.deploy.tuning.run import Tuned
+from swarmwire.deploy.tuning.spec import SHARES, Goal, Tuning
+from swarmwire.deploy.tuning.study import Trial
+from swarmwire.metrics.statistics.bootstrap import binomial_interval
+from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
+from swarmwire.metrics.statistics.summary import interval_text, quantile_text, summary
+from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
+
+
+def statistic_text(trial: Trial, goal: Goal) -> str:
+    """Of a trial on its seeds: a number with its unit, or `> 60 s`."""
+    statistic = trial.result.statistic
+    if trial.result.value is None:
+        return UNKNOWN_TEXT
+    return with_unit(quantile_text(math.nan if statistic is None else statistic, goal.limit_s), goal)
+
+
+def sample_text(sample: Sample, goal: Goal) -> str:
+    """Of other runs, with the interval where there is one."""
+    reached = goal.reached(sample)
+    if not len(sample):
+        return UNKNOWN_TEXT
+    text = with_unit(quantile_text(reached.statistic, goal.limit_s), goal)
+    interval = interval_text(_interval(sample, goal))
+    return text if interval == UNKNOWN_TEXT else f"{text} ({interval})"
+
+
+def with_unit(text: str, goal: Goal) -> str:
+    """A number of the goal's statistic with its unit; a share has none."""
+    return text if goal.stat == "censored" or not goal.response.unit else f"{text} {goal.response.unit}"
+
+
+def _interval(sample: Sample, goal: Goal) -> Interval:
+    if goal.stat == "censored":
+        low, high = binomial_interval(np.array([np.count_nonzero(~sample.observed)]), np.array([len(sample)]))
+        return Interval(float(low[0]), float(high[0]))
+    of = summary(sample)
+    if goal.stat == "mean":
+        return of.mean_interval
+    if goal.stat == "q50":
+        return of.q50_interval
+    return kaplan_meier(sample).quantile_interval(SHARES[goal.stat]) if sample.kind == "time" else UNKNOWN
+
+
+def parameter_text(value: object) -> str:
+    """A parameter: all its digits are in best.toml.
+
+    >>> parameter_text(0.123456789), parameter_text(12), parameter_text("discs")
+    ('0.12346', '12', 'discs')
+    """
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def failed_text(failed: int) -> str:
+    """How many runs failed, in brackets, or nothing.
+
+    >>> failed_text(0), failed_text(2)
+    ('', ', 2 failed')
+    """
+    return f", {failed} failed" if failed else ""
+
+
+def difference_text(of: float, interval: Interval) -> str:
+    """A difference with its interval, signed.
+
+    >>> difference_text(-1.5, Interval(-2.0, -1.0))
+    '-1.5 (-2 to -1)'
+    """
+    return f"{number_text(of, sign=True)} ({interval_text(interval, sign=True)})"
+
+
+def best_told(tuning: Tuning, trials: Sequence[Trial]) -> str:
+    """The best so far, and how many failed, in a few words."""
+    best = best_of(trials, tuning.goal)
+    failed = sum(trial.state == "failed" for trial in trials)
+    told = "none yet" if best is None else f"{statistic_text(best, tuning.goal)} (trial {best.number})"
+    return f"best: {told}" + (f", {failed} failed" if failed else "")
+
+
+class TuneProgress:
+    """Observer that shows how many trials are done, and the best so far."""
+
+    def __init__(self, console: Console, clock: Clock | None = None) -> None:
+        self._meter = Meter(console, clock or WallClock())
+        self._tuning: Tuning | None = None
+        self._trials: list[Trial] = []
+
+    def begin(self, tuning: Tuning, trials: Sequence[Trial]) -> None:
+        """Say what runs."""
+        self._tuning, self._trials = tuning, list(trials)
+        line = f"{tuning.scenario}: {tuning.goal.text}: {tuning.trials} trials x {len(tuning.seeds)} seeds"
+        self._meter.begin(("trials", line), "trials", tuning.trials, len(trials), best_told(tuning, trials))
+
+    def see(self, trial: Trial) -> None:
+        """Count a trial."""
+        self._trials.append(trial)
+        if self._tuning is not None:
+            self._meter.see(len(self._trials), best_told(self._tuning, self._trials))
+
+    def end(self) -> None:
+        """Work is over."""
+        self._meter.end()
+
+
+def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
+    """How far the tuning is; once it is over, what it found."""
+    if tuned.best is None or tuned.check is None:
+        _print_interrupted(tuned, console, program)
+        return
+    failed = [trial for trial in tuned.trials if trial.state == "failed"]
+    console.print(_parameters(tuned, tuned.best))
+    console.print(_worth(tuned, tuned.best, tuned.check))
+    of, difference, interval = gained(tuned.check, tuned.tuning.goal)
+    console.print(f"best less own on fresh seeds, {of}: {difference_text(difference, interval)}", markup=False)
+    if failed:
+        example = f"trial {failed[0].number}: {failed[0].why}"
+        text = f"failed: {len(failed)} of {len(tuned.trials)} trials, such as {example}"
+        console.print(text, markup=False, soft_wrap=True)
+    folder = tuned.folder
+    for line in (
+        f"written: {folder}",
+        f"run the best: {program} run {folder / FILE}",
+        f"compare all responses: {program} compare {tuned.check.own_folder} {tuned.check.best_folder}",
+        f"try more: {program} tune --resume {folder} --trials {2 * tuned.tuning.trials}",
+    ):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _print_interrupted(tuned: Tuned, console: Console, program: Path) -> None:
+    total, done = tuned.tuning.trials, len(tuned.trials)
+    where = f"interrupted: {done} of {total} trials are done" if done < total else "interrupted during the check"
+    console.print(where, soft_wrap=True)
+    if tuned.best is not None:
+        parameters = ", ".join(f"{path}={parameter_text(value)}" for path, value in tuned.best.parameters.items())
+        text = f"best so far: {statistic_text(tuned.best, tuned.tuning.goal)} with {parameters}"
+        console.print(text, markup=False, soft_wrap=True)
+    console.print(f"go on: {program} tune --resume {tuned.folder}", markup=False, soft_wrap=True)
+
+
+def _parameters(tuned: Tuned, best: Trial) -> Table:
+    title = f"{tuned.tuning.scenario}: the best of {len(tuned.trials)} trials is trial {best.number}"
+    table = Table(title=Text(title), title_justify="left", title_style="bold")
+    table.add_column("parameter", style="cyan", overflow="fold")
+    table.add_column("best", justify="right", overflow="fold")
+    table.add_column("searched", justify="right", overflow="fold")
+    if tuned.importance:
+        table.add_column("importance", justify="right")
+    for search in tuned.tuning.searches:
+        ends = f"{parameter_text(search.low)} to {parameter_text(search.high)}"
+        searched = ", ".join(search.names) if search.choices else ends + (", log" if search.log else "")
+        row = [search.path, parameter_text(best.parameters[search.path]), searched]
+        if tuned.importance:
+            row.append(f"{100.0 * tuned.importance.get(search.path, 0.0):.0f} %")
+        table.add_row(*map(Text, row))
+    return table
+
+
+def _worth(tuned: Tuned, best: Trial, check: FreshCheck) -> Table:
+    """The goal on the seeds of the trials, on which the best looks better than it is, and on fresh ones."""
+    tuning = tuned.tuning
+    table = Table(title=Text(tuning.goal.text), title_justify="left", title_style="bold")
+    table.add_column("parameters", style="cyan")
+    table.add_column(f"{len(tuning.seeds)} tuning seeds", justify="right")
+    table.add_column(f"{len(tuning.check_seeds)} fresh seeds", justify="right", overflow="fold")
+    for name, before, sample in (
+        ("best", statistic_text(best, tuning.goal), check.best),
+        ("the scenario's own", "", check.own),
+    ):
+        after = sample_text(sample, tuning.goal) + failed_text(sample.failed)
+        table.add_row(name, Text(before), Text(after))
+    return table

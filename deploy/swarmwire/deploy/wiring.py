@@ -1,0 +1,325 @@
+"""The parts of a run, made from its config and connected; and its observers, in one ordered list."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import cast
+
+from swarmwire.comms.clock import PreciseClock, WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
+from swarmwire.comms.messages import DICT_TAG, message_classes
+from swarmwire.deploy.backends import Backends
+from swarmwire.deploy.config import (
+    Recording,
+    RunConfig,
+    choose_seeds,
+    real_time_factor,
+    runner_count,
+    scenario_of,
+    subtick_of,
+    tick_count,
+)
+from swarmwire.deploy.controls import Controls, Interrupt
+from swarmwire.deploy.gateways.gateways import as_gateways
+from swarmwire.deploy.gateways.serving import RunGateways, Served, Undriven
+from swarmwire.deploy.host import need_open_files, need_threads
+from swarmwire.deploy.live.control_server import ControlServer, Status
+from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.observers import Guarded, TooLarge
+from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.inputs import ReplayedBackend
+from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
+from swarmwire.deploy.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.runners import check_socket, new_run_id
+from swarmwire.deploy.scenario_parts import (
+    agent_specs,
+    check_agents,
+    conditions,
+    measuring,
+    new_medium,
+    scenario_traces,
+)
+from swarmwire.deploy.warm_up import warm_up
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measure import StopConditions as MetricStopConditions
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder.events import EventLog
+from swarmwire.metrics.run_folder.layout import RECORDING, metric_info
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import recorders
+from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
+from swarmwire.world.backends.registry import Loss, RunnerEvent, RunnerHealth
+from swarmwire.world.backends.zenoh_backend import LockstepBackend
+from swarmwire.world.gateways.backend import GatewayBackend
+from swarmwire.world.live_events import LiveEvents
+from swarmwire.world.loop import Loop
+from swarmwire.world.scenario.bodies import bodies_of, custom_code
+from swarmwire.world.subtick import Subticks
+from swarmwire.world.world import World
+
+OUTSIDE = "a simulation is stepped within its `with` block"
+
+
+class RunParts:
+    """The parts of one run.
+
+    Attributes:
+        called_ns: wall time at which the run was asked for.
+        code: the specs of all classes of users: agents, custom sensors, actuators and metrics.
+        stop: the scenario's stop conditions, if it has any.
+        folder: the run folder.
+        pace: of real time, if the run keeps to the wall clock.
+        facts: from what the run was made, once it has begun.
+        losses: runners lost so far.
+        runner_events: runners that joined, left, were lost and returned so far.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        """Make and check all that can be before the agents start; BadInput names what cannot be."""
+        self.config, self.clock = config, WallClock()
+        self.called_ns = self.clock.now_ns()
+        self.scenario = scenario_of(config.scenario, config.overrides)
+        self.gateways = RunGateways(as_gateways(config.gateways), self.scenario)
+        factor = self.gateways.factor(real_time_factor(config.realtime))
+        self._subtick_s = subtick_of(config.subtick, factor, self.scenario)
+        self.agents = agent_specs(self.scenario)
+        self.world = self._new_world(choose_seeds(self.scenario, config.seed, config.seeds))
+        static = self.world.static
+        measures = measuring(self.scenario)
+        self.metrics = Metrics(measures.metrics)
+        stops = conditions(self.scenario)
+        self.stop = MetricStopConditions(self.metrics, stops) if stops else None
+        self.code = tuple(dict.fromkeys([*self.agents.values(), *custom_code(static), *measures.code]))
+        self._traces = scenario_traces(self.scenario)
+        replay = config.replay
+        self.ticks = replay.ticks if replay else tick_count(self.scenario)
+        self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
+        self.runners = runner_count(config.runners, static.arenas * static.robots)
+        self.runners = self.runners if config.listening is None else 1  # at least; the result has their number
+        self._record = config.record or Recording()
+        self._check()
+        # Only now a folder: a refused run leaves none.
+        self.folder = RunFolder(None if config.out is None else Path(config.out), self.clock)
+        rate_hz = static.rate_hz
+        clock = PreciseClock(self.clock) if self._subtick_s else self.clock
+        self.pace = None if factor is None else Pace(clock, rate_hz, factor, self.folder.say)
+        self.run_id, self.interrupt = new_run_id(), Interrupt()
+        self.controls = Controls(self.clock, rate_hz, self.pace, speed_fixed=bool(self.gateways.kinds))
+        bodies = {group.name: group.body for group in static.groups}
+        self.live_events = LiveEvents(self.scenario, bodies, self.folder.keep, replay.live_events if replay else None)
+        self.status = self._new_status()
+        self.published = self._new_published(self.folder.path) if self.folder.path else None
+        self.losses: list[Loss] = []
+        self.runner_events: list[RunnerEvent] = []
+        self.foreign_agents = False  # whether it began with robots without an agent, or with code of another machine
+        self.facts: RunFacts
+        self.backend: AgentBackend | None = None
+        self.loop: Loop | None = None
+        self._guarded: list[Guarded] = []
+
+    def observers(self, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
+        """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
+        say, path, config = self.folder.say, self.folder.path, self.config
+        guarded: list[Observer] = [TooLarge(say)]
+        if path:
+            guarded.append(TrajectoryLog(path, self.hashes))  # before the tables: a killed run keeps its last digest
+            guarded += self._recorders(path)  # after the metrics, whose values of this tick they write
+        if self.published:
+            guarded.append(self.published)  # before the caller's observers: these read the endpoint in live.json
+        guarded += [*config.observers, *watching]
+        self._guarded = [Guarded(observer, say) for observer in guarded]
+        return [
+            self.metrics,  # first: all others may read the values of this tick
+            *([self.stop] if self.stop else []),
+            self.status,  # before the views, which ask for it
+            RadioTally(),
+            EventLog(),
+            *self._guarded,
+            *([Undriven(served, self.factor, say)] if served else []),  # last: its warning ends the output
+        ]
+
+    def begin(self) -> None:
+        """Write into the folder from what the run is made, before anything else starts."""
+        self.facts = self.folder.begin(
+            self.scenario,
+            RunFacts(
+                seeds=self.world.static.seeds,
+                ticks=self.ticks,
+                runners=self.runners,
+                realtime=self.pace.factor if self.pace else None,
+                files=(),
+                modules=module_digests(self.code),
+                cpu=cpu(),
+                versions=versions(),
+                gateways=self.gateways.kinds,
+                metrics=tuple(metric_info(metric) for metric in self.metrics.metrics),
+                subtick_s=self._recorded_subtick_s,
+            ),
+        )
+        if self.pace:  # kernels are loaded before anything answers, and the pace begins
+            world = self._new_world(self.world.static.seeds)
+            warm_up(world, new_medium(self.scenario, world, self._traces), self.metrics.metrics)
+
+    def served(self) -> AbstractContextManager[Served | None]:
+        """The robots that answer as real ones within the context; None if there are none."""
+        return self.gateways.served(self.world, self.agents, self.clock, self.factor, self.folder.path, self.folder.say)
+
+    def new_backend(self, served: Served | None) -> AbstractContextManager[AgentBackend]:
+        """The agents, ended with the context."""
+        pace, subtick_s = self.pace, self._subtick_s
+        return Backends(
+            scenario=self.scenario,
+            static=self.world.static,
+            agents=self.agents,
+            runners=self.runners,
+            run_id=self.run_id,
+            clock=self.clock,
+            pace=pace,
+            socket=self.config.socket,
+            stopped=self.stopped,
+            listening=self.config.listening,
+            lost=self.losses.append,
+            changed=self.runner_events.append,
+            say=self.folder.say,
+            subticks=Subticks(self.clock, pace, self.world.static.rate_hz, subtick_s) if pace and subtick_s else None,
+        ).backend(served)
+
+    def connect(self, backend: AgentBackend, observers: Sequence[Observer], stop: StopConditions | None) -> None:
+        """Make the loop; actions that need not follow from the seed are kept in the folder."""
+        static, replay = self.world.static, self.config.replay
+        acting = backend
+        if replay and replay.inputs:
+            acting = ReplayedBackend(backend, replay.inputs, static.arenas * static.robots, static.rate_hz)
+        acting = self.folder.recorded(acting, self._from_outside)
+        self.backend = backend
+        self.loop = Loop(
+            self.world,
+            new_medium(self.scenario, self.world, self._traces),
+            acting,
+            observers,
+            self.scenario.events,
+            stop,
+            self.live_events,
+            cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
+        )
+
+    def entered_loop(self) -> Loop:
+        """The loop of a run that has begun; RuntimeError before."""
+        if self.loop is None:
+            raise RuntimeError(OUTSIDE)
+        return self.loop
+
+    @property
+    def factor(self) -> float:
+        """Simulated s per s of wall time in real time, else 1."""
+        return self.pace.factor if self.pace else 1.0
+
+    def stopped(self) -> bool:
+        """Whether a person or a signal has asked for the end of the run."""
+        return self.interrupt.asked or self.controls.quit_asked
+
+    def hold(self, tick: int) -> None:
+        """Return when the tick may begin."""
+        self.controls.hold(tick, self.stopped)
+        self.status.began()
+
+    def hashes(self) -> list[str]:
+        """The trajectory hash of each arena, up to the last tick."""
+        return self.loop.hexdigests() if self.loop else []
+
+    def health(self) -> RunnerHealth | None:
+        """The state of the runners; None if there are none."""
+        return self.backend.health() if isinstance(self.backend, LockstepBackend | RealTimeBackend) else None
+
+    def real_time_report(self) -> RealTimeReport | None:
+        """How well the run kept to the wall clock; None in lockstep."""
+        backend = self.backend
+        return backend.report() if isinstance(backend, PacedBackend | RealTimeBackend | GatewayBackend) else None
+
+    def failed_observers(self) -> dict[str, int]:
+        """The observers that failed and were left out from then on, as counts of the summary."""
+        return {f"observer_failed_{observer.name}": 1 for observer in self._guarded if observer.failed}
+
+    def _check(self) -> None:
+        """BadInput for options that do not go together, and for a machine that is too small."""
+        config, static = self.config, self.world.static
+        robots = static.arenas * static.robots
+        if config.listening is not None:
+            config.listening.check(self.scenario, robots)
+        need_open_files(self.runners if config.listening is None else robots)
+        if self.runners or config.out is not None:  # else there is no network, and no table
+            need_threads(self.runners)
+        self.gateways.check(static.arenas, self.runners)
+        self._record.check(static)
+        if self.runners and config.socket is not None:
+            check_socket(config.socket)
+        if config.listening and config.listening.observed and config.out is None:
+            raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
+
+    def _new_world(self, seeds: tuple[int, ...]) -> World:
+        """Every arena at its start, with the sensors that its agents need."""
+        needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
+        needs = self.gateways.sensors(needs, bodies_of(self.scenario, self.scenario.source))
+        return World(self.scenario, seeds, needs)
+
+    def _new_status(self) -> Status:
+        return Status(
+            run_id=self.run_id,
+            scenario=self.scenario.name,
+            ticks=self.ticks,
+            metrics=self.metrics,
+            controls=self.controls,
+            clock=self.clock,
+            health=self.health,
+            counts=lambda: self.loop.counts() if self.loop else {},
+            radio=lambda: self.live_events.progress.radio,
+            events=self.live_events.told,
+        )
+
+    def _new_published(self, folder: Path) -> Published:
+        listening, events = self.config.listening, self.live_events
+        control = ControlServer(self.status, self.controls, events.give, events.end, self.folder.note)
+        published = Published(
+            folder,
+            self.run_id,
+            self.metrics,
+            self.clock,
+            selected=self._record.select,
+            declare=control.declare,
+            door=listening.for_observers(self.run_id) if listening else None,
+        )
+        self.controls.on_pause = published.catch_up
+        return published
+
+    def _recorders(self, folder: Path) -> list[Observer]:
+        """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
+        record, found = self._record, list[Observer]()
+        if record.tables:
+            topics = {DICT_TAG: "dict"} | {kind.tag: kind.__name__ for kind in message_classes()}
+            found += recorders(
+                RecordOptions(
+                    folder,
+                    self.metrics,
+                    self.clock,
+                    record.packets,
+                    topics,
+                    links=record.links,
+                    may_drop=self.pace is not None,
+                )
+            )
+        if record.rrd:
+            found.append(RerunRecording(folder / RECORDING, self.metrics, self.clock, selected=record.select))
+        return found
+
+    def _from_outside(self, tick: int) -> bool:
+        """Whether the actions of this tick need not follow from scenario and seed."""
+        replay = self.config.replay
+        if replay and replay.inputs:
+            return tick >= replay.inputs.first_tick
+        if self.foreign_agents or any(event.tick >= 0 for event in self.runner_events):
+            return True
+        in_real_time = self.pace is not None and (self.runners > 0 or self._subtick_s is not None)
+        return bool(self.losses or self.gateways.kinds) or in_real_time

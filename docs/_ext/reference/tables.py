@@ -1,0 +1,295 @@
+"""The reference's tables as Markdown: the entries that `swarmwire list` and `describe` print, and the commands."""
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, cast
+
+from typer.main import get_command
+
+from swarmwire.deploy.catalogue.kinds import kind_named, toml
+from swarmwire.deploy.catalogue.schema import Entry, Parameter
+from swarmwire.deploy.cli.app import app
+
+NOTHING = "–"
+SCENARIOS = Path(__file__).parents[3] / "scenarios" / "behaviours"
+SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
+CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
+KEYS = ("key", "unit", "value", "default", "meaning")
+
+
+def rows_of(kind: str, *columns: str) -> str:
+    """A row for each entry of a kind: its name, its help, then the facts of these titles."""
+    rows = [
+        (code(of.name), sentence(of.help), *(({of.mark: "yes"} | dict(of.facts)).get(title, "") for title in columns))
+        for of in entries(kind)
+    ]
+    return table((kind_named(kind).one, "meaning", *columns), rows)
+
+
+def facts_of(kind: str, title: str) -> str:
+    """A list with one fact of each entry of a kind, such as its source."""
+    return "".join(f"- {code(of.name)}: {dict(of.facts)[title]}\n" for of in entries(kind))
+
+
+def details_of(kind: str) -> str:
+    """Each entry of a kind under its name: its text, and the tables of its parameters; each table once."""
+    seen: set[str] = set()
+    parts: list[str] = []
+    for of in entries(kind):
+        settings = [_setting(text) for _, text in of.facts if SETTING.fullmatch(text)]
+        parts += [f"### {code(of.name)}\n", *(f"{text}\n" for text in settings), f"{text_of(of)}\n", *_tables(of, seen)]
+    return "\n".join(parts)
+
+
+def _setting(text: str) -> str:
+    """The setting and the header of its table as code; any other text as it is."""
+    return SETTING.sub(r"`\1` in `\2`", text)
+
+
+def keys_of(path: str = "") -> str:
+    """The keys of a scenario's table, and after them those of each table within; without a path those before any."""
+    if not path:
+        tables = {of.name.partition(".")[0] for of in entries("keys") if "." in of.name}
+        return key_table(of.parameters()[0] for of in entries("keys") if of.name not in tables and "." not in of.name)
+    found = {of.name: of for of in (*entries("keys"), *entries("radio"))}
+    return "\n".join(_tables(found.get(f"{path}.*", found[path]), set(), f"{path}."))
+
+
+def behaviour_table() -> str:
+    """A row for each behaviour, with a link to its page."""
+    rows = [
+        (f"[{of.name}](behaviours/{page_of(of.name)}.md)", sentence(of.help), _by_radio(of), dict(of.facts)["needs"])
+        for of in entries("behaviours")
+    ]
+    return table(("behaviour", "what it does", "by radio", "needs"), rows)
+
+
+def behaviour_details(name: str) -> str:
+    """One behaviour: its docstring, needs and parameters; other pages can name its class."""
+    from swarmwire.agent import behaviours
+
+    of = next(of for of in entries("behaviours") if of.name == name)
+    module = getattr(behaviours, name).__module__
+    target = f"```{{py:class}} swarmwire.agent.behaviours.{name}\n:canonical: {module}.{name}\n:no-typesetting:\n```\n"
+    facts = "".join(f"- {title}: {_setting(text)}\n" for title, text in of.facts)
+    return "\n".join([target, facts, text_of(of), "", *_tables(of, set())])
+
+
+def page_of(name: str) -> str:
+    """The page of a behaviour: PsoSearch's is pso_search."""
+    return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def _by_radio(of: Entry) -> str:
+    scenario = SCENARIOS / f"{page_of(of.name)}.toml"
+    return "yes" if "radio" in tomllib.loads(scenario.read_text(encoding="utf-8")) else "no"
+
+
+def body_table() -> str:
+    """Every figure of the bodies' sheets that differs from its key's default, with a column for each body."""
+    bodies, units, sheets = entries("bodies"), dict[str, str](), list[dict[str, str]]()
+    for body in bodies:
+        figures = {path: of for path, of in _figures(body).items() if of.value not in (None, _defaults().get(path))}
+        units |= {path: of.unit for path, of in figures.items()}
+        facts = {title: text for title, text in body.facts if title.startswith("fastest")}
+        fitted = {of.title.replace("sensor: ", "sensors."): "yes" for of in body.tables if "sensor: " in of.title}
+        sheets.append(facts | fitted | {path: _figure(of.value) for path, of in figures.items()})
+    paths = sorted({path: None for sheet in sheets for path in sheet}, key=lambda path: path.startswith("sensors."))
+    rows = [[code(path), units.get(path, ""), *(sheet.get(path, "") for sheet in sheets)] for path in paths]
+    return table(["figure", "unit", *(code(of.name) for of in bodies)], rows)
+
+
+def _figures(body: Entry) -> dict[str, Parameter]:
+    """The parameters of a body by their path in its sheet."""
+    sheets = [of for of in body.tables if not of.title.startswith("reading: ")]
+    prefixes = {of.title: of.title.replace("sensor: ", "sensors.").replace("geometry", "") for of in sheets}
+    return {f"{prefixes[of.title]}.{key.name}".strip("."): key for of in sheets for key in of.parameters}
+
+
+@cache
+def _defaults() -> dict[str, Any]:
+    """The defaults of sheets' keys by their path."""
+    sheets = {of.name: [of] for of in entries("body-keys")} | {"drive": entries("drives")}
+    sheets |= {f"sensors.{of.name}": [of] for of in entries("sensors")}
+    found = {
+        f"{prefix}.{key.name}": key.value
+        for prefix, held in sheets.items()
+        for of in held
+        for each in of.tables
+        if each.title != "reading"
+        for key in each.parameters
+    }
+    return found | {of.name: of.parameters()[0].value for of in entries("body-keys") if of.name != "leds"}
+
+
+def _figure(value: Any) -> str:
+    """A figure as TOML, to six digits; of a ring of sensors their number and directions."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if not isinstance(value, list | tuple) or not value or isinstance(value[0], list | tuple):
+        return toml(value)
+    angles = cast("Sequence[float]", value)
+    steps = {round(later - earlier, 6) for earlier, later in pairwise(angles)}
+    if len(steps) == 1:
+        return f"{len(angles)}, every {steps.pop():g} from {angles[0]:g}"
+    return f"{len(angles)}, at {', '.join(f'{angle:g}' for angle in angles)}"
+
+
+def reading_table() -> str:
+    """The fields of each sensor's readings, and the values that its class derives from them."""
+    rows = [
+        (code(of.name), code(key.name), key.expected, key.unit, sentence(key.help), toml(key.value))
+        for of in entries("sensors")
+        for readings in of.tables
+        if readings.title == "reading"
+        for key in readings.parameters
+    ]
+    return table(("need", "field", "shape", "unit", "meaning", "lost"), rows)
+
+
+def sensor_tables() -> str:
+    """The keys that all sensors of a body share; then every sensor, its text, and its own keys in a data sheet."""
+    sheets = {
+        of: [key for each in of.tables if each.title == "data sheet" for key in each.parameters]
+        for of in entries("sensors")
+        if any(each.title == "reading" for each in of.tables)
+    }
+    shared = [key for key in next(iter(sheets.values())) if all(key in keys for keys in sheets.values())]
+    parts = ["Keys of every sensor:\n", key_table(shared)]
+    for of, keys in sheets.items():
+        own = [key for key in keys if key not in shared]
+        parts.append(f"{code(f'[sensors.{of.name}]')}: {text_of(of)}\n")
+        parts += _by_table(own, set(), "") if own else ["It has no keys of its own.\n"]
+    return "\n".join(parts)
+
+
+def command_tables() -> str:
+    """Every command: what it does, how it is called, and its options."""
+    parts: list[str] = []
+    for name, command in _commands(get_command(app)):
+        arguments = [_option(of) for of in command.params if of.param_type_name == "argument"]
+        options = ["[OPTIONS]"] if len(arguments) < len(command.params) else []
+        call = " ".join(["swarmwire", name, *arguments, *options])
+        parts.append(f"## {code(name)}\n\n{code(call)}\n\n{command.help}\n")
+        rows = [
+            (code(_option(of)), _default(of.default or None, of.required), sentence(of.help or ""))
+            for of in command.params
+            if not getattr(of, "hidden", False)
+        ]
+        parts += [table(("argument or option", "default", "meaning"), rows)] if rows else []
+    return "\n".join(parts)
+
+
+def _commands(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command with its name; those of a group within the group have its name in front."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands(command, f"{within}{name} ")
+        else:
+            yield f"{within}{name}", command
+
+
+def _option(of: Any) -> str:
+    """How it is written on the command line."""
+    if of.param_type_name == "argument":
+        return of.metavar or of.name.upper()
+    value = "" if of.is_flag else f" {of.metavar or of.name.upper()}"
+    return ", ".join(of.opts) + value
+
+
+def entries(kind: str) -> list[Entry]:
+    """The catalogue's entries of this kind."""
+    return kind_named(kind).entries()
+
+
+def text_of(of: Entry) -> str:
+    """What an entry says before its figures."""
+    return of.text or sentence(of.help)
+
+
+def _tables(of: Entry, seen: set[str], prefix: str = "") -> list[str]:
+    """The tables of an entry's parameters, one for each table of keys, unless `seen` has it already."""
+    return [part for each in of.tables for part in _by_table(each.parameters, seen, prefix)]
+
+
+def _by_table(parameters: Iterable[Parameter], seen: set[str], prefix: str) -> Iterator[str]:
+    """The keys without a point, then those of each table within, under its name and its help."""
+    rows, held = dict[str, list[Parameter]](), dict[str, Parameter]()
+    for key in parameters:
+        table_name, _, name = key.name.rpartition(".")
+        rows.setdefault(table_name, []).append(replace(key, name=name))
+        held[key.name] = key
+    for name, keys in rows.items():
+        shown = key_table(keys)
+        if name and shown in seen:
+            continue
+        seen.add(shown)
+        if of := held.get(name) or held.get(name.removesuffix(".*")):
+            yield f"{code(prefix + name.removesuffix('.*'))}: {of.text or sentence(of.help)}\n"
+        yield shown
+        deeper = tuple(f"{name}.{of.name}".strip(".") for of in keys if of.text)
+        yield from (f"{held[path].text}\n" for path in deeper if not any(of.startswith(path) for of in rows))
+
+
+def key_table(keys: Iterable[Parameter]) -> str:
+    """A row for each parameter."""
+    rows = [(code(of.name), of.unit, _expected(of), _default(of.value, of.required), sentence(of.help)) for of in keys]
+    return table(KEYS, rows)
+
+
+def _expected(of: Parameter) -> str:
+    """What a key expects; texts to choose from as TOML has them."""
+    found = CHOICES.fullmatch(of.expected)
+    return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}" if found else of.expected
+
+
+def _default(value: Any, required: bool) -> str:
+    return "required" if required else "" if value is None else code(toml(value))
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; a bar within a cell stays one, an empty cell is a dash."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(_cell(cell) for cell in line)} |" for line in lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ") or NOTHING
+
+
+def code(text: str) -> str:
+    """The text as code."""
+    return f"`{text}`"
+
+
+def sentence(text: str) -> str:
+    """The text without line breaks, from a capital letter to a full stop."""
+    flat = " ".join(text.split())
+    return flat[:1].upper() + flat[1:] + ("" if not flat or flat.endswith((".", "?", "!")) else ".")
+
+
+TABLES: dict[str, Callable[..., str]] = {
+    "behaviour": behaviour_details,
+    "behaviours": behaviour_table,
+    "bodies": body_table,
+    "body-keys": lambda: key_table(key for of in entries("body-keys") if of.name != "leds" for key in of.parameters()),
+    "body-sources": lambda: facts_of("bodies", "source"),
+    "commands": command_tables,
+    "drives": lambda: details_of("drives"),
+    "events": lambda: details_of("events"),
+    "fates": lambda: rows_of("fates"),
+    "fields": lambda: rows_of("fields", "bytes on air"),
+    "keys": keys_of,
+    "leds": lambda: key_table(next(of for of in entries("body-keys") if of.name == "leds").parameters()),
+    "metric-details": lambda: details_of("metrics"),
+    "metrics": lambda: rows_of("metrics", "unit", "kind", "bounds", "standard"),
+    "preset-sources": lambda: facts_of("presets", "source"),
+    "presets": lambda: rows_of("presets", "reach", "longest frame", "but"),
+    "readings": reading_table,
+    "sensors": sensor_tables,
+}

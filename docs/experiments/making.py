@@ -1,0 +1,172 @@
+"""An experiment from its campaign files to its figure: what is missing is swept, digested and drawn.
+
+Digests are the columns of campaigns' tables that an experiment's figure and numbers are made from.
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import polars as pl
+import typer
+from rich.console import Console
+
+from docs.experiments.experiment import Experiment, Places
+from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
+from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
+from swarmwire.deploy.cli.app import let_help_flow
+from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.terminal.sweep import SweepProgress
+from swarmwire.metrics.atomic import output_file, write_text
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
+from swarmwire.metrics.drawing.canvas import save
+
+BEGIN = ("run", "point", "seed")
+ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
+LAST = ("timing_wall_s",)
+MAX_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
+BEGIN_MARK, END_MARK = "<!-- numbers -->", "<!-- /numbers -->"
+
+
+def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ()) -> list[Path]:
+    """Write the digests of an experiment's campaigns, each of which must be over; the files that were written.
+
+    `folders` are campaigns' folders, named as the campaigns, or a single one; none: all that lie where they are swept.
+    BadInput for a folder that is of no campaign of the experiment, or not over, and for digests that are too large.
+    """
+    written: list[Path] = []
+    for campaign, folder in _folders(experiment, places, folders).items():
+        frame = digest_of(experiment, folder)
+        places.data.mkdir(parents=True, exist_ok=True)
+        written.append(places.data / f"{campaign}.parquet")
+        with output_file(written[-1]) as aside:
+            frame.write_parquet(aside, compression="zstd", compression_level=9, statistics=False)
+    size = sum(file.stat().st_size for file in _files(experiment, places) if file.exists())
+    if size > MAX_BYTES:
+        kept = f"expected at most {MAX_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
+        raise BadInput(str(places.data), experiment.name, kept)
+    return written
+
+
+def digest_of(experiment: Experiment, folder: Path) -> pl.DataFrame:
+    """The digest of one campaign; BadInput unless it is over and has the columns that the experiment wants."""
+    campaign = CampaignFolder(folder)
+    if not campaign.finished:
+        lacking = f"{len(campaign.missing)} of {campaign.about.runs} runs are missing"
+        raise BadInput(
+            str(folder), "", f"expected a campaign that is over; {lacking}: swarmwire sweep --resume {folder}"
+        )
+    own = experiment.digested(folder, campaign.runs)
+    if own is not None:
+        return own
+    there = campaign.runs.columns
+    for name in experiment.columns:
+        if name not in there:
+            raise BadInput(
+                str(folder), name, f"expected a column that the campaign has: {did_you_mean(tuple(there), name)}"
+            )
+    ends = [name for name in ENDS if name in there]
+    chosen = dict.fromkeys((*BEGIN, *campaign.parameters, *ends, *experiment.columns, *LAST))
+    return campaign.runs.select(*chosen)
+
+
+def digests(experiment: Experiment, places: Places) -> Mapping[str, pl.DataFrame]:
+    """The digests of an experiment by campaign; BadInput if one is missing."""
+    for file in _files(experiment, places):
+        if not file.exists():
+            raise BadInput(str(file), "", f"is missing: expected a digest; run or digest {experiment.name} first")
+    return {file.stem: pl.read_parquet(file) for file in _files(experiment, places)}
+
+
+def _files(experiment: Experiment, places: Places) -> list[Path]:
+    return [places.data / f"{campaign}.parquet" for campaign in experiment.campaigns]
+
+
+def _folders(experiment: Experiment, places: Places, given: Sequence[Path]) -> dict[str, Path]:
+    """Folders by campaign."""
+    known = experiment.campaigns
+    if not given:
+        return {campaign: places.swept / campaign for campaign in known}
+    if len(given) == len(known) == 1:
+        return {known[0]: given[0]}
+    for folder in given:
+        if folder.name not in known:
+            raise BadInput(
+                "FOLDER", str(folder), f"expected a folder named as its campaign: {did_you_mean(known, folder.name)}"
+            )
+    return {folder.name: folder for folder in given}
+
+
+def draw(experiment: Experiment, places: Places) -> str:
+    """Draw an experiment, put its numbers into its page if there is one, and return them.
+
+    BadInput where a digest is missing, or the page has no place for the numbers.
+    """
+    runs = digests(experiment, places)
+    told = experiment.told(runs)
+    page = places.pages / f"{experiment.name}.md"
+    text = with_numbers(page, told) if page.exists() else None
+    save(experiment.draw(runs), places.figure_of(experiment.name))
+    if text is not None:
+        write_text(page, text)
+    return told
+
+
+def with_numbers(page: Path, told: str) -> str:
+    """The page's text with these numbers between its marks; BadInput unless it has both, once."""
+    text = page.read_text(encoding="utf-8")
+    if text.count(BEGIN_MARK) != 1 or text.count(END_MARK) != 1 or text.index(BEGIN_MARK) > text.index(END_MARK):
+        raise BadInput(str(page), "", f"expected one line {BEGIN_MARK}, and {END_MARK} below it")
+    return f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{told}\n{END_MARK}{text.partition(END_MARK)[2]}"
+
+
+def run(experiment: Experiment, places: Places, seeds: str | None, options: ExecutionOptions, console: Console) -> str:
+    """Sweep what is missing of an experiment's campaigns, digest and draw it; the numbers.
+
+    With `seeds` other seeds than the campaigns' own are taken, in folders of their own. BadInput as of `swarmwire
+    sweep`, and if a campaign that lies there is not the one that its file describes now; Interrupted by Ctrl-C: the
+    same call goes on.
+    """
+    where = places if seeds is None else places.trial(seeds)
+    for name in experiment.campaigns:
+        swept = _swept(where.campaigns / f"{name}.toml", where.swept / name, seeds, options, console)
+        if swept is not None and not swept.is_over:
+            raise Interrupted(f"{swept.done} of {swept.runs} runs of {name} are done: the same command goes on")
+    digest(experiment, where)
+    return draw(experiment, where)
+
+
+def _swept(file: Path, folder: Path, seeds: str | None, options: ExecutionOptions, console: Console) -> Sweep | None:
+    """How far the campaign has come; None: it had been finished before."""
+    campaign = campaign_file(file)
+    if campaign is None:
+        raise BadInput(str(file), "", "expected a campaign, not a scenario")
+    plan = plan_of(spec_in(file, campaign, seeds))
+    options = replace(options, observer=SweepProgress(console))
+    if not (folder / ABOUT).exists():
+        return begin_sweep(plan, folder, f"swarmwire sweep {file.name}", options)
+    if not CampaignFolder(folder).finished:
+        return resume_sweep(folder, options, plan=plan)
+    check_same(plan, read_campaign(folder), folder)
+    console.print(f"there already: {folder}", soft_wrap=True)
+    return None
+
+
+def run_app(app: typer.Typer) -> None:
+    """Run what the arguments say; every error of ours is one line."""
+    let_help_flow(app)
+    try:
+        app()
+    except SwarmwireError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(_exit_code_of(error))
+
+
+def _exit_code_of(error: SwarmwireError) -> int:
+    if isinstance(error, BadInput):
+        return BAD_INPUT
+    return INTERRUPTED if isinstance(error, Interrupted) else FAILED

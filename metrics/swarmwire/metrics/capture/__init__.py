@@ -1,1 +1,0 @@
-"""Captures: what was on air, as a file that Wireshark opens."""

@@ -1,0 +1,195 @@
+"""Delivery of packets: delivery ratios over a window of ticks, throughput and airtime."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.config import parameter
+from swarmwire.comms.kernels import njit
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.truth import PacketCounts, Static
+from swarmwire.metrics.metric import Measure, Metric, TickView
+
+ROUNDING = 1e-9  # of a tick
+BITS_PER_BYTE = 8
+RECEIVED = int(Fate.RECEIVED)
+
+
+@dataclass(frozen=True)
+class OfWindow(Metric):
+    """A metric of what happened in the last while."""
+
+    needs = ()
+
+    window_s: float = parameter(
+        1.0, help="what counts is so old at most; rounded up to whole ticks", unit="s", above=0.0
+    )
+
+
+class Window:
+    """Sums of whole numbers per arena over the last ticks: exact, however long the run."""
+
+    def __init__(self, static: Static, window_s: float, numbers: int) -> None:
+        """For so many `numbers` in each tick."""
+        ticks = max(1, ceil(window_s * static.rate_hz - ROUNDING))
+        self._ring: IntArray = np.zeros((ticks, numbers, static.arenas), np.int64)
+        self._sum: IntArray = np.zeros((numbers, static.arenas), np.int64)
+        self._at = 0
+
+    def add(self, numbers: ArrayLike) -> IntArray:
+        """Take a tick's numbers (numbers, arenas), and tell their sums over the window, which holds it (same shape)."""
+        oldest = self._ring[self._at]
+        self._sum -= oldest
+        oldest[:] = numbers
+        self._sum += oldest
+        self._at = (self._at + 1) % len(self._ring)
+        return self._sum
+
+
+class _DeliveryRatio(OfWindow):
+    """Receivers that received / a count of receivers, of the fates that became final in the window."""
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps the counts of the window's ticks."""
+        window = Window(static, self.window_s, 2)
+
+        def measure(view: TickView) -> FloatArray | float:
+            tally = view.truth.tally
+            if tally is None:
+                return np.nan
+            received, receivers = window.add((tally.fates[:, Fate.RECEIVED], self._receivers(tally)))
+            return received / np.where(receivers > 0, receivers, np.nan)
+
+        return measure
+
+    def _receivers(self, tally: PacketCounts) -> IntArray:
+        """The receivers that the ratio is of, (arenas,)."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class PacketDeliveryRatio(_DeliveryRatio):
+    """Receivers that received / intended receivers, of the fates that became final in the last `window_s`.
+
+    Every fate counts, so receivers out of range lower the ratio. `link_pdr` counts only receivers in range. A loss
+    becomes final sooner than a reception, by the radio's latency, so the ratio dips as traffic sets in and rises as it
+    ends. The ratio over the whole run is `radio.pdr` of the summary; the mean of this metric over the ticks differs,
+    since each tick has the same weight, however many packets it has. From 0 to 1; NaN without a radio, or if no fate
+    became final in the window.
+    """
+
+    name = "pdr"
+    help = "packet delivery ratio: received / intended receivers, of the fates that became final in the last window_s"
+    bounds = (0.0, 1.0)
+
+    def _receivers(self, tally: PacketCounts) -> IntArray:
+        return tally.fates.sum(axis=1)
+
+
+@dataclass(frozen=True)
+class LinkPacketDeliveryRatio(_DeliveryRatio):
+    """Receivers that received / receivers in range, of the fates that became final in the last `window_s`.
+
+    In range after path loss and walls, as in `PacketCounts.in_range`: dead and blacked-out receivers count. With
+    independent losses of probability p the ratio is 1 - p, with K tries 1 - p^K. A loss becomes final sooner than a
+    reception, by the radio's latency, so the ratio dips as traffic sets in and rises as it ends. The ratio over the
+    whole run is `radio.link_pdr` of the summary; the mean of this metric over the ticks differs, since each tick has
+    the same weight, however many packets it has. From 0 to 1; NaN without a radio, or if no fate of a receiver in
+    range became final in the window.
+    """
+
+    name = "link_pdr"
+    help = "delivery ratio of links: received / in range, of the fates that became final in the last window_s"
+    bounds = (0.0, 1.0)
+
+    def _receivers(self, tally: PacketCounts) -> IntArray:
+        return tally.in_range
+
+
+@dataclass(frozen=True)
+class Throughput(Metric):
+    """Payload received, over all receivers of the arena: sum of 8 x bytes since the last tick x tick rate, in bit/s.
+
+    A broadcast counts once for each robot that hears it; the message's tag counts, what the radio adds to it does not.
+    The mean over the ticks divided by the robots is that of a receiver. NaN without a radio.
+    """
+
+    name = "throughput"
+    help = "payload received by all robots together, a broadcast once for each, in bit/s"
+    unit = "bit/s"
+    standard = True
+    needs = ()
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        return _throughput_bps
+
+
+def _throughput_bps(view: TickView) -> FloatArray | float:
+    static, ended = view.static, view.truth.finished
+    if ended is None:
+        return np.nan
+    return _received_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
+
+
+@njit()
+def _received_bytes(fate, arena, size_bytes, arenas):
+    total = np.zeros(arenas)
+    for i in range(len(fate)):
+        if fate[i] == RECEIVED:
+            total[arena[i]] += size_bytes[i]
+    return total
+
+
+@dataclass(frozen=True)
+class Airtime(Metric):
+    """Share of the time that a robot's radio has packets on air: mean over the robots alive of airtime / tick.
+
+    A packet counts in the tick in which its end is known, and what of it is longer than a tick in those that follow. Of
+    a packet sent again for want of an acknowledgement one try counts, and acknowledgements do not. NaN without a radio,
+    or if no robot is alive. What fills the medium around a robot is this times the robots whose signals reach it.
+    """
+
+    name = "airtime"
+    help = "share of the time that a robot's radio has packets on air, mean over robots alive"
+    standard = True
+    needs = ("airtime",)
+    bounds = (0.0, 1.0)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps the airtime that is still to be counted."""
+        owed_ns: IntArray = np.zeros((static.arenas, static.robots), np.int64)
+        tick_ns = NS_PER_S // static.rate_hz
+
+        def measure(view: TickView) -> FloatArray | float:
+            gone = view.truth.departed
+            if gone is None:
+                return np.nan
+            counted_ns = _counted_ns(
+                gone.arena, gone.sender, gone.on_air_at_ns, gone.off_air_at_ns, tick_ns, view.alive, owed_ns
+            )
+            return counted_ns / (tick_ns * view.per_robot_alive)
+
+        return measure
+
+
+@njit()
+def _counted_ns(arena, sender, on_air_at_ns, off_air_at_ns, tick_ns, alive, owed_ns):
+    """The airtime that counts in this tick, of robots alive, (arenas,); `owed_ns` is what every robot has left."""
+    for i in range(len(arena)):
+        owed_ns[arena[i], sender[i]] += off_air_at_ns[i] - on_air_at_ns[i]
+    total_ns = np.zeros(len(owed_ns), np.int64)
+    for a in range(owed_ns.shape[0]):
+        for robot in range(owed_ns.shape[1]):
+            counted_ns = min(owed_ns[a, robot], tick_ns)
+            owed_ns[a, robot] -= counted_ns
+            if alive[a, robot]:
+                total_ns[a] += counted_ns
+    return total_ns

@@ -1,0 +1,279 @@
+"""Logs of packets between robots, as CSV or Parquet, with RSSI (a radio's) or without (a network's)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.metrics.radio_fit.losses import LossSequences
+from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
+from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
+from swarmwire.metrics.real_log.robot_log import LogTable, RobotLog, received_packets
+from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
+from swarmwire.metrics.table_file import MeasuredTable
+
+NETWORK_COLUMNS = ("t_s", "tx", "rx", "seq")
+RADIO_COLUMNS = (*NETWORK_COLUMNS, "rssi_dbm")
+ENDS = ("tx_x_m", "tx_y_m", "rx_x_m", "rx_y_m")
+DISTANCE = "distance_m"
+MAX_LOST = 10_000_000
+
+
+@dataclass(frozen=True)
+class RadioLog:
+    """A row per packet that was received, or noted as lost; sorted by link, then by sequence number.
+
+    Packets between two rows of a link whose sequence numbers leave a gap were lost, too.
+    """
+
+    links: tuple[tuple[str, str], ...]  # names of sender and receiver
+    link: IntArray  # (n,) place in `links`
+    time_s: FloatArray  # (n,) rising within a link
+    sequence: IntArray  # (n,) rising within a link
+    rssi_dbm: FloatArray  # (n,) NaN: lost
+    distance_m: FloatArray  # (n,) NaN: unknown, of lost packets only
+    ends_m: FloatArray | None  # (n, 4) x and y of sender and receiver; None: the log has no positions
+
+    @cached_property
+    def received(self) -> BoolArray:
+        """Which rows were received, (n,)."""
+        return np.isfinite(self.rssi_dbm)
+
+    @cached_property
+    def opens(self) -> BoolArray:
+        """Which rows are the first of their link, (n,)."""
+        return np.diff(self.link, prepend=-1) != 0
+
+    @cached_property
+    def gaps(self) -> IntArray:
+        """How many packets were lost unseen right before each row, (n,)."""
+        missed = np.diff(self.sequence, prepend=0) - 1
+        return np.where(self.opens, 0, missed)
+
+    @cached_property
+    def last_distance_m(self) -> FloatArray:
+        """Distances (n,), with unknown ones replaced by the last known of the link; NaN before any."""
+        row = np.arange(len(self.link))
+        known: IntArray = np.maximum.accumulate(np.where(np.isfinite(self.distance_m), row, -1))
+        here = (known >= 0) & (self.link[known] == self.link)
+        return np.where(here, self.distance_m[known], np.nan)
+
+    def within(self, distance_m: float) -> "RadioLog":
+        """The rows at most this far apart; where a link comes back after a while beyond, it counts as another link."""
+        near = self.last_distance_m <= distance_m
+        far_since_start = np.cumsum(~near)
+        # A link's rows with no far row between them stay together.
+        spell = np.stack([self.link, far_since_start])[:, near]
+        starts = np.any(np.diff(spell, axis=1, prepend=-1) != 0, axis=0)
+        first: list[int] = self.link[near][starts].tolist()
+        return RadioLog(
+            tuple(self.links[i] for i in first),
+            np.cumsum(starts) - 1,
+            self.time_s[near],
+            self.sequence[near],
+            self.rssi_dbm[near],
+            self.distance_m[near],
+            None if self.ends_m is None else self.ends_m[near],
+        )
+
+
+def read_log(path: Path) -> RadioLog:
+    """The log in a file, its links in the order of their names.
+
+    Columns: t_s, tx, rx, seq, rssi_dbm (empty: the packet was lost), and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m
+    (may be empty where a packet was lost). The rows of a link stand in the order of time, links in any.
+    BadInput where they do not, for a sequence number that comes twice, and for values that cannot be.
+    """
+    table = MeasuredTable(path)
+    table.need(RADIO_COLUMNS)
+    time_s, sequence, rssi_dbm = (table.numbers(name) for name in ("t_s", "seq", "rssi_dbm"))
+    table.refuse_where(np.isnan(time_s), "t_s", "expected a time in s")
+    table.refuse_where(~(np.abs(sequence) < 2.0**53) | (sequence % 1 != 0), "seq", "expected a whole number")
+    names = list(zip(table.texts("tx"), table.texts("rx"), strict=True))
+    table.refuse_where(np.array([tx == rx for tx, rx in names]), "rx", "expected another robot than tx")
+    lost = np.isnan(rssi_dbm)
+    ends_m = _ends(table, lost)
+    distance_m = _distance(table, ends_m, lost)
+    links = tuple(sorted(set(names)))
+    place = {link: i for i, link in enumerate(links)}
+    link = np.array([place[name] for name in names], np.int64)
+    order: IntArray = np.argsort(link, kind="stable")
+    _refuse_disorder(table, order, link, time_s, sequence)
+    whole = sequence.astype(np.int64)
+    ends = None if ends_m is None else ends_m[order]
+    return RadioLog(links, link[order], time_s[order], whole[order], rssi_dbm[order], distance_m[order], ends)
+
+
+def _ends(table: MeasuredTable, lost: BoolArray) -> FloatArray | None:
+    """Positions (rows, 4) of sender and receiver in m, if the file has them."""
+    if not any(name in table.columns for name in ENDS):
+        return None
+    table.need(ENDS)
+    for name in ENDS:
+        table.refuse_where(np.isnan(table.numbers(name)) & ~lost, name, "expected the position of a received packet")
+    return np.stack([table.numbers(name) for name in ENDS], axis=1)
+
+
+def _distance(table: MeasuredTable, ends_m: FloatArray | None, lost: BoolArray) -> FloatArray:
+    """Distance of sender and receiver in m, (rows,): of the positions, if there are any."""
+    if ends_m is not None:
+        apart_m: FloatArray = np.hypot(ends_m[:, 2] - ends_m[:, 0], ends_m[:, 3] - ends_m[:, 1])
+        table.refuse_where(apart_m <= 0.0, "rx_x_m", "expected sender and receiver in different places")
+        return apart_m
+    if DISTANCE not in table.columns:
+        raise table.refused(DISTANCE, f"is missing, and so are the positions {', '.join(ENDS)}; expected either")
+    distance_m = table.numbers(DISTANCE)
+    table.refuse_where((np.isnan(distance_m) & ~lost) | (distance_m <= 0.0), DISTANCE, "expected more than 0 m")
+    return distance_m
+
+
+def _refuse_disorder(
+    table: MeasuredTable, order: IntArray, link: IntArray, time_s: FloatArray, sequence: FloatArray
+) -> None:
+    """BadInput unless time and sequence number rise from row to row of each link."""
+    same = np.diff(link[order]) == 0
+    steps = np.diff(sequence[order])
+    for wrong, column, expected in (
+        (steps == 0, "seq", "comes twice on this link; expected each number once"),
+        (steps < 0, "seq", "falls on this link; expected numbers that rise with time"),
+        (np.diff(time_s[order]) <= 0, "t_s", "does not rise on this link; expected its rows in the order of time"),
+    ):
+        table.refuse_where(_rows(order, same & wrong), column, expected)
+    gaps = np.where(same, steps - 1.0, 0.0)
+    if gaps.sum() > MAX_LOST:
+        widest = _rows(order, gaps == gaps.max())
+        table.refuse_where(
+            widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MAX_LOST} lost in all at most"
+        )
+
+
+def _rows(order: IntArray, wrong: AnyArray) -> BoolArray:
+    """Rows of the file, (rows,), from steps between rows in order, (rows - 1,)."""
+    found = np.zeros(len(order), np.bool_)
+    found[order[1:][wrong]] = True
+    return found
+
+
+def loss_sequences(log: RadioLog) -> LossSequences:
+    """The packets of a log; those that were lost unseen are taken as sent evenly between the rows around them.
+
+    Packets before a link's first row and after its last leave no trace.
+    """
+    repeat = log.gaps + 1
+    row = np.repeat(np.arange(len(log.link)), repeat)
+    step_s = np.diff(log.time_s, prepend=0.0) / repeat
+    since_s = step_s[row]
+    last = np.cumsum(repeat) - 1
+    since_s[last[log.opens]] = np.inf  # an opening row has no gap before it
+    lost = np.ones(len(row), np.bool_)
+    lost[last] = ~log.received
+    return LossSequences(log.link[row], since_s, lost)
+
+
+@dataclass(frozen=True)
+class NetworkLog:
+    """Packets of all links, link after link, by number within each."""
+
+    names: tuple[str, ...]
+    packets: LinkPackets
+    distance_m: FloatArray  # (n,) as each was sent; NaN: not known
+    notes: tuple[str, ...]
+
+    @property
+    def lost(self) -> BoolArray:
+        """Which packets were lost, (n,)."""
+        return np.isnan(self.packets.received_s)
+
+    @property
+    def has_distances(self) -> bool:
+        """Whether any packet's distance is known: the robots had a tracker."""
+        return bool(np.isfinite(self.distance_m).any())
+
+    def within(self, distance_m: float) -> "NetworkLog":
+        """The packets sent over at most this distance."""
+        near = self.distance_m <= distance_m
+        return replace(self, packets=self.packets.rows(near), distance_m=self.distance_m[near])
+
+    def sequences(self, kept: BoolArray) -> LossSequences:
+        """The losses of some of the packets (n,), in the order of time within each link."""
+        of = self.packets.rows(kept)
+        link = of.sender * len(self.names) + of.receiver
+        order = np.lexsort((of.sent_s, link))
+        link, sent_s, lost = link[order], of.sent_s[order], self.lost[kept][order]
+        opens = np.diff(link, prepend=-1) != 0
+        since_s = np.where(opens, np.inf, np.maximum(np.diff(sent_s, prepend=0.0), 1e-9))
+        return LossSequences(np.cumsum(opens) - 1, since_s, lost)
+
+
+def is_network_table(path: Path) -> bool:
+    """Whether a file is a CSV of received packets without strengths; False if it cannot be read."""
+    if path.suffix.lower() != ".csv":
+        return False
+    try:
+        with path.open(encoding="utf-8") as file:
+            columns = file.readline().strip().split(",")
+    except (OSError, ValueError):
+        return False
+    return set(NETWORK_COLUMNS) <= set(columns) and "rssi_dbm" not in columns
+
+
+def network_log_of_table(path: Path) -> NetworkLog:
+    """A table of what robots received; packets before a link's first and after its last leave no trace.
+
+    Columns: t_s, tx, rx, seq; optional: to, latency_s, distance_m. BadInput for invalid values.
+    """
+    table = LogTable(path, NETWORK_COLUMNS)
+    notes = ("half a line at the end was dropped",) if table.half_line else ()
+    received, receivers = received_packets(table), np.array(table.texts("rx"), np.str_)
+    table.refuse_where(received.sender == receivers, "rx", "expected another robot than tx")
+    names = sorted({*received.sender.tolist(), *receivers.tolist()})
+    nodes = [Node(name, None, received.picked(np.flatnonzero(receivers == name)), None) for name in names]
+    return _network_log(nodes, [None] * len(nodes), str(path), notes)
+
+
+def network_log_of_robots(logs: RealLogs) -> NetworkLog:
+    """All robots' received.csv and sent.csv, by one clock; also links from robots without a log."""
+    logs = in_step(logs)
+    by_name: dict[str, RobotLog] = dict(zip(logs.names, logs.robots, strict=True))
+    robots = [by_name.get(name) for name in logs.robots[0].about.robots]
+    nodes = [
+        Node(name, None, None, None) if robot is None else Node(name, robot.sent, robot.received, _span_s(robot))
+        for name, robot in zip(logs.robots[0].about.robots, robots, strict=True)
+    ]
+    return _network_log(nodes, robots, logs.where, logs.notes)
+
+
+def _span_s(robot: RobotLog) -> tuple[float, float] | None:
+    steps_s = robot.steps.time_s
+    return (float(steps_s[0]), float(steps_s[-1])) if len(steps_s) else None
+
+
+def _network_log(
+    nodes: Sequence[Node], robots: Sequence[RobotLog | None], where: str, notes: tuple[str, ...]
+) -> NetworkLog:
+    packets = link_packets(nodes, own_packets(nodes, where))
+    ends_s = np.array([node.span_s[1] if node.span_s else np.inf for node in nodes])
+    # What may still have been received after a log's end is not lost.
+    final = np.isfinite(packets.received_s) | (packets.sent_s <= ends_s[packets.receiver] - usual_latency_s(packets))
+    packets = packets.rows(final)
+    return NetworkLog(tuple(node.name for node in nodes), packets, _distances_m(packets, robots), notes)
+
+
+def _distances_m(packets: LinkPackets, robots: Sequence[RobotLog | None]) -> FloatArray:
+    """By the poses of both as the packet was sent, else between those that receivers noted on the link; (n,)."""
+    distance_m = np.full(len(packets.sender), np.nan)
+    link = packets.sender * max(len(robots), 1) + packets.receiver
+    for number in np.unique(link):
+        rows = np.flatnonzero(link == number)
+        sender, receiver = robots[int(packets.sender[rows[0]])], robots[int(packets.receiver[rows[0]])]
+        sent_s = packets.sent_s[rows]
+        noted = np.isfinite(packets.distance_m[rows])
+        if sender and receiver and posed_span_s(sender) and posed_span_s(receiver):
+            apart = poses_at(sender, sent_s)[:, :2] - poses_at(receiver, sent_s)[:, :2]
+            distance_m[rows] = np.hypot(apart[:, 0], apart[:, 1])
+        elif noted.any():
+            distance_m[rows] = np.interp(sent_s, sent_s[noted], packets.distance_m[rows][noted])
+    return distance_m

@@ -1,0 +1,98 @@
+"""Path loss fitted to RSSI over distance: reference loss and exponent, with their standard errors."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+
+CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+MIN_PACKETS = 10
+MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
+MIN_CLUSTERS = 10
+# Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
+MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
+
+
+class Estimate(NamedTuple):
+    """A value and its standard error, in the unit of its name."""
+
+    value: float
+    standard_error: float  # NaN: unknown
+
+
+def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: float) -> FloatArray:
+    """Standard errors (n,) of parameters where `cost`, the negative log likelihood, is least; by differences of `step`.
+
+    NaN where the cost does not rise around the place.
+    """
+    count = len(at)
+    move = np.eye(count) * step
+    bend = np.empty((count, count))
+    for i in range(count):
+        for j in range(i + 1):
+            corners = sum(sign * cost(at + a * move[i] + b * move[j]) for a, b, sign in CORNERS)
+            bend[i, j] = bend[j, i] = corners / (4.0 * step * step)
+    if not np.isfinite(bend).all() or np.linalg.matrix_rank(bend) < count:
+        return np.full(count, np.nan)
+    variance = np.diag(np.linalg.inv(bend))
+    return np.where(variance > 0.0, np.sqrt(np.abs(variance)), np.nan)
+
+
+@dataclass(frozen=True)
+class PathLossFit:
+    """RSSI(d) = rssi_at_1_m - 10 n log10 d."""
+
+    exponent: Estimate  # n
+    rssi_at_1_m_dbm: Estimate
+
+    def rssi_dbm(self, distance_m: FloatArray) -> FloatArray:
+        """The line at distances of any shape."""
+        return self.rssi_at_1_m_dbm.value - 10.0 * self.exponent.value * np.log10(distance_m)
+
+
+def design(distance_m: FloatArray) -> FloatArray:
+    """The columns (n, 2) that RSSI at 1 m and the exponent are multiplied by."""
+    return np.stack([np.ones_like(distance_m), -10.0 * np.log10(distance_m)], axis=1)
+
+
+def why_not(distance_m: FloatArray) -> str | None:
+    """A sentence on the data that a fit lacks; None if these distances suffice."""
+    if len(distance_m) < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} received packets, got {len(distance_m)}"
+    span = float(distance_m.max() / distance_m.min())
+    if span < MIN_SPAN:
+        return f"needs distances that span a factor of {MIN_SPAN:g}, got {span:.2f}"
+    return None
+
+
+def why_none(fit: PathLossFit) -> str | None:
+    """A sentence on an exponent that no medium has; None if the fit is plausible."""
+    exponent = round(fit.exponent.value, 3) + 0.0  # rounded to 0 rather than -0 or 1e-17
+    if MIN_EXPONENT <= exponent <= MAX_EXPONENT:
+        return None
+    way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < MIN_EXPONENT else "falls too fast"
+    bounds = f"{MIN_EXPONENT:g} to {MAX_EXPONENT:g}"
+    return f"RSSI {way} with distance: expected an exponent of {bounds}, got {exponent:g}"
+
+
+def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArray) -> PathLossFit:
+    """Ordinary least squares over received packets (n,).
+
+    Packets of a cluster (n,), such as the two directions between two robots, share their surroundings. Standard
+    errors allow for it (the sandwich of Liang and Zeger, Biometrika 73, 1986) where there are enough clusters.
+    """
+    x = design(distance_m)
+    inverse = np.linalg.inv(x.T @ x)
+    beta = inverse @ (x.T @ rssi_dbm)
+    residual = rssi_dbm - x @ beta
+    variance = inverse * (residual @ residual) / max(len(rssi_dbm) - 2, 1)
+    clusters = np.unique(cluster, return_inverse=True)[1]
+    count = int(clusters.max()) + 1
+    if count >= MIN_CLUSTERS:
+        score = np.stack([np.bincount(clusters, x[:, i] * residual) for i in range(2)], axis=1)
+        variance = inverse @ (score.T @ score) @ inverse * count / (count - 1)
+    errors = np.sqrt(np.diag(variance))
+    return PathLossFit(Estimate(float(beta[1]), float(errors[1])), Estimate(float(beta[0]), float(errors[0])))

@@ -1,0 +1,308 @@
+"""The sections of models, with charts: survival of times, resilience to loss, scaling with the number of robots."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.metrics.campaign.spec import Response
+from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SOFT, Look
+from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log
+from swarmwire.metrics.report.campaign_data import (
+    Levels,
+    Rounding,
+    Samples,
+    figure_name,
+    levels_of,
+    response_title,
+    rounding_of,
+)
+from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
+from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
+from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.statistics.trends import (
+    MIN_STRESSES,
+    Degradation,
+    Fit,
+    Scaling,
+    degradation,
+    relative_to_unharmed,
+    scaling,
+)
+from swarmwire.metrics.text import listed, number, sentence
+
+MAX_CURVES = 6
+_MAX_PARAMETERS = 2
+_LOSSES = ("share", "loss")  # last words of parameters of loss
+_GRID = 60
+_COUNT = re.compile(r"robots\.[^.]+\.count")
+_LEGEND_IN = 0.72
+_MAX_CORNERS, _MAX_TICKS = 300, 60
+
+
+@dataclass(frozen=True)
+class FittedShape:
+    """A fit at shares (g,)."""
+
+    label: str
+    share: FloatArray
+    value: FloatArray
+    better: bool  # than the other
+
+
+def resilience_curve(
+    share: FloatArray,
+    value: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    shapes: Sequence[FittedShape],
+    title: str,
+    x_label: str,
+) -> Any:
+    """The figure of values (k,) with their intervals, over shares (k,) that were lost."""
+    figure, axes = column_axes(title, x_label)
+    axes.axhline(1.0, color=SOFT, lw=0.7, ls=":", zorder=1)
+    lines: Look = {"color": CURVE, "lw": 1.0, "zorder": 3, "clip_on": False}
+    axes.vlines(share, low, high, **lines)
+    axes.plot(share, value, "o", color=CURVE, ms=3.6, zorder=4, clip_on=False)
+    for shape in shapes:
+        look: Look = {"color": ACCENT, "lw": 1.4} if shape.better else {"color": INK, "lw": 0.9, "ls": (0, (4, 2))}
+        axes.plot(shape.share, shape.value, label=shape.label, zorder=2, **look)
+    axes.set_ylim(min(0.0, float(low.min())), None)
+    axes.set_xlim(-0.03 * float(share[-1]), None)
+    plain_legend(axes, loc="best")
+    return figure
+
+
+def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: float) -> Any:
+    """The figure of a value (k,) over numbers of robots (k,); `level`: the value of ideal scaling."""
+    figure, axes = column_axes(title, "robots")
+    axes.axhline(level, color=SOFT, lw=0.7, ls="--", zorder=1)
+    known = np.isfinite(value)
+    axes.plot(robots[known], value[known], "o-", color=CURVE, lw=1.3, ms=3.6)
+    if fits_log(robots):
+        set_log(axes.xaxis)
+    axes.set_xticks(robots, [f"{count:g}" for count in robots])
+    return figure
+
+
+@dataclass(frozen=True)
+class SurvivalCurve:
+    """A group's estimate; the share is 1 before the first time and holds from each time on."""
+
+    label: str
+    time_s: FloatArray  # (k,) ascending, at which it falls
+    share: FloatArray  # (k,) of the runs, from that time on
+    censored_s: FloatArray  # (c,) ends of runs that were still waiting
+    end_s: float  # up to where any run was followed
+
+
+def survival_curves(curves: Sequence[SurvivalCurve], title: str, x_label: str) -> Any:
+    """The figure."""
+    figure, axes = column_axes(title, x_label, right_in=_LEGEND_IN if len(curves) > 1 else 0.1)
+    axes.grid(axis="x", color=GRID, linewidth=0.6)
+    for curve, color in zip(curves, ordered_colors(len(curves)), strict=True):
+        time_s, share = _steps(curve)
+        axes.plot(time_s, share, drawstyle="steps-post", color=color, lw=1.3, label=curve.label, solid_capstyle="butt")
+        ends_s = np.unique(curve.censored_s)
+        ends_s = ends_s[:: -(-len(ends_s) // _MAX_TICKS) or 1]
+        if len(ends_s):
+            at = share[np.maximum(np.searchsorted(time_s, ends_s, side="right") - 1, 0)]
+            mark: Look = {"ms": 5, "mew": 1.1, "ls": "", "clip_on": False, "zorder": 4}
+            axes.plot(ends_s, at, "|", color=color, **mark)
+    axes.set_ylim(0.0, 1.03)
+    axes.set_xlim(0.0, None)
+    if len(curves) > 1:
+        plain_legend(axes, loc="upper left", bbox_to_anchor=(1.01, 1.03), handletextpad=0.5)
+    return figure
+
+
+def _steps(curve: SurvivalCurve) -> tuple[FloatArray, FloatArray]:
+    """The corners from 0 to the end, at most _MAX_CORNERS."""
+    time_s = np.concatenate(([0.0], curve.time_s, [max(curve.end_s, *curve.time_s, 0.0)]))
+    share = np.concatenate(([1.0], curve.share, [curve.share[-1] if len(curve.share) else 1.0]))
+    if len(time_s) <= _MAX_CORNERS:
+        return time_s, share
+    grid: FloatArray = np.linspace(0.0, float(time_s[-1]), _MAX_CORNERS)
+    last = np.unique(np.searchsorted(time_s, grid, side="right") - 1)
+    return time_s[last], share[last]
+
+
+def survival_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
+    """The section; None without a response that is a time."""
+    levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MAX_PARAMETERS]]
+    levels = [each for each in levels if len(each) > 1] or [None]
+    figures = [_survival_figure(samples, response, each) for response in times for each in levels]
+    if not figures:
+        return None
+    text = (
+        "The share of runs in which it has not happened yet, by Kaplan and Meier's estimate. A curve falls with "
+        "each run in which it happens; a tick on it is a run that ended before."
+    )
+    return Section("Survival", (text, *figures))
+
+
+def _survival_figure(samples: Samples, response: Response, levels: Levels | None) -> Figure:
+    title = response_title(response)
+    if levels is None:
+        name = figure_name("survival", response.column)
+        everything = tuple(range(len(samples.folder.points)))
+        curves = [_curve(samples, response, "all runs", everything)]
+        return Figure(name, as_svg(survival_curves(curves, "share still waiting", title), name), f"{title}.")
+    name = figure_name("survival", response.column, levels.path)
+    last, count = len(levels) - 1, min(MAX_CURVES, len(levels))
+    shown = [round(last * turn / (count - 1)) for turn in range(count)]
+    curves = [_curve(samples, response, levels.short[level], tuple(levels.points(level))) for level in shown]
+    drawn = survival_curves(curves, f"share still waiting, by {levels.path}", title)
+    some = f", {len(shown)} of its {len(levels)} values" if len(shown) < len(levels) else ""
+    pooled = ", over all values of the others" if len(samples.folder.parameters) > 1 else ""
+    return Figure(name, as_svg(drawn, name), f"{sentence(title)} by `{levels.path}`{some}{pooled}.")
+
+
+def _curve(samples: Samples, response: Response, label: str, points: tuple[int, ...]) -> SurvivalCurve:
+    sample = samples.sample(response, points)
+    estimate = kaplan_meier(sample)
+    cut_off = sample.value[~sample.observed]
+    end_s = float(sample.value.max()) if len(sample) else 0.0
+    return SurvivalCurve(label, estimate.time, estimate.survival, cut_off, end_s)
+
+
+def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
+    """The section; None unless a share that starts at nothing lost is varied."""
+    figures: list[Figure] = []
+    rows: list[tuple[str, ...]] = []
+    growing: list[str] = []
+    for levels in filter(_is_loss, (levels_of(path, samples.folder.points) for path in samples.folder.parameters)):
+        for response in responses:
+            left = _relative(samples, response, levels)
+            if left is None:
+                continue
+            fits = degradation(_numbers(levels), left)
+            if fits is None:
+                continue
+            present = _present(left)
+            if present[-1].mean() >= present[0].mean():
+                growing.append(f"`{response.column}`")
+                continue
+            figures.append(_resilience_figure(response, levels, left, fits))
+            rows += [_words(response, levels, fits, fit) for fit in (fits.linear, fits.exponential)]
+    if not figures:
+        return None
+    grows = f" Not falling, and so without a curve: {listed(list(dict.fromkeys(growing)))}." if growing else ""
+    text = (
+        "What is left of a response, relative to its mean with nothing lost, with 95 % intervals of the means. A "
+        "time counts by its reciprocal, how much is done in a time, and as 0 where it never came. A line and an "
+        f"exponential are fitted to all runs; the red one has the lower AIC.{grows}"
+    )
+    header = ("response", "over", "shape", "at 0", "slope at 0", "95 % interval", "R²", "AIC", "")
+    return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of what is left")))
+
+
+def _is_loss(levels: Levels) -> bool:
+    if levels.number is None or len(levels) < MIN_STRESSES or levels.path.rpartition(".")[2] not in _LOSSES:
+        return False
+    return bool(levels.number[0] == 0.0 and levels.number[-1] <= 1.0)
+
+
+def _numbers(levels: Levels) -> FloatArray:
+    assert levels.number is not None
+    return levels.number
+
+
+def _relative(samples: Samples, response: Response, levels: Levels) -> FloatArray | None:
+    """Values (levels, runs) relative to the least loss; None without a reference."""
+    cells = [tuple(levels.points(level)) for level in range(len(levels))]
+    table = samples.table(response, cells)
+    if response.kind == "time":
+        reached = samples.reached(response, cells)
+        table = np.where(reached, 1.0 / np.where(table > 0.0, table, np.nan), np.where(np.isnan(table), np.nan, 0.0))
+    left = relative_to_unharmed(_numbers(levels), table)
+    return left if np.isfinite(left).any() else None
+
+
+def _present(left: FloatArray) -> list[FloatArray]:
+    """The values of each level that has any."""
+    rows = [row[np.isfinite(row)] for row in left]
+    return [row for row in rows if len(row)]
+
+
+def _resilience_figure(response: Response, levels: Levels, left: FloatArray, fits: Degradation) -> Figure:
+    share = _numbers(levels)
+    full, present = np.isfinite(left).any(axis=1), _present(left)
+    means = np.array([row.mean() for row in present])
+    intervals = np.array([percentile_interval(resampled_means(row), len(row)) for row in present])
+    low, high = np.where(np.isnan(intervals), means[:, None], intervals).T
+    grid = np.linspace(0.0, float(share[-1]), _GRID)
+    shapes = [
+        FittedShape(fit.form, grid, fit.at(grid), fit is fits.better)
+        for fit in (fits.linear, fits.exponential)
+        if np.isfinite(fit.a)
+    ]
+    title = f"{'1 / ' if response.kind == 'time' else ''}{response_title(response)}, relative to none lost"
+    name = figure_name("resilience", response.column, levels.path)
+    drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.path)
+    if fits.is_clear:
+        verdict = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
+    else:
+        verdict = "AIC does not tell the two shapes apart"
+    caption = f"{sentence(response_title(response))} over `{levels.path}`: {verdict}."
+    return Figure(name, as_svg(drawn, name), caption)
+
+
+def _words(response: Response, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
+    better = ("better" if fits.is_clear else "no worse") if fit is fits.better else ""
+    three, one = Rounding(3).text, Rounding(1).text
+    slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
+    shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)
+    return (response.column, levels.path, fit.form, *shown, better)
+
+
+def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
+    """The section; None unless a number of robots is varied and a time was measured."""
+    parts: list[Figure | Table] = []
+    for levels in (levels_of(path, samples.folder.points) for path in samples.folder.parameters):
+        if not _COUNT.fullmatch(levels.path) or levels.number is None or len(levels) < 2 or levels.number[0] <= 0.0:
+            continue
+        for response in times:
+            parts += _parts(samples, response, levels)
+    if not parts:
+        return None
+    text = (
+        "Speed-up X is the mean time of the smallest swarm over that of N robots, a run that was cut off counting "
+        "with the time until then; efficiency is X per robot, 1 where each does as much as one of the smallest "
+        "swarm (dashed). The serial fraction of Karp and Flatt is the share of the work that does not gain from "
+        "more robots: 0 at best, 1 if they gain nothing, more if they are in one another's way."
+    )
+    return Section("Scaling", (text, *parts))
+
+
+def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure | Table]:
+    assert levels.number is not None
+    means = np.array([samples.summary(response, tuple(levels.points(level))).mean for level in range(len(levels))])
+    if not np.isfinite(means).any() or not means[0] > 0.0:
+        return []
+    found = scaling(levels.number, means, is_time=True)
+    figures: list[Figure | Table] = []
+    kinds = (("efficiency", found.efficiency, 1.0), ("serial fraction", found.serial_fraction, 0.0))
+    for what, value, level in kinds:
+        name = figure_name(what, response.column, levels.path)
+        drawn = scaling_curve(levels.number, value, what, level)
+        figures.append(
+            Figure(name, as_svg(drawn, name), f"{what.capitalize()} of {response_title(response)}, `{levels.path}`.")
+        )
+    return [*figures, _table(response, levels, means.tolist(), found)]
+
+
+def _table(response: Response, levels: Levels, means: list[float], found: Scaling) -> Table:
+    rounded = rounding_of(means).text
+    rows = tuple(
+        (label, rounded(mean), *map(Rounding(3).text, values))
+        for label, mean, *values in zip(
+            levels.labels, means, found.speed_up, found.efficiency, found.serial_fraction, strict=True
+        )
+    )
+    header = (levels.path, f"mean time in {response.unit}", "speed-up", "efficiency", "serial fraction")
+    return Table(header, rows, f"Scaling of {response_title(response)}")

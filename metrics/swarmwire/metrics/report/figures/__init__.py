@@ -1,1 +1,0 @@
-"""Figures of a report: each from plain numbers to a matplotlib figure of a column's width; no files, no statistics."""

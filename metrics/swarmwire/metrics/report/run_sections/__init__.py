@@ -1,1 +1,0 @@
-"""What the report of a single run holds, a section a file."""

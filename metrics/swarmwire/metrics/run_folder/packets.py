@@ -1,0 +1,224 @@
+"""The table `packets`: what became of each packet for each receiver within reach; of all packets, or of a share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import polars as pl
+
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.clock import NS_PER_S, Clock
+from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.packets import BROADCAST, FATE_NAMES
+from swarmwire.comms.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Static, Truth
+from swarmwire.metrics.run_folder.table import RecordOptions, Table, Verdict, compare_fates
+from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
+from swarmwire.metrics.torus import shortest
+
+OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
+NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row
+CHUNK_ROWS = 100_000
+POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is unknown of one on its way for longer
+
+
+class Packets(Table):
+    """A row per (packet, receiver within reach), if packets are recorded.
+
+    Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
+    receivers), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns,
+    final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air;
+    null: unknown), payload (bytes, the tag first).
+    """
+
+    name = "packets"
+    may_be_null = ("receiver", "to", "rssi_dbm", "distance_m", "payload")
+
+    types: ClassVar = {
+        "arena": pl.Int32,
+        "sender": pl.Int32,
+        "receiver": pl.Int32,  # null: never on air
+        "receivers": pl.Int32,
+        "to": pl.Int32,  # null: a broadcast
+        "sequence": pl.Int64,
+        "sent_at_ns": pl.Int64,
+        "on_air_at_ns": pl.Int64,
+        "final_at_ns": pl.Int64,
+        "fate": pl.Enum(FATE_NAMES),
+        "rssi_dbm": pl.Float32,  # null: unknown to the radio
+        "size_bytes": pl.Int32,
+        "topic": pl.String,
+        "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
+        "payload": pl.Binary,  # with its tag
+    }
+
+    def recorder(self, options: RecordOptions) -> Observer | None:
+        """A recorder, if packets are to be recorded."""
+        if not options.packets:
+            return None
+        return PacketRecorder(options.folder, options.clock, options.packets, options.topics, options.may_drop)
+
+    def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
+        """If all packets of a run that ended by itself were recorded: as many receivers of each fate."""
+        recorded: dict[str, Any] = {} if summary is None else summary["record"].get(self.name, {})
+        if summary is None or recorded.get("share") != 1.0 or recorded["dropped"]:
+            return None
+        found = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
+        fates = [fate for fate in FATE_NAMES if fate not in NO_ROWS]
+        return compare_fates({(arena, fate): rows for arena, fate, rows in found.iter_rows()}, fates, summary)
+
+
+class PacketRecorder(Observer):
+    """Observer that writes `packets.parquet`, a row per (packet, receiver it might have reached).
+
+    Receivers out of range are counted in `ticks` and the summary alone, and what is in flight at the end has no row.
+    A share below 1 keeps whole packets, chosen by arena seed, sender and sequence number: the same in every layout.
+    Summary part: `record_packets`: rows written, rows dropped (in real time only; all, not the share), and the share.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        clock: Clock,
+        share: float = 1.0,
+        topics: Mapping[int, str] | None = None,
+        may_drop: bool = False,
+    ) -> None:
+        """Record a share of the packets, above 0 to 1; `topics` names messages by their tag, others show as 0x1a2b."""
+        if not 0.0 < share <= 1.0:
+            raise BadInput("", "packets", f"expected a share above 0 and at most 1, got {share!r}")
+        self._folder, self._clock, self._may_drop = folder, clock, may_drop
+        self._share, self._topics = share, dict(topics or {})
+
+    def begin(self, static: Static) -> None:
+        """Open the table."""
+        self._static = static
+        self._sample = PacketSample(self._share, static.seeds)
+        self._writer = TableWriter(self._folder, "packets", Packets.types, self._may_drop)
+        self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
+        self._parts: list[ReceptionRecords] = []
+        self._rows, self._first_tick = 0, 0
+        self._poses: list[FloatArray] = []  # of the chunk's ticks and some before
+
+    def see(self, truth: Truth) -> None:
+        """Take what ended by this tick."""
+        if not self._poses:
+            self._first_tick = truth.tick
+        self._poses.append(truth.pose)
+        if truth.finished is not None and len(truth.finished.sender):
+            self._parts.append(truth.finished)
+            self._rows += len(truth.finished.sender)
+        if self._limit.reached(self._rows):
+            self._hand_over()
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Write what is left and join the parts."""
+        try:
+            self._hand_over()
+        finally:
+            self._writer.close()
+        return {
+            "record_packets": {"rows": self._writer.rows, "dropped": self._writer.dropped, "share": self._share},
+        }
+
+    def _hand_over(self) -> None:
+        if self._parts:
+            columns = PacketColumns(
+                self._static, self._sample, self._topics, self._first_tick, list(self._poses), self._parts
+            )
+            self._writer.put(Chunk(self._rows, columns.frame))
+        self._parts, self._rows = [], 0
+        old = max(0, len(self._poses) - int(POSES_KEPT_S * self._static.rate_hz) - 1)
+        del self._poses[:old]
+        self._first_tick += old
+        self._limit.restart()
+
+
+class PacketSample:
+    """Which packets are recorded: a share of them, the same whatever the layout, each with all of its receivers."""
+
+    def __init__(self, share: float, seeds: tuple[int, ...]) -> None:
+        self._share = share
+        self._keys: KeyArray = np.array([derive_key("recorded packets", seed) for seed in seeds], np.uint64)
+
+    def __call__(self, finished: ReceptionRecords) -> BoolArray:
+        """Whether to keep each row, (k,)."""
+        if self._share >= 1.0:
+            return np.ones(len(finished.sender), np.bool_)
+        key, sequence = self._keys[finished.arena], finished.sequence
+        drawn = uniform(key, purpose("packet"), finished.sender, sequence & LOW32, sequence >> 32)
+        return drawn < self._share
+
+
+@dataclass
+class PacketColumns:
+    """The links that ended in some ticks, and the poses of these and some ticks before, as references."""
+
+    static: Static
+    sample: PacketSample
+    topics: Mapping[int, str]  # name of a message's class by its tag
+    first_tick: int  # of `poses`
+    poses: list[FloatArray]  # of each tick since, (rows, 3)
+    parts: list[ReceptionRecords] = field(default_factory=list[ReceptionRecords])
+
+    def frame(self) -> pl.DataFrame:
+        """The rows of the packets in the sample, as they ended."""
+        keep = [self.sample(part) for part in self.parts]
+        taken = {name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OTHERWISE}
+        fate, tag = taken.pop("fate"), taken.pop("tag")
+        has_receiver, is_addressed = pl.Series(taken["receiver"] != NO_ROBOT), pl.Series(taken["to"] != BROADCAST)
+        columns: dict[str, Any] = {
+            **taken,
+            "fate": pl.Series(FATE_NAMES).gather(fate),
+            "rssi_dbm": self._rssi_dbm(keep),
+            "topic": self._topic(tag),
+            "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
+            "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
+        }
+        schema = Packets.types
+        frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
+        return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"), to=pl.when(is_addressed).then("to"))
+
+    def _joined(self, name: str, keep: list[BoolArray]) -> IntArray:
+        return np.concatenate([getattr(part, name)[rows] for part, rows in zip(self.parts, keep, strict=True)])
+
+    def _rssi_dbm(self, keep: list[BoolArray]) -> pl.Series:
+        none: AnyArray = np.full(1, np.nan)
+        strengths = [none if part.rssi_dbm is None else part.rssi_dbm for part in self.parts]
+        strengths = [np.broadcast_to(rssi, rows.shape)[rows] for rssi, rows in zip(strengths, keep, strict=True)]
+        return pl.Series(np.concatenate(strengths)).fill_nan(None)
+
+    def _topic(self, tag: IntArray) -> pl.Series:
+        known, place = np.unique(tag, return_inverse=True)
+        return pl.Series([self.topics.get(one, f"0x{one:04x}") for one in known.tolist()], dtype=pl.String).gather(
+            place
+        )
+
+    def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
+        """Between sender and receiver when the packet went on air, (k,); NaN without a receiver or the tick's poses."""
+        tick = geometry_tick(links["on_air_at_ns"], self.static.rate_hz) - self.first_tick
+        known = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.poses)))
+        distance_m = np.full(len(tick), np.nan)
+        if len(known):
+            place = np.stack([pose[:, :2] for pose in self.poses])
+            first = links["arena"][known] * self.static.robots
+            sender = place[tick[known], first + links["sender"][known]]
+            receiver = place[tick[known], first + links["receiver"][known]]
+            distance_m[known] = np.hypot(*shortest(sender - receiver, self.static).T)
+        return distance_m
+
+
+def _payload(part: ReceptionRecords, keep: BoolArray) -> pl.Series:
+    """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
+    if part.payload is None or part.payloads is None:
+        return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
+    packet, place = np.unique(part.payload[keep], return_inverse=True)
+    return pl.Series([part.payloads.row(row) for row in packet.tolist()], dtype=pl.Binary).gather(place)
+
+
+def geometry_tick(on_air_at_ns: IntArray, rate_hz: int) -> IntArray:
+    """The last tick that starts no later than the packet goes on air, (k,): its poses are the geometry."""
+    return ((on_air_at_ns + 1) * rate_hz - 1) // NS_PER_S

@@ -1,0 +1,247 @@
+"""A run folder, read back: of runs that ended, that were killed, and that still go on."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from types import NoneType
+from typing import Any, TypeGuard, cast
+
+import numpy as np
+import polars as pl
+
+from swarmwire.comms.config import check_format, from_json
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.run_folder.layout import (
+    RUN_FORMAT,
+    RUN_JSON,
+    STATIC,
+    SUMMARY,
+    SUMMARY_FORMAT,
+    TABLES_FORMAT,
+    VALUE,
+    MetricInfo,
+    metric_infos,
+)
+from swarmwire.metrics.run_folder.tables import TABLES, read_static
+from swarmwire.metrics.run_folder.ticks import movable_columns, robot_columns
+from swarmwire.metrics.run_folder.writer import parts_of, scan_files, table_file
+from swarmwire.metrics.table_file import corruption_errors
+
+NUMBER, MAYBE_NUMBER = (int, float), (int, float, NoneType)
+# What is read from a summary, and from each item of its `by_arena`.
+ARENA_KINDS: Mapping[str, Any] = {
+    "ended": str,
+    "sim_time_s": NUMBER,
+    "stop_time_s": MAYBE_NUMBER,
+    "stopped_by": (str, NoneType),
+    "ticks": int,
+}
+SUMMARY_KINDS: Mapping[str, Any] = {
+    "arenas": int,
+    "by_arena": list,
+    "counts": dict,
+    "cpu": str,
+    "ended": str,
+    "engine": str,
+    "error": (str, NoneType),
+    "events": list,
+    "files": list,
+    "global_sensors": dict,
+    "inputs": (dict, NoneType),
+    "live_events": (dict, NoneType),
+    "lost_runners": list,
+    "metrics": (dict, list),
+    "mode": str,
+    "radio": (dict, list, NoneType),
+    "realtime_factor": NUMBER,
+    "record": dict,
+    "runner_events": list,
+    "runners": int,
+    "sim_time_s": NUMBER,
+    "stop": list,
+    "ticks": int,
+    "trajectory_sha256": list,
+    "versions": dict,
+    "wall_time_s": NUMBER,
+}
+CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
+
+
+class RunFolder:
+    """Tables of a run as polars frames (`.to_pandas()` gives pandas': needs pyarrow, which the extra [view] brings).
+
+    Of a run that was killed or still goes on they hold what is on disk; each call looks again. BadInput where a file is
+    missing or damaged.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Look at this folder; BadInput unless there is one."""
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise BadInput(str(path), "", "expected a run folder: there is none")
+
+    @property
+    def summary(self) -> dict[str, Any] | None:
+        """`summary.json`; None if the run has not ended, or was killed."""
+        path = self.path / SUMMARY
+        try:
+            found: object = from_json(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise BadInput(str(path), "", f"expected the summary of a run: {error}") from error
+        check_format(found, SUMMARY_FORMAT, str(path))
+        if not _is_summary(found):
+            raise BadInput(str(path), "", "expected the summary of a run")
+        return found
+
+    @cached_property
+    def _static(self) -> Static:
+        return read_static(self.path / STATIC)
+
+    @property
+    def static(self) -> Static:
+        """Arena, bodies, groups and names."""
+        return self._static
+
+    @property
+    def started(self) -> dict[str, Any]:
+        """`run.json`: from what the run was made; empty if it is missing or damaged."""
+        path = self.path / RUN_JSON
+        try:
+            found: object = from_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):  # those who need the file say what is wrong with it
+            return {}
+        check_format(found, RUN_FORMAT, str(path))
+        return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+
+    @property
+    def measured(self) -> dict[str, MetricInfo]:
+        """By name: what each metric that the run measured says of itself; empty if `run.json` is missing or damaged."""
+        try:
+            return {of.name: of for of in metric_infos(self.started)}
+        except (KeyError, TypeError, ValueError):
+            return {}
+
+    def table(self, name: str, arena: int | None = None, left_out: Sequence[str] = ()) -> pl.DataFrame:
+        """A recorded table by name, of one arena or of all, without the columns left out; BadInput if there is none."""
+        self._refuse_other_format()
+        for _ in range(CHANGES_UNDERFOOT):
+            files = self.files(name)
+            if not files:
+                break
+            try:
+                lazy = scan_files(files)
+                if arena is not None:
+                    lazy = lazy.filter(pl.col("arena") == arena)
+                return lazy.drop(*left_out, strict=False).collect()
+            except FileNotFoundError:
+                continue  # the run ended just now, and its parts were joined
+            except corruption_errors() as error:
+                reason = str(error).splitlines()[0]
+                expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
+                raise BadInput(self.where(name), "", expected) from error
+        schema = TABLES[name].schema() if name in TABLES else {}
+        if schema and (self.path / name).is_dir():  # a run that was killed before anything happened
+            return pl.DataFrame(schema=schema)
+        raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
+
+    def validated(self, name: str, arena: int | None = None) -> pl.DataFrame:
+        """A table, checked; BadInput names file and fault if it holds anything that no run writes."""
+        table = self.table(name, arena)
+        fault = TABLES[name].fault(table.lazy(), self.static)
+        if fault is None:
+            return table
+        expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
+        raise BadInput(self.where(name), "", expected)
+
+    def ticks(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per tick and arena, of one arena or of all; columns: see `Ticks`."""
+        return self.table("ticks", arena)
+
+    def robots(self, arena: int = 0) -> pl.DataFrame:
+        """A row per tick and robot of one arena: tick, time_s, robot (name), group, the lists of `ticks`."""
+        static, ticks = self.static, self.ticks(self._checked(arena))
+        names = pl.Series(static.robot_names, dtype=pl.Enum(static.robot_names))
+        in_order = [group.name for group in static.groups for _ in range(group.start, group.stop)]
+        groups = pl.Series(in_order, dtype=pl.Enum([group.name for group in static.groups]))
+        index = pl.Series(list(range(static.robots)) * len(ticks), dtype=pl.UInt32)
+        return pl.DataFrame(
+            [
+                *(ticks[name].gather(_repeated(len(ticks), static.robots)) for name in ("tick", "time_s")),
+                names.gather(index).alias("robot"),
+                groups.gather(index).alias("group"),
+                *(ticks[name].explode() for name in (*robot_columns(static), VALUE) if name in ticks.columns),
+            ]
+        )
+
+    def metrics(self, arena: int = 0) -> pl.DataFrame:
+        """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
+        wide = (*robot_columns(self.static), VALUE, *movable_columns(self.static))
+        return self.table("ticks", self._checked(arena), [*wide, "arena", "seed"])
+
+    def packets(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per (packet, receiver within reach), of one arena or of all; columns: see `Packets`."""
+        return self.table("packets", arena)
+
+    def events(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per event and arena, of one arena or of all; columns: see `Events`."""
+        return self.table("events", arena)
+
+    def radio_robots(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per robot, of one arena or of all, over the whole run; columns: see `RadioRobots`."""
+        return self.table("radio_robots", arena)
+
+    def radio_distances(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per bin of the distance between sender and receiver, of one arena or of all: see `RadioDistances`."""
+        return self.table("radio_distances", arena)
+
+    def radio_links(self, arena: int | None = None) -> pl.DataFrame:
+        """A row per link and fate that occurred on it, of one arena or of all; columns: see `RadioLinks`."""
+        return self.table("radio_links", arena)
+
+    def files(self, name: str) -> list[Path]:
+        """The files of a table: the whole of it, else the parts that are there, else none."""
+        whole = table_file(self.path, name)
+        return [whole] if whole.exists() else parts_of(self.path, name)
+
+    def where(self, name: str) -> str:
+        """The path of a table's one file, or of the folder of its parts: for errors."""
+        files = self.files(name)
+        return str(files[0] if len(files) == 1 else self.path / name)
+
+    def _refuse_other_format(self) -> None:
+        """Tables are of the format of the static part; should that be missing or damaged, they can be read still."""
+        path = self.path / STATIC
+        with suppress(OSError, ValueError):
+            check_format(from_json(path.read_text(encoding="utf-8")), TABLES_FORMAT, str(path))
+
+    def _checked(self, arena: int) -> int:
+        if not 0 <= arena < self.static.arenas:
+            raise BadInput(str(self.path), "arena", f"expected 0 to {self.static.arenas - 1}, got {arena}")
+        return arena
+
+
+def _repeated(rows: int, times: int) -> pl.Series:
+    """0 `times` times, then 1, and so on up to rows - 1."""
+    return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
+
+
+def _is_summary(found: object) -> TypeGuard[dict[str, Any]]:
+    """Whether all is there, of the right kind, that is read from a summary."""
+    if not _holds(found, SUMMARY_KINDS):
+        return False
+    hashes, ends = found["trajectory_sha256"], found["by_arena"]
+    if found["ticks"] < 0 or not len(hashes) == len(ends) == found["arenas"]:
+        return False
+    return all(isinstance(item, str) for item in hashes) and all(_holds(end, ARENA_KINDS) for end in ends)
+
+
+def _holds(found: object, kinds: Mapping[str, Any]) -> TypeGuard[dict[str, Any]]:
+    """Whether it is an object that has all these keys, each of its kind."""
+    if not isinstance(found, dict):
+        return False
+    values = cast("dict[str, object]", found)
+    return all(key in values and isinstance(values[key], kind) for key, kind in kinds.items())

@@ -1,0 +1,339 @@
+"""Check a run folder: what is intact, what a killed run left, what is missing, what does not agree."""
+
+import hashlib
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from hashlib import file_digest
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import polars as pl
+
+from swarmwire.comms.config import check_format, from_json
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import VIEW
+from swarmwire.metrics.run_folder.layout import (
+    DIGEST_BYTES,
+    DIGESTS,
+    INPUTS,
+    LOG,
+    RECORDING,
+    RUN_FORMAT,
+    RUN_JSON,
+    STATIC,
+    SUMMARY,
+)
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.table import State, Table
+from swarmwire.metrics.run_folder.tables import TABLES
+from swarmwire.metrics.run_folder.writer import part_file, parts_of, scan_files, table_file
+from swarmwire.metrics.table_file import corruption_errors
+
+COPIES = "copies of files"
+FILE_HEADER_BYTES = 12  # of a .rrd: magic, version, options
+FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-endian
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One part of a run folder, how it is, and one line that says more."""
+
+    part: str
+    state: State
+    text: str
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is wrong with it."""
+        return self.state in (State.INTACT, State.NOT_RECORDED)
+
+
+def verify(path: Path | str) -> list[Finding]:
+    """A finding for each part of a run folder; nothing is changed. BadInput if this is no run folder."""
+    folder = RunFolder(path)
+    parts = (SUMMARY, RUN_JSON, STATIC, LOG, RECORDING, *TABLES, *(f"{name}.parquet" for name in TABLES))
+    if not any((folder.path / part).exists() for part in parts):
+        raise BadInput(str(path), "", "expected a run folder; there is nothing of a run in it")
+    summary, of_summary = _summary(folder)
+    return [
+        of_summary,
+        _static(folder),
+        *(_table(folder, table, summary) for table in TABLES.values()),
+        _recording(folder, summary),
+        _log(folder),
+        check_run_json(folder.path),
+        *_told(DIGESTS, lambda: [check_digests(folder.path, summary)]),
+        *_told(INPUTS, lambda: check_inputs(folder.path, summary)),
+        *_told(COPIES, lambda: _copies(folder, summary)),
+    ]
+
+
+def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
+    """What a comparison with the summary finds; a summary that is damaged further in than `RunFolder` looks differs."""
+    try:
+        return compared()
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
+        reason = " ".join(repr(error)[:60].split())
+        return [Finding(name, State.DIFFERS, f"{SUMMARY} does not say what a run says there ({reason})")]
+    except corruption_errors() as error:
+        return [Finding(name, State.DAMAGED, str(error).splitlines()[0])]
+
+
+def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
+    try:
+        summary = folder.summary
+    except BadInput as error:
+        return None, Finding(SUMMARY, State.DAMAGED, error.expected)
+    if summary is None:
+        return None, Finding(SUMMARY, State.MISSING, "the run did not end by itself, or still goes on")
+    arenas = f", {summary['arenas']} arenas" if summary["arenas"] > 1 else ""
+    text = f"ended: {summary['ended']}; {summary['ticks']} ticks ({summary['sim_time_s']:g} s){arenas}"
+    return summary, Finding(SUMMARY, State.INTACT, text)
+
+
+def _static(folder: RunFolder) -> Finding:
+    if not (folder.path / STATIC).exists():
+        return Finding(STATIC, State.MISSING, "without it rows have no robots' names")
+    try:
+        static = folder.static
+    except BadInput as error:
+        return Finding(STATIC, State.DAMAGED, error.expected)
+    return Finding(STATIC, State.INTACT, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
+
+
+def _table(folder: RunFolder, table: Table, summary: dict[str, Any] | None) -> Finding:
+    name = table.name
+    found = check_table(folder.path, name, table.columns())
+    if found.state is State.MISSING:
+        expected = name in summary["record"] if summary else table.always
+        return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
+    if not found.files:
+        return Finding(name, found.state, found.text)
+    fault = _fault(folder, table, found.files)
+    if fault is not None:
+        return Finding(name, State.DAMAGED, fault)
+    reach = "; ".join(part for part in (_reach(table, found.files), found.text) if part)
+
+    def compared() -> list[Finding]:
+        verdict = table.compare(found.files, summary) if found.state is not State.DAMAGED else None
+        state, text = verdict or (found.state, "")
+        return [Finding(name, state, f"{text}; {reach}" if text else reach)]
+
+    return _told(name, compared)[0]
+
+
+def _fault(folder: RunFolder, table: Table, files: list[Path]) -> str | None:
+    """Values or types that cannot be in the table's readable files, in words."""
+    try:
+        static = folder.static
+    except BadInput:  # which has a finding of its own
+        static = None
+    try:
+        return table.fault(scan_files(files), static)
+    except corruption_errors() as error:  # parts of different types
+        return str(error).splitlines()[0]
+
+
+def _reach(table: Table, files: list[Path]) -> str:
+    """How much a table holds, in words."""
+    lazy, megabytes = scan_files(files), sum(file.stat().st_size for file in files) / 1e6
+    rows = lazy.select(pl.len()).collect().item()
+    reach = table.reach(lazy) if rows else ""
+    return f"{rows} rows, {megabytes:.1f} MB" + (f", {reach}" if reach else "")
+
+
+def _recording(folder: RunFolder, summary: dict[str, Any] | None) -> Finding:
+    path = folder.path / RECORDING
+    if not path.exists():
+        return Finding(RECORDING, State.MISSING if summary and "rrd" in summary["record"] else State.NOT_RECORDED, "")
+    return Finding(RECORDING, *check_recording(path, has_ticks=summary is None or summary["ticks"] > 0))
+
+
+def _log(folder: RunFolder) -> Finding:
+    path = folder.path / LOG
+    if not path.exists():
+        return Finding(LOG, State.MISSING, "what was said during the run")
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        return Finding(LOG, State.DAMAGED, str(error))
+    return Finding(LOG, State.INTACT if lines else State.DAMAGED, f"{len(lines)} lines")
+
+
+def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
+    """Of each file that the summary lists, whether it is there and as it was."""
+    findings: list[Finding] = []
+    for copy in summary["files"] if summary else ():
+        path = folder.path / copy["path"]
+        if not path.is_file():
+            findings.append(Finding(copy["path"], State.MISSING, "a file that the run used"))
+            continue
+        with path.open("rb") as file:
+            same = file_digest(file, "sha256").hexdigest() == copy["sha256"]
+        text = f"sha256 {copy['sha256'][:16]}…" if same else f"its sha256 is not {copy['sha256'][:16]}…"
+        findings.append(Finding(copy["path"], State.INTACT if same else State.DIFFERS, text))
+    return findings
+
+
+def check_run_json(folder: Path) -> Finding:
+    """From what the run was made."""
+    try:
+        found: object = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return Finding(RUN_JSON, State.MISSING, "without it the run cannot be repeated")
+    except (OSError, ValueError) as error:
+        return Finding(RUN_JSON, State.DAMAGED, str(error))
+    try:
+        check_format(found, RUN_FORMAT, str(folder / RUN_JSON))
+    except BadInput as error:
+        return Finding(RUN_JSON, State.DAMAGED, f"{error.key}: {error.expected}")
+    match found:
+        case {"seeds": list(), "ticks": int(ticks)}:
+            return Finding(RUN_JSON, State.INTACT, f"{ticks} ticks asked for")
+        case _:
+            return Finding(RUN_JSON, State.DAMAGED, "expected what swarmwire writes at the start of a run")
+
+
+def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
+    """A digest for each tick, the last that of the summary's hashes."""
+    try:
+        data = (folder / DIGESTS).read_bytes()
+    except FileNotFoundError:
+        return Finding(DIGESTS, State.MISSING, "without it a repetition is compared as a whole only")
+    except OSError as error:
+        return Finding(DIGESTS, State.DAMAGED, str(error))
+    ticks = len(data) // DIGEST_BYTES
+    if summary is None:
+        return Finding(DIGESTS, State.PARTIAL, f"{ticks} ticks")
+    if len(data) != DIGEST_BYTES * summary["ticks"]:
+        return Finding(DIGESTS, State.DIFFERS, f"{ticks} ticks; the summary has {summary['ticks']}")
+    last = hashlib.sha256("".join(summary["trajectory_sha256"]).encode()).digest()[:DIGEST_BYTES]
+    if ticks and data[-DIGEST_BYTES:] != last:
+        return Finding(DIGESTS, State.DIFFERS, "the last is not that of the summary's hashes")
+    return Finding(DIGESTS, State.INTACT, f"{ticks} ticks")
+
+
+def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Finding]:
+    """What came from outside, if anything did."""
+    recorded: Mapping[str, Any] | None = None if summary is None else summary["inputs"]
+    path = folder / INPUTS
+    if not path.is_file():
+        return [] if recorded is None else [Finding(INPUTS, State.MISSING, "without it the run cannot be repeated")]
+    with path.open("rb") as file:
+        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+    if recorded is None:
+        state = State.PARTIAL if summary is None else State.DIFFERS
+        return [Finding(INPUTS, state, f"{path.stat().st_size} bytes, of which the summary says nothing")]
+    if sha256 != recorded["sha256"]:
+        return [Finding(INPUTS, State.DIFFERS, f"its sha256 is not {recorded['sha256'][:16]}…")]
+    return [Finding(INPUTS, State.INTACT, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]
+
+
+@dataclass(frozen=True, slots=True)
+class TableCheck:
+    """The readable files of a table, and how it is as far as they tell."""
+
+    state: State
+    files: list[Path]
+    text: str
+
+
+def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck:
+    """Read every file of a table to its end, a column at a time; it must have at least these columns."""
+    whole, parts = table_file(folder, name), parts_of(folder, name)
+    if whole.exists():
+        fault = _file_fault(whole, columns)
+        if fault is None:
+            # A run killed between the two leaves both; readers take the whole.
+            return TableCheck(State.INTACT, [whole], "its parts were not cleared away" if parts else "")
+        return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
+    if not (folder / name).is_dir():
+        return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
+    faults = {part: fault for part in parts if (fault := _file_fault(part, columns)) is not None}
+    for number, part in enumerate(parts):
+        if part != part_file(folder, name, number):
+            faults.setdefault(part, f"expected {part_file(folder, name, number).name} before it")
+            break
+    if faults:
+        part, fault = next(iter(faults.items()))
+        readable = [part for part in parts if part not in faults]
+        return TableCheck(State.DAMAGED, readable, f"{len(faults)} of {len(parts)} parts; {name}/{part.name}: {fault}")
+    text = f"{len(parts)} part{'s' if len(parts) != 1 else ''}, never joined" if parts else "nothing was on disk yet"
+    return TableCheck(State.PARTIAL, parts, text)
+
+
+def _file_fault(file: Path, columns: Collection[str]) -> str | None:
+    try:
+        there = pl.read_parquet_schema(file)
+        missing = [column for column in columns if column not in there]
+        if missing:
+            return f"no column {missing[0]}"
+        for column in there:
+            pl.read_parquet(file, columns=[column])
+    except (OSError, *corruption_errors()) as error:
+        return str(error).splitlines()[0]
+    return None
+
+
+def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
+    """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
+    megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
+    if VIEW.missing():
+        return State.INTACT, f"{megabytes}, not read: that needs {VIEW.requirement}"
+    try:
+        last, closed = _read_all(path)
+    except Exception as error:  # noqa: BLE001 - rerun promises no type; whatever it is, the file is unreadable
+        return State.DAMAGED, str(error).splitlines()[0]
+    reach = "no tick in it" if last is None else f"up to tick {last}"
+    if not closed:
+        return State.PARTIAL, f"{megabytes}, readable {reach}; it was never closed"
+    return State.PARTIAL if last is None and has_ticks else State.INTACT, f"{megabytes}, {reach}"
+
+
+def _read_all(path: Path) -> tuple[int | None, bool]:
+    """As `_read`; where rerun's reader refuses a file whose last frame is cut off, up to that frame."""
+    try:
+        return _read(path)
+    except RuntimeError as refused:
+        with TemporaryDirectory() as folder, path.open("rb") as whole:
+            start = Path(folder) / path.name
+            start.write_bytes(whole.read(_whole_frames_bytes(path)))
+            try:
+                return _read(start)[0], False
+            except RuntimeError:
+                raise refused from None  # what it said of the file itself counts
+
+
+def _whole_frames_bytes(path: Path) -> int:
+    """Where the frame begins that the file cuts off, as the end of a run that was killed may."""
+    size, at = path.stat().st_size, FILE_HEADER_BYTES
+    with path.open("rb") as file:
+        while at + FRAME_HEADER_BYTES <= size:
+            file.seek(at + 8)
+            end = at + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
+            if end > size:
+                break
+            at = end
+    return at
+
+
+def _read(path: Path) -> tuple[int | None, bool]:
+    """The last tick in a recording, and whether it was closed: only then does it have an index."""
+    import rerun as rr
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it takes a file without an index for one of an old version
+        reader: Any = rr.chunk.RrdReader(str(path))
+        last = max((tick for chunk in reader.stream() if (tick := _last_tick(chunk)) is not None), default=None)
+        try:
+            reader.store()
+        except Exception:  # noqa: BLE001 - rerun promises no type
+            return last, False
+    return last, True
+
+
+def _last_tick(chunk: Any) -> int | None:
+    batch = chunk.to_record_batch()
+    return max(batch["tick"].to_pylist(), default=None) if "tick" in batch.schema.names else None

@@ -1,0 +1,276 @@
+"""How a response changes along a parameter: in a step, with stress (a line, or an exponential), with more robots.
+
+The step has two levels, by least squares over all runs: of all ways to divide the ordered points into a lower and an
+upper part, the one with the least sum of squares around two means (Hinkley, Biometrika 57, 1970, for normal noise).
+There is a change only if that explains the runs better than one mean by the information criterion
+BIC = n ln(RSS / n) + k ln n, in which the step has two parameters more: its second level and its place. Of responses
+that do not change it finds a step in 0.4 % with 20 runs at each of 10 points, in 4 % with 5. A gradual change has a
+step, too: where two levels explain most.
+"""
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import optimize, special
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval
+
+MIN_STRESSES = 3  # two points lie on every curve
+PARAMETERS = 3  # a, b and the variance
+ROUNDING = 1e-24  # of squares, relative to all
+TELLING = 2.0  # smaller differences of AIC mean little (Burnham and Anderson, 2002)
+
+Form = Literal["linear", "exponential"]
+MORE_PARAMETERS = 2  # of a step than of a constant
+SAME_VALUES = 1e-12  # relative, of values and of sums of squares
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Least squares over all runs; NaN, and AIC inf, where no curve of this form was found."""
+
+    form: Form
+    a: float  # at no stress: near 1 if performance is relative to the unharmed
+    b: float  # slope per unit of stress at none, relative to a if exponential
+    a_interval: Interval
+    b_interval: Interval
+    r_squared: float  # share of the runs' variance that is explained; NaN if there is none
+    aic: float  # n ln(RSS / n) + 2 * 3
+
+    def at(self, stress: FloatArray) -> FloatArray:
+        """The curve at stresses of any shape."""
+        return _curve(self.form)(stress, self.a, self.b)
+
+
+@dataclass(frozen=True)
+class Degradation:
+    """Both forms, fitted to the same runs."""
+
+    linear: Fit
+    exponential: Fit
+
+    @property
+    def better(self) -> Fit:
+        """The one with the lower AIC; the line if they are equal."""
+        return min((self.linear, self.exponential), key=lambda fit: fit.aic)
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether AIC tells the forms apart, by 2 or more."""
+        return abs(self.linear.aic - self.exponential.aic) >= TELLING
+
+
+def relative_to_unharmed(stress: FloatArray, table: FloatArray) -> FloatArray:
+    """Performance (stresses, seeds) over its mean at the least stress, of the same shape; NaN if that is 0 or none.
+
+    Where less is better (times), hand over its reciprocal: how much is done in a time.
+    """
+    unharmed = table[int(np.argmin(stress))]
+    there = unharmed[np.isfinite(unharmed)]
+    mean = float(there.mean()) if len(there) else 0.0
+    return table / (mean if mean != 0.0 else math.nan)
+
+
+def degradation(stress: FloatArray, table: FloatArray, level: float = LEVEL) -> Degradation | None:
+    """Fits a + b f and a exp(b f) to performance (stresses, seeds) at stresses f (stresses,); NaN: no value.
+
+    Intervals are Student's, from the curvature of the squares. None if fewer than three stresses have values.
+    """
+    there = np.isfinite(table)
+    if np.count_nonzero(there.any(axis=1)) < MIN_STRESSES:
+        return None
+    x = np.broadcast_to(stress[:, None], table.shape)[there]
+    y = table[there]
+    line = np.polyfit(x, y, 1)
+    slope, start = float(line[0]), float(line[1])
+    guess = (start, slope / start if start > 0.0 else 0.0)
+    return Degradation(_fit("linear", x, y, (start, slope), level), _fit("exponential", x, y, guess, level))
+
+
+def _curve(form: Form) -> Any:
+    return _line if form == "linear" else _exponential
+
+
+def _line(x: FloatArray, a: float, b: float) -> FloatArray:
+    return a + b * x
+
+
+def _exponential(x: FloatArray, a: float, b: float) -> FloatArray:
+    return a * np.exp(np.minimum(b * x, 700.0))  # the search may try values that would overflow
+
+
+def _fit(form: Form, x: FloatArray, y: FloatArray, guess: tuple[float, float], level: float) -> Fit:
+    scipy: Any = optimize
+    try:
+        with warnings.catch_warnings(action="ignore", category=optimize.OptimizeWarning):  # its variance is inf then
+            found, covariance = scipy.curve_fit(_curve(form), x, y, p0=guess)
+    except RuntimeError:  # its word for a search that came to no end
+        return Fit(form, math.nan, math.nan, UNKNOWN, UNKNOWN, math.nan, math.inf)
+    a, b = float(found[0]), float(found[1])
+    residual = max(float(np.sum((y - _curve(form)(x, a, b)) ** 2)), ROUNDING * float(np.sum(y**2)))
+    total = float(np.sum((y - y.mean()) ** 2))
+    student: Any = special.stdtrit(max(len(y) - 2, 1), 0.5 + 0.5 * level)
+    reach_a, reach_b = (float(student) * math.sqrt(float(variance)) for variance in np.diag(covariance))
+    return Fit(
+        form,
+        a,
+        b,
+        Interval(a - reach_a, a + reach_a),
+        Interval(b - reach_b, b + reach_b),
+        1.0 - residual / total if total > 0.0 else math.nan,
+        len(y) * math.log(residual / len(y)) + 2.0 * PARAMETERS if residual > 0.0 else -math.inf,
+    )
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Relative to the smallest swarm, of N0 robots; each array is of the response's shape, NaN where that is NaN or 0.
+
+    With N0 = 1 these are P(N) / (N P(1)), or T(1) / (N T(N)), and the fraction of Karp and Flatt (Comm. ACM 33, 1990),
+    as used of swarms by Harwell and Gini (arXiv 1907.03880).
+    """
+
+    robots: FloatArray  # (sizes,) N
+    reference: float  # N0
+    speed_up: FloatArray  # X = P(N) / P(N0), or T(N0) / T(N)
+    efficiency: FloatArray  # E = X N0 / N: 1 if each robot does as much as one of the smallest swarm
+    serial_fraction: FloatArray  # e = (1/X - 1/s) / (1 - 1/s), s = N / N0: 0 if E is 1, 1 if more robots gain nothing
+
+
+def scaling(robots: FloatArray, response: FloatArray, *, is_time: bool) -> Scaling:
+    """The scaling of a response (…, sizes) over numbers of robots (sizes,): work done, or the time of a task.
+
+    Leading axes may be resamples. BadInput unless there are at least two sizes, all positive, each once.
+    """
+    if len(robots) < 2 or len(np.unique(robots)) < len(robots) or robots.min() <= 0.0:
+        raise BadInput("", "robots", f"expected at least two sizes, positive and each once, got {robots.tolist()}")
+    smallest = int(np.argmin(robots))
+    known = np.where(response != 0.0, response, np.nan)
+    speed_up = known / known[..., smallest : smallest + 1]
+    if is_time:
+        speed_up = 1.0 / speed_up
+    times = robots / robots[smallest]
+    more = np.where(times > 1.0, 1.0 - 1.0 / times, np.nan)  # of the smallest itself there is no fraction
+    serial = (1.0 / speed_up - 1.0 / times) / more
+    return Scaling(robots, float(robots[smallest]), speed_up, speed_up / times, serial)
+
+
+@dataclass(frozen=True)
+class PointSums:
+    """Of the values of each point, (points,); of resamples (resamples, points)."""
+
+    count: FloatArray
+    total: FloatArray
+    squares: FloatArray
+
+
+def point_sums(table: FloatArray) -> PointSums:
+    """Of a table (points, seeds), NaN where a run has no value."""
+    return _weighted(table, np.ones((1, table.shape[1])), 0)
+
+
+def resampled_sums(table: FloatArray) -> PointSums:
+    """The same of resamples of the seeds: a seed brings its runs of all points, or none."""
+    return _weighted(table, drawn(table.shape[1]).astype(np.float64))
+
+
+def _weighted(table: FloatArray, weight: FloatArray, row: int | slice = slice(None)) -> PointSums:
+    there = np.isfinite(table)
+    value = np.where(there, table, 0.0)
+    count, total, squares = (weight @ of.T for of in (there.astype(np.float64), value, value**2))
+    return PointSums(count[row], total[row], squares[row])
+
+
+@dataclass(frozen=True)
+class ChangePoint:
+    """A step. Its place is halfway between the two points that it divides."""
+
+    after: float  # the last value of the parameter below it
+    before: float  # the first above
+    place: float
+    place_interval: Interval
+    below: float  # mean of the response below
+    above: float
+    effect: float  # above - below
+    effect_interval: Interval
+    standardised: float  # effect / standard deviation around the two levels; inf if nothing varies around them
+    gain: float  # by how much BIC is lower than that of a constant, > 0
+
+
+def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL) -> ChangePoint | None:
+    """The step along a parameter (points,), strictly rising, of the responses (points, seeds), NaN: no value.
+
+    Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant does as well, or
+    fewer than two points have values.
+    """
+    full = np.isfinite(table).any(axis=1)
+    parameter, table = parameter[full], table[full]
+    if len(parameter) < 2:
+        return None
+    mean = float(np.nanmean(table))
+    table = table - mean  # centred, so that sums of squares keep their digits
+    sums = point_sums(table)
+    residual = _residuals(sums)
+    split = int(np.argmin(residual))
+    gain = _gain(sums, float(residual[split]), mean)
+    if not gain > 0.0:
+        return None
+    places = 0.5 * (parameter[:-1] + parameter[1:])
+    below, above = _levels(sums)
+    effect = float(above[split] - below[split])
+    resampled_place, resampled_effect = _resampled(table, places)
+    seeds = table.shape[1]
+    deviation = math.sqrt(float(residual[split]) / max(float(sums.count.sum()) - 2.0, 1.0))
+    return ChangePoint(
+        after=float(parameter[split]),
+        before=float(parameter[split + 1]),
+        place=float(places[split]),
+        place_interval=percentile_interval(resampled_place, seeds, level),
+        below=mean + float(below[split]),
+        above=mean + float(above[split]),
+        effect=effect,
+        effect_interval=percentile_interval(resampled_effect, seeds, level),
+        standardised=effect / deviation if deviation > 0.0 else math.copysign(math.inf, effect),
+        gain=gain,
+    )
+
+
+def _levels(sums: PointSums) -> tuple[FloatArray, FloatArray]:
+    """Means below and above each split, (…, splits); NaN where a resample drew no run of that part."""
+    count, total = np.cumsum(sums.count, axis=-1), np.cumsum(sums.total, axis=-1)
+    below = total[..., :-1] / np.where(count[..., :-1] > 0.0, count[..., :-1], np.nan)
+    rest = count[..., -1:] - count[..., :-1]
+    return below, (total[..., -1:] - total[..., :-1]) / np.where(rest > 0.0, rest, np.nan)
+
+
+def _residuals(sums: PointSums) -> FloatArray:
+    """Sum of squares around the two means of each split, (…, splits); inf without two."""
+    below, above = _levels(sums)
+    count = np.cumsum(sums.count, axis=-1)
+    explained = count[..., :-1] * below**2 + (count[..., -1:] - count[..., :-1]) * above**2
+    left = sums.squares.sum(axis=-1, keepdims=True) - explained
+    return np.where(np.isfinite(left), np.maximum(left, 0.0), np.inf)
+
+
+def _gain(sums: PointSums, residual: float, mean: float) -> float:
+    """BIC of a constant less that of the step; 0 if the constant leaves nothing to explain but rounding of the mean."""
+    n, constant = float(sums.count.sum()), float(sums.squares.sum())
+    if constant <= n * (SAME_VALUES * mean) ** 2:
+        return 0.0
+    return n * math.log(constant / max(residual, SAME_VALUES * constant)) - MORE_PARAMETERS * math.log(n)
+
+
+def _resampled(table: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Places and effects of the best steps of resampled seeds, each (resamples,)."""
+    sums = resampled_sums(table)
+    split: IntArray = np.argmin(_residuals(sums), axis=1)
+    below, above = _levels(sums)
+    rows = np.arange(len(split))
+    effect = above[rows, split] - below[rows, split]
+    return places[split], effect

@@ -1,0 +1,191 @@
+"""Motion of single robots: changes of turning side, detours and deadlocks."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.config import parameter
+from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import njit
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.torus import sides_m
+
+
+@dataclass(frozen=True)
+class Oscillation(Metric):
+    """Changes of turning side so far / robot-minutes alive so far, in 1/min; NaN while nobody was alive.
+
+    A robot changes sides when the turning rate that is commanded, within its limits, is beyond `dead_band_radps` to one
+    side, and the last that was beyond it, however long ago, was to the other. Going straight in between is no change.
+    Robots alive are added up over time; a robot that died has no side when it lives again. `final` is the rate of the
+    run. Once a tick is the most: 60 times the tick rate.
+
+    Our own definition of the dithering that thresholds bring about. A robot that wanders changes sides, too: compare
+    rules in one setting.
+    """
+
+    dead_band_radps: float = parameter(0.05, help="slower turns have no side", unit="rad/s", at_least=0.0)
+
+    name = "oscillation"
+    help = "changes of the commanded turning side per robot-minute so far, in 1/min"
+    unit = "1/min"
+    needs = ()
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure."""
+        side: IntArray = np.zeros(static.arenas * static.robots, np.int64)
+        changes, robot_ticks = np.zeros(static.arenas, np.int64), np.zeros(static.arenas, np.int64)
+        ticks_per_min = static.rate_hz * 60.0
+
+        def measure(view: TickView) -> FloatArray:
+            _count_changes(view.truth.command, view.alive, self.dead_band_radps, side, changes)
+            np.add(robot_ticks, view.robots_alive, out=robot_ticks)
+            robot_min = np.where(robot_ticks > 0, robot_ticks / ticks_per_min, np.nan)
+            return changes / robot_min
+
+        return measure
+
+
+@njit()
+def _count_changes(command, alive, dead_band_radps, side, changes):
+    """Add this tick's changes of each arena to `changes`, and note each robot's `side`: 1 left, -1 right, 0 none."""
+    arenas, robots = alive.shape
+    for arena in range(arenas):
+        for i in range(robots):
+            row = arena * robots + i
+            turn = command[row, 1]
+            if not alive[arena, i]:
+                side[row] = 0
+            elif abs(turn) > dead_band_radps:
+                now = 1 if turn > 0.0 else -1
+                changes[arena] += side[row] == -now
+                side[row] = now
+
+
+@dataclass(frozen=True)
+class PathEfficiency(Metric):
+    """Mean over the robots alive that moved of |x(t) - x(0)| / length of the path from x(0) to x(t), 0 to 1.
+
+    1 for those that went straight, 0 for those that are back where they began. A robot moved if its path is at least
+    `moved_m` long: what shivers on the spot is left out. Paths are sums of the shortest ways from tick to tick, and on
+    a torus x is unrolled: who went once around is a side away from where it was. What a robot went while dead, pushed
+    by others, counts once it is alive again. NaN while no robot alive has moved.
+
+    A random walk has sqrt(pi / (4 n)) after n steps of equal length, n large: it falls as the run goes on.
+
+    Source: the straightness index of E. Batschelet, Circular Statistics in Biology (1981).
+    """
+
+    moved_m: float = parameter(0.01, help="who has a shorter path has not moved", unit="m", above=0.0)
+
+    name = "path_efficiency"
+    help = "net displacement / path length since the start, mean over robots alive that moved"
+    bounds = (0.0, 1.0)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; it remembers where each robot was, its displacement and its path."""
+        before: FloatArray | None = None
+        gone_m: FloatArray = np.zeros((static.arenas * static.robots, 3))  # along x, along y, path
+        wrap_m = sides_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            nonlocal before
+            pose = view.truth.pose
+            if before is None:
+                before = pose[:, :2].copy()
+            return _add_step(pose, view.alive, wrap_m, self.moved_m, before, gone_m)
+
+        return measure
+
+
+@njit()
+def _add_step(pose, alive, wrap_m, moved_m, before, gone_m):
+    """The mean of each arena, after adding the step from `before`, which becomes the present place, to `gone_m`."""
+    arenas, robots = alive.shape
+    mean = np.full(arenas, np.nan)
+    for arena in range(arenas):
+        total, n = 0.0, 0
+        for i in range(robots):
+            row = arena * robots + i
+            along, across = pose[row, 0] - before[row, 0], pose[row, 1] - before[row, 1]
+            along, across = along + to_nearest(along, wrap_m[0]), across + to_nearest(across, wrap_m[1])
+            before[row, 0], before[row, 1] = pose[row, 0], pose[row, 1]
+            gone_m[row, 0] += along
+            gone_m[row, 1] += across
+            gone_m[row, 2] += np.sqrt(along * along + across * across)
+            if alive[arena, i] and gone_m[row, 2] >= moved_m:
+                net_m = np.sqrt(gone_m[row, 0] ** 2 + gone_m[row, 1] ** 2)
+                total += min(net_m / gone_m[row, 2], 1.0)  # rounding may carry it just past
+                n += 1
+        if n:
+            mean[arena] = total / n
+    return mean
+
+
+@dataclass(frozen=True)
+class Deadlocked(Metric):
+    """Robots deadlocked / robots alive, 0 to 1. NaN before `window_s` have passed, and if no robot is alive.
+
+    Our own definition; we know of none that others share. A robot alive is deadlocked if over the last `window_s`
+
+    - it was told to go at least `told_m`: the sum over ticks, while it was alive, of the commanded speed (forward or
+      backward, and sideways, within its limits) times the tick's length; and
+    - its centre is now less than `moved_m` from where it was `window_s` ago, the shortest way on a torus.
+
+    So who waits, or turns on the spot, is not deadlocked; who pushes against others is, who goes to and fro between
+    two, and who drives in circles that small. Nothing is told of why. `told_m` should be well above `moved_m`: a robot
+    that was told to go a little is not held back. The window is rounded to whole ticks, at least one.
+    """
+
+    window_s: float = parameter(10.0, help="how far it looks back", unit="s", above=0.0, at_most=3600.0)
+    moved_m: float = parameter(0.05, help="who came less far from where it was has not come away", unit="m", above=0.0)
+    told_m: float = parameter(0.2, help="who was commanded to go at least so far was told to move", unit="m", above=0.0)
+
+    name = "deadlocked"
+    help = "robots alive that were told to move over a window and stayed where they were / robots alive"
+    bounds = (0.0, 1.0)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; it remembers a window of places."""
+        window_ticks = max(round(self.window_s * static.rate_hz), 1)
+        rows = static.arenas * static.robots
+        then: FloatArray = np.zeros((window_ticks, rows, 3))  # x, y, and the way told up to then
+        told_m: FloatArray = np.zeros(rows)
+        tick_s, seen = 1.0 / static.rate_hz, 0
+        wrap_m = sides_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            nonlocal seen
+            truth, at = view.truth, then[seen % window_ticks]
+            known, seen = seen >= window_ticks, seen + 1
+            limits = self.told_m, self.moved_m
+            stuck = _count_stuck(truth.pose, truth.command, view.alive, tick_s, wrap_m, limits, told_m, at)
+            return stuck / view.per_robot_alive if known else np.full(static.arenas, np.nan)
+
+        return measure
+
+
+@njit()
+def _count_stuck(pose, command, alive, tick_s, wrap_m, limits, told_m, then):
+    """How many robots of each arena are deadlocked; puts the present tick in the place of the one a window ago."""
+    arenas, robots = alive.shape
+    stuck = np.zeros(arenas)
+    least_told_m, moved_m = limits
+    for arena in range(arenas):
+        for i in range(robots):
+            row = arena * robots + i
+            x, y = pose[row, 0], pose[row, 1]
+            along, across = x - then[row, 0], y - then[row, 1]
+            along, across = along + to_nearest(along, wrap_m[0]), across + to_nearest(across, wrap_m[1])
+            stayed = along * along + across * across < moved_m * moved_m
+            if alive[arena, i] and stayed and told_m[row] - then[row, 2] >= least_told_m:
+                stuck[arena] += 1.0
+            then[row, 0], then[row, 1], then[row, 2] = x, y, told_m[row]
+            if alive[arena, i]:
+                told_m[row] += np.sqrt(command[row, 0] ** 2 + command[row, 2] ** 2) * tick_s
+    return stuck

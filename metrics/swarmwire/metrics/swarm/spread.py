@@ -1,0 +1,284 @@
+"""Spread: how far robots stand from their centroid and from one another.
+
+On a torus the mean of coordinates is no centroid. Instead, along each axis, the places are unrolled around their
+circular mean (the mean direction of the angles 2 pi x / side), and the centroid is the mean of the unrolled places. A
+swarm that lies within half a side of its circular mean has the same centroid as on a plane. Places whose directions
+cancel have no centroid.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.geometry.obstacles import to_nearest
+from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.swarm.pairs import along_m, fill, first_order, place_at, radii_m, room_for
+from swarmwire.metrics.torus import sides_m
+
+AT_THE_CENTROID_M = 1e-9  # nearer is rounding, and has no direction
+CANCELLED = 1e-9  # a mean of directions shorter than this is rounding
+
+
+@dataclass(frozen=True)
+class Cohesion(Metric):
+    """max |x_i - c| in m over the robots alive, c their centroid; 0 for one robot alone, NaN if none is alive.
+
+    The radius of the least circle around the centroid that holds all centres: the smaller, the more cohesive. One robot
+    that stays behind decides it; `dispersion` weighs all. On a torus the centroid is taken from the circular mean of
+    the places, distances are the shortest, and what has no centroid is NaN.
+
+    Source: R. Olfati-Saber, Flocking for multi-agent dynamic systems, IEEE TAC 51 (2006), section IX: cohesion radius.
+    """
+
+    name = "cohesion"
+    help = "largest distance of a robot alive to the centroid of those alive, in m"
+    unit = "m"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        wrap_m = sides_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            return _largest(from_centroid_m(view.pose, view.alive, wrap_m), view.alive)
+
+        return measure
+
+
+@njit()
+def _largest(away_m, alive):
+    arenas, robots = alive.shape
+    largest_m = np.full(arenas, np.nan)
+    for arena in range(arenas):
+        most, n = 0.0, 0
+        for i in range(robots):
+            if alive[arena, i]:
+                square = away_m[arena, i, 0] ** 2 + away_m[arena, i, 1] ** 2
+                most = square if np.isnan(square) else max(most, square)
+                n += 1
+        if n:
+            largest_m[arena] = np.sqrt(most)
+    return largest_m
+
+
+@dataclass(frozen=True)
+class Dispersion(Metric):
+    """sum |x_i - c|^2 / (4 r^2) over the robots alive: second moment about their centroid c, in squared diameters.
+
+    The least is that of the densest packing, near a hexagonal one, of as many discs: 6 for 7 of them, 48 for 19. It
+    grows with the square of their number even so: compare it with that, or runs with equally many robots. r is the
+    radius of the body; of mixed bodies r^2 is the mean of their squares over the robots alive. On a torus the centroid
+    is taken from the circular mean of the places, distances are the shortest, and what has no centroid
+    is NaN; so is an arena in which no robot is alive.
+
+    Source: M. Gauci et al., Self-organized aggregation without computation, IJRR 33 (2014), eq. 1.
+    """
+
+    name = "dispersion"
+    help = "dispersion: sum of squared distances to the centroid / (4 r^2), over robots alive"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        wrap_m, radius_m = sides_m(static), radii_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            return _dispersion(from_centroid_m(view.pose, view.alive, wrap_m), radius_m, view.alive)
+
+        return measure
+
+
+@njit()
+def _dispersion(away_m, radius_m, alive):
+    arenas, robots = alive.shape
+    dispersion = np.full(arenas, np.nan)
+    for arena in range(arenas):
+        spread, squares, n = 0.0, 0.0, 0
+        for i in range(robots):
+            if alive[arena, i]:
+                spread += away_m[arena, i, 0] ** 2 + away_m[arena, i, 1] ** 2
+                squares += radius_m[i] ** 2
+                n += 1
+        if n:
+            dispersion[arena] = spread / (4.0 * squares / n)
+    return dispersion
+
+
+@dataclass(frozen=True)
+class Rotation(Metric):
+    """|sum r_i x u_i| / N over the N robots alive: u_i unit heading, r_i unit vector from the centroid to the robot.
+
+    1 when all head along circles around the centroid, one way round; 0 when they cancel, head outwards, or all one
+    way. A robot at the centroid has no r_i and adds 0. A robot that drives backwards counts by where it looks. On a
+    torus the centroid is taken from the circular mean of the places, and r_i is the shortest way: it
+    means little unless the swarm is much smaller than the arena. NaN if no robot is alive, or without a centroid.
+
+    Source: I. D. Couzin et al., Collective memory and spatial sorting in animal groups, J. Theor. Biol. 218 (2002),
+    group angular momentum m_group, with headings for directions of motion.
+    """
+
+    name = "rotation"
+    help = "rotation around the centroid: |sum of r x u| / robots alive, r to the robot, u its heading, unit vectors"
+    bounds = (0.0, 1.0)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; nothing is remembered."""
+        wrap_m = sides_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            away_m = from_centroid_m(view.pose, view.alive, wrap_m)
+            return _rotation(away_m, *view.direction, view.alive)
+
+        return measure
+
+
+@njit()
+def _rotation(away_m, c, s, alive):
+    arenas, robots = alive.shape
+    rotation = np.full(arenas, np.nan)
+    for arena in range(arenas):
+        total, n = 0.0, 0
+        for i in range(robots):
+            if alive[arena, i]:
+                n += 1
+                x, y = away_m[arena, i]
+                length_m = np.sqrt(x * x + y * y)
+                if not length_m <= AT_THE_CENTROID_M:  # NaN goes on
+                    total += (x * s[arena, i] - y * c[arena, i]) / length_m
+        if n and not np.isnan(total):
+            rotation[arena] = min(abs(total) / n, 1.0)
+    return rotation
+
+
+@dataclass(frozen=True)
+class NearestNeighbour(Metric):
+    """Mean over the robots i alive of min over the others j alive of |x_i - x_j| in m, centre to centre.
+
+    The shortest way on a torus. Of robots at random on a large plane, n to the square metre, it is 1 / (2 sqrt(n)), and
+    at most 1.0746 / sqrt(n), which a hexagonal lattice has; what is below the first is clustered. NaN with fewer than
+    two robots alive.
+
+    Source: P. J. Clark, F. C. Evans, Distance to nearest neighbor as a measure of spatial relationships in populations,
+    Ecology 35 (1954).
+    """
+
+    name = "nearest_neighbour"
+    help = "mean distance from a robot alive to the nearest other one, centre to centre, in m"
+    unit = "m"
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure; what it remembers only makes it quick."""
+        order, strips, wrap_m = first_order(static), room_for(static), sides_m(static)
+
+        def measure(view: TickView) -> FloatArray:
+            return _mean_nearest_m(view.pose, view.alive, order, strips, wrap_m)
+
+        return measure
+
+
+@njit()
+def _mean_nearest_m(pose, alive, order, strips, wrap_m):
+    """From each robot strip by strip outwards, until the sides of the next ones are farther than the nearest so far."""
+    mean_m = np.full(len(order), np.nan)
+    for arena in range(len(order)):
+        n = np.sum(alive[arena])
+        count, low_m, height_m = fill(strips, order[arena], pose[arena], alive[arena], 0.0, int(np.sqrt(n)), wrap_m[1])
+        total_m = 0.0
+        for a in range(n):
+            own = strips.strip[a]
+            up_m = strips.y[a] - (low_m + own * height_m)  # above the lower side of its strip
+            nearest = _nearest_square(strips, a, own, np.inf, wrap_m)
+            for away in range(1, count // 2 + 1 if wrap_m[1] > 0.0 else count):
+                between_m = (away - 1) * height_m
+                if between_m * between_m >= nearest:
+                    break
+                for other, to_m in ((own - away, up_m + between_m), (own + away, height_m - up_m + between_m)):
+                    s = other % count if wrap_m[1] > 0.0 else other
+                    if 0 <= s < count and to_m * to_m < nearest:
+                        nearest = _nearest_square(strips, a, s, nearest, wrap_m)
+            total_m += np.sqrt(nearest)
+        if n > 1:
+            mean_m[arena] = total_m / n
+    return mean_m
+
+
+@kernel()
+def _nearest_square(strips, a, s, nearest, wrap_m):
+    """The least of `nearest` and the squared distances from place a to the others of strip s: either way along x."""
+    low, size = strips.start[s], strips.start[s + 1] - strips.start[s]
+    here = _first_from(strips.x, low, low + size, strips.x[a]) - low
+    right, left = (here + size, here - 1 - size) if wrap_m[0] > 0.0 else (size, -1)
+    for begin, end, step in ((here, right, 1), (here - 1, left, -1)):
+        for v in range(begin, end, step):
+            along, b = along_m(strips, a, low, size, v, wrap_m[0]), place_at(low, size, v)
+            if along * along >= nearest:
+                break
+            if b != a:
+                across = strips.y[b] - strips.y[a]
+                across += to_nearest(across, wrap_m[1])
+                nearest = min(nearest, along * along + across * across)
+    return nearest
+
+
+@kernel()
+def _first_from(x, low, high, least):
+    """The first of the places low to high - 1, sorted by x, that is not left of `least`; high if all are."""
+    while low < high:
+        middle = (low + high) // 2
+        if x[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit()
+def from_centroid_m(pose: FloatArray, alive: BoolArray, wrap_m: tuple[float, float]) -> FloatArray:
+    """Each robot's place less the centroid of the robots alive of its arena, (arenas, robots, 2).
+
+    `wrap_m` are the sides of a torus, 0 where an arena ends; there differences are the shortest. NaN of the dead, and
+    along an axis without a centroid.
+    """
+    arenas, robots = alive.shape
+    away_m = np.full((arenas, robots, 2), np.nan)
+    for arena in range(arenas):
+        for axis in range(2):
+            centre = _mean(pose[arena, :, axis], alive[arena], 0.0, 0.0)
+            if wrap_m[axis] > 0.0:
+                around = _circular_mean(pose[arena, :, axis], alive[arena], wrap_m[axis])
+                centre = around + _mean(pose[arena, :, axis], alive[arena], around, wrap_m[axis])
+            for i in range(robots):
+                if alive[arena, i]:
+                    away = pose[arena, i, axis] - centre
+                    away_m[arena, i, axis] = away + to_nearest(away, wrap_m[axis])
+    return away_m
+
+
+@njit()
+def _mean(at, alive, origin, side):
+    """The mean of the shortest differences to `origin`; NaN if nobody is alive."""
+    total, n = 0.0, 0
+    for i in range(len(at)):
+        if alive[i]:
+            away = at[i] - origin
+            total += away + to_nearest(away, side)
+            n += 1
+    return total / n if n else np.nan
+
+
+@njit()
+def _circular_mean(at, alive, side):
+    """The place in the mean direction of the angles 2 pi at / side; NaN if they cancel, or nobody is alive."""
+    turn, c, s, n = 2.0 * np.pi / side, 0.0, 0.0, 0
+    for i in range(len(at)):
+        if alive[i]:
+            c += np.cos(turn * at[i])
+            s += np.sin(turn * at[i])
+            n += 1
+    return np.arctan2(s, c) / turn if np.hypot(c, s) > CANCELLED * n else np.nan

@@ -1,1 +1,0 @@
-"""Whether a run folder is intact, and holds what its summary says."""

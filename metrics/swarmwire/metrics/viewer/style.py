@@ -1,0 +1,107 @@
+"""Colours of a recording, and the classes of robots that have one: each group in each state, and the dead."""
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.truth import Static
+from swarmwire.metrics.drawing.canvas import Color, robot_color
+
+DEAD = (118, 118, 124)
+WALL = (150, 155, 170)
+LIGHT = (255, 220, 60)
+MARK = (235, 235, 240)
+
+SERIES: tuple[Color, ...] = (
+    (86, 180, 233),
+    (240, 228, 66),
+    (0, 200, 140),
+    (230, 120, 40),
+    (204, 121, 167),
+    (180, 180, 190),
+)
+FATES: dict[Fate, Color] = {
+    Fate.RECEIVED: (86, 180, 233),
+    Fate.BLOCKED: (240, 180, 60),
+    Fate.LOST: (235, 85, 75),
+    Fate.QUEUE_FULL: (160, 140, 250),
+    Fate.TOO_LARGE: (205, 205, 110),
+    Fate.IN_FLIGHT: (0, 200, 140),
+    Fate.SENDER_DEAD: (125, 125, 135),
+    Fate.RECEIVER_DEAD: (175, 175, 185),
+    Fate.BLACKOUT: (190, 95, 235),
+    Fate.PARTITIONED: (255, 130, 195),
+}  # out of range is no colour: such receivers are counted, never listed
+
+_LAST_LETTER = "\u024f"  # of Latin with its extensions
+DEAD_CLASS = 0
+LEGEND_LINES = 6  # as many as the layout has room for
+_LONGEST_LINE = 28  # characters
+_LABELLED = 1.0  # radius in ui points of the dot that a line of the legend hangs on
+
+
+def packed(color: Color, alpha: int) -> int:
+    """A colour and its opacity of 255 as the number 0xRRGGBBAA, which rerun takes fastest."""
+    red, green, blue = color
+    return red << 24 | green << 16 | blue << 8 | alpha
+
+
+def shown(text: str) -> str:
+    """The text with `?` for letters that the viewer's only font may lack: drawing without a screen, it ends at one."""
+    return "".join(letter if " " <= letter <= _LAST_LETTER else "?" for letter in text)
+
+
+class RerunClasses:
+    """Class ids of robots: 0 for the dead, and one per (group, state), given in the order in which they appear.
+
+    The names and colours are logged as rerun's annotations of `world`, so that a robot says what it is when it is
+    pointed at, and as a legend in which each name has its colour; both again whenever there is a new class.
+    """
+
+    def __init__(self, static: Static) -> None:
+        """No class but the dead yet."""
+        self._static = static
+        self._group = np.concatenate([np.full(g.stop - g.start, i) for i, g in enumerate(static.groups)])
+        self._id: dict[tuple[int, int], int] = {}  # (group, state code) to class
+        self._names = ["dead"]
+        self._died = False
+
+    def of(self, rec: Any, alive: BoolArray, state: IntArray, states: tuple[str, ...]) -> IntArray:
+        """Each robot's class, (robots,), from alive and its index in `states`; logs new classes."""
+        codes = len(states)
+        keys, inverse = np.unique(self._group * codes + state, return_inverse=True)
+        known = len(self._id), self._died
+        ids = np.array([self._class(int(key) // codes, int(key) % codes, states) for key in keys], np.uint16)
+        self._died |= not alive.all()
+        if known != (len(self._id), self._died):
+            self._log(rec)
+        return np.where(alive, ids[inverse], np.uint16(DEAD_CLASS))
+
+    def _class(self, group: int, code: int, states: tuple[str, ...]) -> int:
+        if (group, code) not in self._id:
+            self._id[group, code] = len(self._names)
+            self._names.append(shown(self._name(self._static.groups[group].name, states[code])))
+        return self._id[group, code]
+
+    def _name(self, group: str, state: str) -> str:
+        """The name of a class; the group's name is left out where there is only one group."""
+        if not state:
+            return group
+        return state if len(self._static.groups) == 1 else f"{group}: {state}"
+
+    def _log(self, rec: Any) -> None:
+        import rerun as rr
+
+        colors = [DEAD, *(robot_color(i) for i in range(len(self._names) - 1))]
+        described = zip(range(len(colors)), self._names, colors, strict=True)
+        rec.log("world", rr.AnnotationContext(list(described)), static=True)
+        lines = list(zip(self._names, colors, strict=True))[1:] + [("dead", DEAD)] * self._died
+        if len(lines) > LEGEND_LINES:
+            lines = [*lines[: LEGEND_LINES - 1], (f"... and {len(lines) - LEGEND_LINES + 1} more", DEAD)]
+        texts = [text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..." for text, _ in lines]
+        places = [(0.0, float(line)) for line in range(len(lines))]
+        dot = rr.Radius.ui_points(_LABELLED)
+        points = rr.Points2D(places, radii=dot, labels=texts, colors=[color for _, color in lines], show_labels=True)
+        rec.log("legend", points, static=True)

@@ -1,0 +1,299 @@
+"""Radios of real robots."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import zenoh
+
+from swarmwire.agent.radios import zenoh_radio
+from swarmwire.agent.radios.radio import ReceivedPacket, RobotRadio, SentPacket
+from swarmwire.agent.radios.tracker import Tracker
+from swarmwire.agent.radios.world_radio import WorldRadio
+from swarmwire.agent.radios.zenoh_radio import PacketHeader
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
+from tests.support.clocks import until
+from tests.support.swarms import (
+    ANY_PORT,
+    KEYS,
+    MAX_BYTES,
+    ROBOTS,
+    KeptLog,
+    Wide,
+    Word,
+    meet,
+    peers,
+    radio,
+    radios,
+    received_by,
+    words,
+)
+
+NEEDS = {"range_m": "radio.range", "bearing_rad": "radio.bearing", "rssi_dbm": "radio.rssi"}
+
+
+@contextmanager
+def by_zenoh() -> Generator[RobotRadio]:
+    with peers(1) as (session,):
+        yield radio(session, "flock-1")
+
+
+@contextmanager
+def by_zenoh_and_tracker() -> Generator[RobotRadio]:
+    with peers(1) as (session,):
+        yield radio(session, "flock-1", tracker=Tracker(session, KEYS, ROBOTS), needs_pose=True)
+
+
+@contextmanager
+def by_air() -> Generator[RobotRadio]:
+    bridge = RadioBridge(
+        Network(ANY_PORT), KEYS, {"flock-1": 1}, BridgedRadio(ROBOTS, 10, 100, ("rssi_dbm",), ("radio.rssi",))
+    )
+    session = open_swarm(Network(connect=bridge.open()))
+    try:
+        made = WorldRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
+        made.open()
+        yield made
+    finally:
+        session.close()
+        bridge.close()
+
+
+@pytest.fixture(params=[by_zenoh, by_zenoh_and_tracker, by_air])
+def any_radio(request) -> Generator[RobotRadio]:
+    with request.param() as made:
+        yield made
+
+
+def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio):
+    for _ in range(2):
+        received, tx_status = any_radio.received(0)
+        assert (len(received), len(tx_status)) == (0, 0)
+        assert tuple(received.given) == any_radio.measures
+    assert any_radio.needs == {NEEDS[column] for column in any_radio.measures}
+
+
+def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
+    any_radio.send(SentPackets.none())
+    assert any_radio.counts() == {}
+    any_radio.send(words(1.0, 2.0, row=1))
+    assert any_radio.counts() == {"packets_sent": 2}
+    assert all(type(count) is int for count in any_radio.counts().values())
+
+
+def test_what_is_larger_than_the_payload_limit_is_counted_and_raises_nothing(any_radio):
+    any_radio.send(SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes(101)])))
+    assert any_radio.counts() == {"packets_too_large": 1}
+
+
+def test_it_may_be_closed_twice_and_asked_even_then(any_radio):
+    any_radio.close()
+    any_radio.close()
+    assert len(any_radio.received(0)[0]) == 0
+
+
+def packet(number: float = 1.0, to: int = BROADCAST, sequence: int = 0, sent_utc_ns: int = 0) -> bytes:
+    return PacketHeader(to, sequence, sent_utc_ns).encode() + Word(number=number).encode()
+
+
+def test_a_packet_is_received_by_all_others_with_sender_and_number_and_never_by_its_sender():
+    with radios(3) as (a, b, c):
+        a.send(words(1.0, 2.0))
+        b.send(words(3.0))
+        assert received_by(a, 1) == [(1, 0, 3.0)]
+        assert sorted(received_by(b, 2)) == [(0, 0, 1.0), (0, 1, 2.0)]
+        assert sorted(received_by(c, 3)) == [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)]
+        a.send(words(4.0))
+        assert received_by(b, 1) == [(0, 2, 4.0)]
+        assert received_by(c, 1) == [(0, 2, 4.0)]
+        assert a.counts()["packets_sent"] == 3
+        assert a.counts()["packets_received"] == 1
+
+
+def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now():
+    with radios(3) as (a, b, c):
+        a.send(words(*range(20)))
+        b.send(words(*range(20)))
+        until(lambda: len(c._inbox._waiting) == 40)
+        now_ns = 5 * NS_PER_S
+        received, tx_status = c.received(now_ns)
+        rows = list(
+            zip(received.received_at_ns.tolist(), received.sender.tolist(), received.sequence.tolist(), strict=True)
+        )
+        assert rows == sorted(rows)
+        assert [sequence for _, sender, sequence in rows if sender == 0] == list(range(20))
+        assert 0 < rows[0][0] <= rows[-1][0] <= now_ns
+        assert received.receiver.tolist() == [2] * 40
+        assert len(tx_status) == 0
+        assert received.given == {}
+
+
+def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it():
+    logs = KeptLog(), KeptLog(), KeptLog()
+    with peers(3) as sessions:
+        a, b, c = (radio(s, own, log=log) for s, own, log in zip(sessions, ROBOTS, logs, strict=True))
+        meet(sessions[0], [b, c])
+        a.send(words(1.0, to=1))
+        assert received_by(b, 1) == [(0, 0, 1.0)]
+        until(lambda: len(c.received(0)[0]) or c.counts().get("packets_overheard"))
+        assert c.counts().get("packets_received") is None
+    (sent,), (overheard,), (received,) = logs[0].sent_packets, logs[2].received_packets, logs[1].received_packets
+    assert sent == SentPacket(sent.utc_ns, sequence=0, to=1, size_bytes=6, tag=Word.tag, fate="sent")
+    latency_ns = overheard.latency_ns
+    assert latency_ns is not None
+    assert 0 < latency_ns < NS_PER_S
+    assert overheard == ReceivedPacket(
+        sent.utc_ns + latency_ns, 0, 0, 1, 6, Word.tag, latency_ns, distance_m=None, given=False
+    )
+    assert received.given
+
+
+def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
+    said: list[str] = []
+    log = KeptLog()
+    with peers(2) as sessions:
+        a, b = radio(sessions[0], ROBOTS[0], log=log, say=said.append), radio(sessions[1], ROBOTS[1])
+        meet(sessions[0], [b])
+        large = Payloads.of([b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()])
+        a.send(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), large))
+        a.send(SentPackets(np.zeros(1, np.int64), np.full(1, BROADCAST), large.rows(np.array([1]))))
+        a.send(words(4.0))
+        rows: list[int] = []
+
+        def three() -> bool:
+            received, _ = b.received(0)
+            rows.extend(received.sequence.tolist())
+            return len(rows) == 3
+
+        until(three)
+        assert rows == [0, 2, 4]
+        assert a.counts()["packets_too_large"] == 2
+    assert [packet.fate for packet in log.sent_packets] == ["sent", "too_large", "sent", "too_large", "sent"]
+    assert len(said) == 1
+    assert f"{MAX_BYTES + 1} bytes" in said[0]
+
+
+def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbered_only():
+    with radios() as (a, b):
+        a.send(words(1.0, to=0))
+        a.send(words(1.0, to=3))
+        a.send(words(2.0))
+        assert received_by(b, 1) == [(0, 2, 2.0)]
+        assert a.counts()["packets_to_nobody"] == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "data", "counted"),
+    [
+        (KEYS.radio("stranger", Word.tag), packet(), "packets_of_unknown"),
+        (KEYS.radio("flock-0", Word.tag), packet(), "packets_in_own_name"),
+        (KEYS.radio("flock-1", Word.tag), b"", "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), b"\1", "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), bytes(40), "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), packet()[:-5], "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), packet(to=-2), "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), packet(to=1), "packets_malformed"),
+        (KEYS.radio("flock-1", Word.tag), packet(to=3), "packets_malformed"),
+        (KEYS.radio("flock-1", Wide.tag), packet(), "packets_malformed"),
+        (f"{KEYS.root}/radio/flock-1/*", packet(), "packets_malformed"),
+        (f"{KEYS.root}/**/flock-1/{Word.tag:04x}", packet(), "packets_malformed"),
+        ("**", packet(), "packets_of_unknown"),
+        (KEYS.radio("flock-1", Word.tag), packet() + bytes(MAX_BYTES), "packets_oversized"),
+        (KEYS.radio("flock-1", Word.tag), packet() + bytes(10**6), "packets_oversized"),
+    ],
+)
+def test_what_breaks_the_protocol_is_counted_and_dropped(key, data, counted):
+    with peers(2) as (session, other):
+        a = radio(session, "flock-0")
+        meet(other, [a])
+        before = a.counts().get(counted, 0)
+        # A megabyte fills the queue, and a busy machine takes longer to send it than a put waits that may be dropped.
+        other.put(key, data, congestion_control=zenoh.CongestionControl.BLOCK)
+        proper = packet(7.0, sequence=3)
+        other.put(KEYS.radio("flock-1", Word.tag), proper, congestion_control=zenoh.CongestionControl.BLOCK)
+        assert received_by(a, 1) == [(1, 3, 7.0)]
+        assert a.counts()[counted] == before + 1
+
+
+def test_garbage_never_stops_a_radio():
+    rng = np.random.default_rng(5)
+    with peers(2) as (session, other):
+        a = radio(session, "flock-0")
+        meet(other, [a])
+        for size in rng.integers(0, 60, 300).tolist():
+            other.put(KEYS.radio("flock-1", Word.tag), rng.bytes(size))
+        other.put(KEYS.radio("flock-1", Word.tag), packet(7.0))
+        assert received_by(a, 1)[-1][2] == 7.0
+        assert a.counts()["packets_malformed"] > 250
+
+
+def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_received(monkeypatch):
+    monkeypatch.setattr(zenoh_radio, "MAX_WAITING", 50)
+    with radios() as (a, b):
+        a.send(words(*range(80)))
+        until(lambda: b.counts().get("packets_dropped") == 30)
+        assert [number for _, _, number in received_by(b, 50)] == list(range(50))
+        a.send(words(80.0))
+        assert received_by(b, 1) == [(0, 80, 80.0)]
+        assert (b.links[0].received, b.links[0].missed) == (51, 30)
+
+
+def test_a_peer_that_vanishes_and_comes_back_is_received_again_and_its_link_counts_no_loss():
+    with peers(1) as (stays,):
+        a = radio(stays, "flock-0")
+        endpoint = endpoints_of(stays, Network(listen=ANY_PORT))
+        for life in range(2):
+            session = open_swarm(Network(connect=endpoint))
+            b = radio(session, "flock-1")
+            meet(session, [a])
+            b.send(words(1.0, 2.0, 3.0 + life))
+            assert [(1, 0, 1.0), (1, 1, 2.0), (1, 2, 3.0 + life)] == received_by(a, 3)
+            session.close()
+            b.send(words(5.0))  # nobody is hurt
+            assert b.counts()["packets_refused"] == 1
+            b.close()
+        assert (a.links[1].received, a.links[1].missed) == (6, 0)
+
+
+def test_who_was_called_and_comes_back_at_its_old_endpoint_is_found_again():
+    with peers(1) as (first,):
+        endpoint = endpoints_of(first, Network(listen=ANY_PORT))
+        caller = open_swarm(Network(connect=endpoint))
+        try:
+            b = radio(caller, "flock-1")
+            meet(first, [b])
+            first.close()
+            again = open_swarm(Network(listen=endpoint))
+            try:
+                meet(again, [b])
+                radio(again, "flock-0").send(words(9.0))
+                assert received_by(b, 1) == [(0, 0, 9.0)]
+            finally:
+                again.close()
+        finally:
+            caller.close()
+
+
+def test_a_radio_that_was_closed_hears_no_more_and_may_be_closed_again():
+    with radios() as (a, b):
+        b.close()
+        b.close()
+        c = radio(b._session, "flock-2")
+        meet(a._session, [c])
+        a.send(words(1.0))
+        assert received_by(c, 1) == [(0, 0, 1.0)]
+        assert len(b.received(0)[0]) == 0
+
+
+def test_many_packets_at_once_all_arrive():
+    with radios(3) as (a, b, c):
+        for _ in range(5):
+            a.send(words(*range(100)))
+            for other in (b, c):
+                assert [number for _, _, number in received_by(other, 100)] == list(range(100))
+        assert (b.links[0].received, b.links[0].missed) == (500, 0)

@@ -1,0 +1,261 @@
+"""zenoh sessions."""
+
+import queue
+import stat
+import subprocess
+import sys
+import threading
+from contextlib import ExitStack
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import zenoh
+
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.robots.ros2 import links
+from swarmwire.comms.robots.ros2.keys import attachment
+from swarmwire.comms.robots.ros2.links import Subscription
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.ending import end_now
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm, swarm_config
+from swarmwire.comms.wire.sessions import (
+    close_session,
+    closed_after,
+    listens_at,
+    open_router,
+    open_runner,
+    open_world,
+    unix_endpoint,
+)
+from tests.support.clocks import until
+from tests.support.comms.radio import MODULES
+from tests.support.swarms import ANY_PORT, peers
+
+NOBODY = "tcp/127.0.0.1:9"  # the discard port, on which nothing listens
+# A session whose close takes long, as on a machine that is busy.
+PROGRAM = """
+import atexit, sys, threading
+from swarmwire.comms.wire import ending
+from swarmwire.comms.wire.sessions import close_session
+
+class Slow:
+    def __init__(self): self.closed, self.may = False, threading.Event()
+    def close(self):
+        self.may.wait()
+        self.closed = True
+
+session = Slow()
+close_session(session, patience_s=0.01)
+print("done")
+"""
+WAITS = "atexit.register(lambda: print('closed' if session.closed else 'open')); "
+WAIT_S = 10.0
+
+
+def test_a_runner_asks_the_world_at_its_socket_and_is_answered(tmp_path):
+    endpoint = unix_endpoint(f"{tmp_path}/world")
+
+    def answer(query: zenoh.Query) -> None:
+        query.reply("here", b"yes")
+
+    with open_world(endpoint, runner_timeout_s=10.0) as world, open_runner(endpoint) as runner:
+        asked = world.declare_queryable("here", answer)
+        replies = [reply.ok.payload.to_bytes() for reply in runner.get("here", timeout=10.0) if reply.ok]
+        asked.undeclare()
+    assert replies == [b"yes"]
+
+
+def test_nobody_answers_where_there_is_no_world(tmp_path):
+    with pytest.raises(zenoh.ZError):
+        open_runner(unix_endpoint(f"{tmp_path}/nobody"), connect_s=0.1)
+
+
+def test_ports_that_the_system_chose_are_told_and_a_world_may_listen_at_several_places(tmp_path):
+    unix = unix_endpoint(f"{tmp_path}/world")
+    with closed_after(open_world([unix, "tcp/127.0.0.1:0"], runner_timeout_s=10.0)) as world:
+        told = listens_at(world)
+        assert unix.removeprefix("unixsock-stream/") in " ".join(told)
+        tcp = next(endpoint for endpoint in told if endpoint.startswith("tcp/"))
+        assert not tcp.endswith(":0")
+        for endpoint in (unix, tcp):
+            with closed_after(open_runner(endpoint)):
+                pass
+
+
+def test_who_says_that_it_is_insecure_may():
+    with closed_after(open_world("tcp/0.0.0.0:0", 10.0, Network(insecure=True))) as world:
+        assert listens_at(world)
+
+
+def test_a_query_passes_two_routers_whichever_begins_first():
+    insecure = Network(insecure=True)
+    with ExitStack() as opened:
+        near = opened.enter_context(closed_after(open_router("tcp/127.0.0.1:0", (), insecure)))
+        far = opened.enter_context(closed_after(open_router("tcp/127.0.0.1:0", listens_at(near), insecure)))
+        runner = opened.enter_context(closed_after(open_runner(listens_at(far)[0])))
+        world = opened.enter_context(closed_after(open_router("tcp/127.0.0.1:0", listens_at(near), insecure)))
+
+        def answer(query: zenoh.Query) -> None:
+            query.reply("here", b"yes")
+
+        asked = world.declare_queryable("here", answer)
+        until(lambda: any(reply.ok for reply in runner.get("here", timeout=1.0)))
+        asked.undeclare()
+
+
+def test_peers_that_list_one_another_are_linked_and_others_are_not():
+    with peers(2) as (a, b):
+        until(lambda: len(list(a.info.peers_zid())) == 1)
+        until(lambda: [str(zid) for zid in b.info.peers_zid()] == [str(a.zid())])
+        alone = open_swarm(Network(listen=ANY_PORT))
+        try:
+            assert not list(alone.info.peers_zid())
+        finally:
+            close_session(alone)
+
+
+def test_opening_does_not_wait_for_those_who_are_not_there():
+    clock = WallClock()
+    began_ns = clock.now_ns()
+    session = open_swarm(Network(connect=(NOBODY,)))
+    assert clock.now_ns() - began_ns < NS_PER_S
+    close_session(session)
+
+
+def test_closing_does_not_wait_long_for_peers_that_are_frozen():
+    answers = threading.Event()
+    frozen: Any = SimpleNamespace(close=answers.wait)
+    try:
+        close_session(frozen, patience_s=0.01)
+    finally:
+        answers.set()
+    with peers(1) as (session,):
+        close_session(session)
+        assert session.is_closed()
+
+
+def test_a_chosen_port_can_be_read_back_and_a_given_one_is_as_given():
+    with peers(1) as (session,):
+        (endpoint,) = endpoints_of(session, Network(listen=ANY_PORT))
+        assert endpoint.startswith("tcp/127.0.0.1:")
+        assert not endpoint.endswith(":0")
+        given = Network(listen=(endpoint,))
+        assert endpoints_of(session, given) == given.listen
+        with pytest.raises(BadInput) as caught:
+            open_swarm(given)
+        assert endpoint in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_who_lists_none_listens_nowhere():
+    session = open_swarm(Network(connect=(NOBODY,)))
+    try:
+        assert swarm_config(Network(connect=(NOBODY,)))["listen"]["endpoints"] == []
+        assert not list(session.info.peers_zid())
+    finally:
+        close_session(session)
+
+
+def test_who_is_to_be_found_by_multicast_listens_at_a_port_that_can_be_read_back():
+    network = Network(multicast=True, insecure=True)
+    config = swarm_config(network)
+    assert config["listen"]["endpoints"] == ["tcp/0.0.0.0:0"]
+    assert config["adminspace"]["enabled"] is True
+    with peers(1) as (session,):  # multicast itself is not for tests: it may find others
+        assert endpoints_of(session, network)[0].startswith("tcp/127.0.0.1:")
+
+
+def test_a_certificate_that_is_none_is_refused_in_one_line(tmp_path):
+    for name in ("ca", "pem", "key"):
+        (tmp_path / name).write_text("nonsense")
+        (tmp_path / name).chmod(stat.S_IRUSR)
+    files = {"ca": tmp_path / "ca", "certificate": tmp_path / "pem", "key": tmp_path / "key"}
+    with pytest.raises(BadInput) as caught:
+        open_swarm(Network(("tls/127.0.0.1:0",), **files))
+    assert "\n" not in str(caught.value)
+
+
+class Stuck:
+    """A session that zenoh cannot close in time."""
+
+    def __init__(self, wait: Event | None = None) -> None:
+        self._wait = wait
+
+    def close(self) -> None:
+        if self._wait is not None:
+            self._wait.wait()
+        raise zenoh.ZError("close operation timed out!")
+
+
+def test_a_session_is_closed_and_may_be_closed_again():
+    with peers(1) as (session,), closed_after(session):
+        close_session(session)
+        assert session.is_closed()
+
+
+def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog):
+    caplog.set_level("INFO")
+    with closed_after(Stuck()):
+        pass
+    assert "left to the end of the process" in caplog.text
+    wait = Event()
+    close_session(Stuck(wait), patience_s=0.01)
+    wait.set()
+
+
+def ended(program: str) -> tuple[int, str, str]:
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_where_nothing_is_closing_it_returns(monkeypatch):
+    monkeypatch.setattr(ending, "_closing_threads", [])
+    end_now(3)
+
+
+def test_a_program_ends_at_once_with_its_exit_code():
+    assert ended(PROGRAM + "ending.end_now(3); sys.exit(4)") == (3, "done\n", "")
+
+
+def test_once_all_is_closed_it_ends_as_usual():
+    closed = "session.may.set(); ending._closing_threads[0].join(); "
+    assert ended(PROGRAM + closed + "ending.end_now(3); sys.exit(4)") == (4, "done\n", "")
+
+
+def test_else_python_waits_for_what_still_closes():
+    # What is registered first is called last: by then the session is closed, or the wait was in vain.
+    program = PROGRAM.replace("session = Slow()", "session = Slow()\n" + WAITS)
+    end = "threading.Timer(0.05, session.may.set).start(); sys.exit(4)"
+    assert ended(program + end) == (4, "done\nclosed\n", "")
+
+
+# zenoh's stubs leave out return types.
+# pyright: reportUnknownMemberType=false
+
+
+def test_frames_without_their_attachment_are_refused_by_name():
+    router, endpoint = links.open_router("tcp/127.0.0.1:0")
+    client = links.open_client(endpoint, 5.0)
+    taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    refused: queue.SimpleQueue[str] = queue.SimpleQueue()
+    subscription = Subscription(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
+    try:
+        client.put("0/scan", b"bare")
+        assert refused.get(timeout=WAIT_S) == "no_attachment"
+        client.put("0/scan", b"whole", attachment=attachment(0, 1, bytes(16)))
+        assert taken.get(timeout=WAIT_S) == b"whole"
+        assert taken.empty()
+        subscription.close()
+    finally:
+        links.close(client)
+        links.close(router)
+
+
+def test_parameters_are_imported_without_a_compiler():
+    code = f"import sys, {', '.join(MODULES)}; sys.exit('numba' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,220 @@
+"""Routers."""
+
+import json
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Timer
+
+import pytest
+import zenoh
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import RunnerLost
+from swarmwire.deploy import repeat, run
+from swarmwire.deploy.certificates.folder import revoke
+from swarmwire.deploy.certificates.member import access_in, network_in
+from swarmwire.deploy.config import Listening
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.world.backends.registry import RunnerEvent
+from tests.integration.deploy.machines.test_machines import lab
+from tests.support.deploy.joiners import HERE as LOCALHOST
+from tests.support.deploy.joiners import Joiners, Watcher
+from tests.support.deploy.machines import Started, on
+from tests.support.deploy.runs import LOSSY, called
+
+HERE = ("127.0.0.1",)
+TCP = ("--listen", "tcp/127.0.0.1:0", "--connect", "tcp/127.0.0.1:1")
+TLS = ("--listen", "tls/127.0.0.1:0", "--connect", "tls/127.0.0.1:1")
+FROZEN_S = 0.5
+SHORT = ["duration_s=3", "run.on_runner_loss=wait"]
+RUNNERS = {"r1": "8", "r2": "12"}
+
+
+@pytest.fixture(scope="module")
+def certs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = lab(tmp_path_factory.mktemp("lab") / "ca", {"world": HERE, "gate": HERE, "gate2": HERE}, "r1", "gone")
+    revoke(folder, "gone", WallClock())
+    return folder
+
+
+def test_on_this_machine_it_routes_without_certificates_until_it_is_asked_to_end():
+    with on(None, "router", *TCP) as router:
+        assert router.said("listens at").endswith(", calls tcp/127.0.0.1:1")
+        assert router.stop() == 0
+    assert router.lines[-1] == "router: ended"
+    assert not any("warning" in line for line in router.lines)
+
+
+def test_beyond_this_machine_it_warns_each_time_that_it_is_insecure():
+    with on(None, "router", "--listen", "tcp/0.0.0.0:0", "--connect", "tcp/127.0.0.1:1", "--insecure") as router:
+        router.said("warning: insecure")
+        router.said("listens at")
+        assert router.stop() == 0
+
+
+def test_the_settings_for_another_router_are_what_it_would_use_itself(certs, monkeypatch, capsys):
+    words = "router", *TLS, "--certs", certs, "--name", "gate2", "--revoked", "nobody", "--print"
+    code, out, errors = called(monkeypatch, capsys, *words)
+    assert (code, errors) == (0, "")
+    settings = json.loads(out)
+    assert zenoh.Config.from_json5(out).get_json("mode") == '"router"'
+    tls = settings["transport"]["link"]["tls"]
+    assert (tls["enable_mtls"], tls["listen_certificate"]) == (True, str(certs / "gate2.pem"))
+    assert settings["transport"]["link"]["protocols"] == ["tls"]
+    assert settings["access_control"]["default_permission"] == "deny"
+    assert {of["id"] for of in settings["access_control"]["subjects"]} == {"r1", "gate", "gate2", "world"}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--listen", "tcp/0.0.0.0:7447", "--connect", "tcp/127.0.0.1:1"),
+        (*TLS,),
+        ("--listen", "tls/nowhere", "--connect", "tcp/127.0.0.1:1"),
+        (*TCP, "--runner", "r1"),
+        (*TCP, "--certs", "none"),
+        (*TCP, "--name", "gate"),
+        ("--listen", "unixsock-stream//nowhere/at/all", "--connect", "tcp/127.0.0.1:1"),
+    ],
+)
+def test_a_bad_call_is_one_line(words, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "router", *words)
+    assert (code, out) == (2, "")
+    assert errors.startswith("error: ")
+    assert errors.count("\n") == 1
+
+
+def test_which_of_several_certificates_must_be_said(certs, monkeypatch, capsys):
+    code, _, errors = called(monkeypatch, capsys, "router", *TLS, "--certs", certs)
+    assert code == 2
+    assert "gate, gate2" in errors
+
+
+def test_names_can_be_told_without_a_register(certs, monkeypatch, capsys):
+    files = "--ca", certs / "ca.pem", "--certificate", certs / "gate.pem", "--key", certs / "gate.key"
+    names = "--runner", "r1", "--router", "gate2", "--world", "lab"
+    _, out, _ = called(monkeypatch, capsys, "router", *TLS, *files, *names, "--print")
+    assert {of["id"] for of in json.loads(out)["access_control"]["subjects"]} == {"r1", "gate2", "lab"}
+
+
+class BehindRouter(Joiners):
+    """A runner with all robots that reaches the world through a router without certificates."""
+
+    def __init__(self, folder, opened: ExitStack) -> None:
+        super().__init__(folder)
+        self._opened = opened
+        self.router: Started | None = None
+
+    def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
+        router = on(None, "router", "--listen", LOCALHOST[0], "--connect", endpoints[0])
+        self.router = self._opened.enter_context(router)
+        self.endpoint = self.router.said("listens at").split()[3].strip(",")
+        self.start("r1")
+
+    def send_router(self, number: signal.Signals) -> None:
+        assert self.router is not None
+        self.router.process.send_signal(number)
+
+    def freeze_router(self) -> None:
+        self.send_router(signal.SIGSTOP)
+
+    def freeze_and_thaw_router(self) -> None:
+        self.freeze_router()
+        Timer(FROZEN_S, self.send_router, [signal.SIGCONT]).start()
+
+
+@pytest.fixture
+def joiners(tmp_path):
+    with ExitStack() as opened:
+        found = BehindRouter(tmp_path, opened)
+        opened.callback(found.close)
+        yield found
+
+
+def simulation_of(joiners, act, *overrides):
+    simulation = Simulation(
+        LOSSY,
+        overrides=[*joiners.overrides, "duration_s=2", *overrides],
+        listening=Listening(LOCALHOST, observer=joiners),
+    )
+    simulation.watch(Watcher((lambda truth: truth.tick == 8, act)))
+    return simulation
+
+
+def test_a_run_goes_on_when_its_router_does_and_nothing_is_lost(joiners):
+    result = finished(simulation_of(joiners, joiners.freeze_and_thaw_router))
+    assert result.counts.get("runners_lost", 0) == 0
+    assert result.trajectory_sha256 == run(LOSSY, overrides=[*joiners.overrides, "duration_s=2"]).trajectory_sha256
+
+
+def test_behind_a_router_that_stays_frozen_a_runner_is_lost_after_its_time(joiners):
+    simulation = simulation_of(joiners, joiners.freeze_router, "run.runner_timeout_s=2")
+    with pytest.raises(RunnerLost, match="no answer for 2 s"):
+        finished(simulation)
+    assert simulation.result.ticks == 9
+
+
+class BehindGuardedRouter(Joiners):
+    """Runners that reach the world through a router, which is started first."""
+
+    def __init__(self, folder: Path, certs: Path, opened: ExitStack) -> None:
+        super().__init__(folder)
+        self._certs, self._opened = certs, opened
+        self._world, self._at = "", "tls/127.0.0.1:0"
+        self.routers: list[Started] = []
+        self.lost: dict[str, tuple[str, ...]] = {}
+
+    def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
+        self._world = endpoints[0]
+        self._route()
+        for name, robots in RUNNERS.items():
+            self._join(name, "--robots", robots)
+
+    def _route(self) -> None:
+        words = "router", "--listen", self._at, "--connect", self._world, "--certs", self._certs
+        router = self._opened.enter_context(on(None, *words))
+        self._at = self.endpoint = router.said("listens at").split()[3].strip(",")
+        router.said("linked with world")
+        self.routers.append(router)
+
+    def _join(self, name: str, *arguments: str) -> None:
+        own = [f"{self._certs / name}.{ending}" for ending in ("pem", "key")]
+        self.start(name, *arguments, "--ca", self._certs / "ca.pem", "--certificate", own[0], "--key", own[1])
+
+    def kill_router(self) -> None:
+        self.routers[-1].process.send_signal(signal.SIGKILL)
+
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
+        """Once all are lost, the router is started again, and they after it."""
+        super().changed(change, free)
+        if change.what != "lost":
+            return
+        self.lost[change.runner] = change.robots
+        if len(self.lost) < len(RUNNERS):
+            return
+        for name in RUNNERS:
+            code, said = self.said(name)
+            assert (code, said.splitlines()[-1]) == (1, "the world is gone, or out of reach")
+        self._route()
+        for name, robots in self.lost.items():
+            self._join(name, "--names", ",".join(robots))
+
+
+def test_the_run_goes_on_where_it_was_and_says_what_happened(tmp_path):
+    certs = lab(tmp_path / "ca", {"world": HERE, "gate": HERE}, *RUNNERS)
+    with ExitStack() as opened:
+        joiners = BehindGuardedRouter(tmp_path, certs, opened)
+        opened.callback(joiners.close)
+        at = ("tls/127.0.0.1:0",)
+        listening = Listening(at, network=network_in(certs, "world"), access=access_in(certs), observer=joiners)
+        overrides = [*joiners.overrides, *SHORT]
+        simulation = Simulation(LOSSY, overrides=overrides, listening=listening, out=tmp_path / "run")
+        simulation.watch(Watcher((lambda truth: truth.tick == 8, joiners.kill_router)))
+        result = finished(simulation)
+    assert sorted(joiners.told[2:4]) == [("lost", "r1"), ("lost", "r2")]
+    assert sorted(joiners.told[4:]) == [("returned", "r1"), ("returned", "r2")]
+    assert {change.tick for change in result.runner_events[2:]} == {9}
+    assert result.counts["runners_lost"] == result.counts["runners_returned"] == 2
+    assert result.trajectory_sha256 == run(LOSSY, overrides=overrides).trajectory_sha256
+    assert repeat(tmp_path / "run").same

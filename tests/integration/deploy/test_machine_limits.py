@@ -1,0 +1,208 @@
+"""Limits of the machine: disk, files, threads, memory."""
+
+import ctypes
+import errno
+import os
+import resource
+import shutil
+import socket
+import subprocess
+import sys
+from _thread import start_new_thread
+
+import psutil
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.deploy import run
+from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
+from swarmwire.deploy.record import folder, provenance
+from swarmwire.metrics.atomic import write_text
+from swarmwire.metrics.run_folder.layout import SUMMARY
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
+from tests.integration.examples.test_examples import EXAMPLES
+from tests.support.deploy.runs import LOSSY, called
+
+SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")
+NO_ROOM = "No space left on device"
+FULL = OSError(errno.ENOSPC, NO_ROOM)
+IN_SMALL = (
+    'mount -t tmpfs -o size=40k none "$0" || exit 99; to=$1; shift; "$@"; code=$?; cp -r "$0/run" "$to"; exit $code'
+)
+THREADS = 6
+PROGRAM = f"""
+import ctypes, threading
+from swarmwire.deploy.host import share_heaps
+SHARED
+met, gone = threading.Barrier({THREADS + 1}), threading.Barrier({THREADS + 1})
+libc = ctypes.CDLL(None)
+libc.malloc.restype, libc.malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
+libc.fopen.restype = ctypes.c_void_p
+def take():
+    met.wait()
+    assert libc.malloc(100_000)
+    gone.wait()
+for _ in range({THREADS}):
+    threading.Thread(target=take).start()
+met.wait()
+gone.wait()
+file = libc.fopen(b"/dev/stdout", b"w")
+libc.malloc_info(0, ctypes.c_void_p(file))
+libc.fflush(ctypes.c_void_p(file))
+"""
+SHORT_RUN = ["duration_s=0.5", "robots.flock.count=3"]
+
+
+def refuses(*_, **__):
+    raise FULL
+
+
+def assert_names(error, path):
+    """One line with the path, the cause and the cure."""
+    assert error.startswith(f"error: {path} ")
+    assert NO_ROOM in error
+    assert "df -h" in error
+    assert len(error.splitlines()) == 1
+
+
+def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_path):
+    disk, left = tmp_path / "disk", tmp_path / "left"
+    disk.mkdir()
+    if shutil.which("unshare") is None:
+        pytest.skip("mount namespaces: there is no unshare")
+    command = [sys.executable, "-m", "swarmwire.deploy", "run", LOSSY, "--set", "duration_s=4", "--out", disk / "run"]
+    run = ["unshare", "--mount", "sh", "-c", IN_SMALL, disk, left, *command]
+    told = subprocess.run(list(map(str, run)), capture_output=True, text=True, timeout=100, check=False)
+    if not left.exists():
+        pytest.skip(f"mount namespaces: {told.stderr.strip()}")
+    assert told.returncode == 1
+    *before, last = told.stderr.splitlines()
+    assert_names(last, disk / "run" / "summary.json")
+    assert before
+    assert all(line.startswith("observer ") for line in before)
+    assert "4 s in" in told.stdout
+    assert "observer_failed_TickRecorder" in told.stdout
+    states = {finding.part: finding.state for finding in verify(left)}
+    assert states["static.json"] is states["run.json"] is states["log.txt"] is State.INTACT
+    assert State.DAMAGED not in states.values()
+
+
+def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(
+        folder, "write_text", lambda path, text: (refuses if path.name == SUMMARY else write_text)(path, text)
+    )
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
+    assert code == 1
+    assert_names(errors, tmp_path / "run" / "summary.json")
+    assert "trajectory" in out
+    assert (tmp_path / "run" / "ticks.parquet").exists()
+
+
+def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(provenance, "write_text", refuses)
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
+    assert (code, out) == (1, "")
+    assert_names(errors, tmp_path / "run")
+    assert f"failed to start: {tmp_path}/run " in (tmp_path / "run" / "log.txt").read_text()
+
+
+@pytest.fixture
+def few_files():
+    """The limit is low, and may be raised."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (OWN_FILES + 100, before[1]))
+    yield before[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
+def test_a_run_raises_its_limit_of_open_files_as_far_as_it_needs(few_files):
+    need_open_files(100)
+    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (OWN_FILES + 100, few_files)
+    need_open_files(200)
+    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (OWN_FILES + 200, few_files)
+
+
+def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
+    few = "import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)); "
+    call = "from swarmwire.deploy.cli.app import main; sys.argv[0] = 'swarmwire'; main()"
+    command = [sys.executable, "-c", few + call, "run", LOSSY, "--runners", "per-robot", "--out", tmp_path / "run"]
+    told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
+    assert told.returncode == 2
+    (line,) = told.stderr.splitlines()
+    for said in ("error: this machine: ", f"at least {OWN_FILES + 20} open files", "got 64 ", "ulimit -n"):
+        assert said in line
+    assert not (tmp_path / "run").exists()
+
+
+def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys):
+    started, start = [], start_new_thread
+
+    def limited(*arguments):
+        if len(started) == OWN_THREADS:
+            raise RuntimeError("can't start new thread")
+        started.append(start(*arguments))
+
+    monkeypatch.setattr("swarmwire.deploy.host.start_new_thread", limited)
+    code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
+    assert code == 2
+    assert errors.startswith("error: this machine: ")
+    for said in ("for 10 runners", f"got {OWN_THREADS} ", "ulimit -u"):
+        assert said in errors
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_machine_has_room_for_the_threads_of_a_few_runners():
+    need_threads(10)
+    with pytest.raises(BadInput, match="open files .*1000000000 runners"):
+        need_open_files(1_000_000_000)
+
+
+def heaps(first: str) -> int:
+    """How many heaps a process has whose threads all took memory at the same time."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.replace("SHARED", first)], capture_output=True, text=True, check=True, timeout=60
+    )
+    return done.stdout.count("<heap nr=")
+
+
+@pytest.mark.skipif(
+    not hasattr(ctypes.CDLL(None), "malloc_info"), reason="only glibc, whose heaps these are, tells how many there are"
+)
+def test_threads_share_two_heaps() -> None:
+    assert heaps("share_heaps()") == 2 < heaps("")
+
+
+class Policies(Observer):
+    """Observer that asks how the system schedules each runner."""
+
+    def __init__(self) -> None:
+        self.found = list[int]()
+
+    def see(self, truth: Truth) -> None:
+        """Ask, in every tick."""
+        agent_host = [child for child in psutil.Process().children() if "swarmwire.agent.agent_host" in child.cmdline()]
+        self.found = [os.sched_getscheduler(runner.pid) for process in agent_host for runner in process.children()]
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="the system has no scheduling in batches")
+@pytest.mark.parametrize(("realtime", "policy"), [(None, "SCHED_BATCH"), (2.0, "SCHED_OTHER")])
+def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime: float | None, policy: str) -> None:
+    policies = Policies()
+    run(
+        EXAMPLES / "protocol" / "flock.toml",
+        overrides=SHORT_RUN,
+        runners=2,
+        realtime=realtime,
+        observers=[policies],
+    )
+    assert policies.found == [getattr(os, policy)] * 2
+
+
+def test_a_socket_that_a_run_left_behind_is_taken_over(tmp_path):
+    stale = tmp_path / "s"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(stale))
+    assert run(LOSSY, overrides=["duration_s=0.5"], runners=1, socket=stale).ticks == 5

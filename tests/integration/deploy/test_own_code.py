@@ -1,0 +1,200 @@
+"""The command line with code of the user's: new projects and custom metrics."""
+
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import RunFolder, Simulation, repeat, run
+from swarmwire.deploy.cli.inspect import new_swarm
+from swarmwire.metrics.drawing.film import film_of
+from tests.docs.pages import files_of
+from tests.support.custom_code import CODE, install
+from tests.support.deploy.runs import called, run_spread
+
+HEAVY = ("numba", "pydantic", "pymunk", "scipy", "polars", "zenoh", "matplotlib", "rerun")
+FROM_ZERO = "metrics.1.from_m=0.0"
+SCENARIO = """
+format = 1
+name = "spread"
+duration_s = 1.0
+metrics = ["spread.py:Spread"]
+[arena]
+size_m = [4.0, 4.0]
+[robots.a]
+body = "epuck"
+count = 3
+agent = "swarmwire.agent.behaviours:Avoidance"
+"""
+
+
+def test_help_waits_for_no_heavy_library():
+    code = f"import sys, swarmwire.deploy.cli.app; print([name for name in {HEAVY} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.strip() == "[]"
+
+
+def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = called(monkeypatch, capsys, "robots", "deploy", "--help")
+    assert "as it was, and others go on; to do it again does only what is missing. Robots" in out
+    assert "  swarmwire robots deploy fleet.toml --group red --restart" in out
+
+
+def test_it_says_its_version(monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "--version")
+    assert (code, out, errors) == (0, f"swarmwire {version('swarmwire-deploy')}\n", "")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    return new_swarm("my_swarm", tmp_path_factory.mktemp("new"))[0].parent
+
+
+def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=100, cwd=cwd, check=False, env=environment)
+
+
+def own_tests(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return python("pytest", "-q", "-p", "no:cacheprovider", *arguments, cwd=folder)
+
+
+def test_the_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeypatch, capsys):
+    code, out, errors = called(monkeypatch, capsys, "new", "my_swarm", "--in", tmp_path)
+    assert (code, errors) == (0, "")
+    names = {path.name for path in (tmp_path / "my_swarm").iterdir()}
+    assert names == {"agent.py", "scenario.toml", "test_my_swarm.py", "README.md"}
+    assert f"swarmwire run {tmp_path}/my_swarm/scenario.toml" in out
+
+
+def test_its_files_know_its_name_and_nothing_is_left_to_fill_in(made):
+    for path in made.iterdir():
+        assert "$" not in path.read_text()
+    assert 'name = "my_swarm"' in (made / "scenario.toml").read_text()
+    assert "`test_my_swarm.py`" in (made / "README.md").read_text()
+
+
+def test_it_checks_and_runs_as_it_is_made(made, tmp_path, monkeypatch, capsys):
+    scenario = made / "scenario.toml"
+    checked = called(monkeypatch, capsys, "check", scenario)[1]
+    assert ": 10 x epuck" in checked
+    assert checked.endswith("Hz, engine discs\n")
+    code, out, _ = called(monkeypatch, capsys, "run", scenario, "--set", "duration_s=2", "--out", tmp_path / "out")
+    assert code == 0
+    assert "my_swarm" in out
+    assert (tmp_path / "out" / "summary.json").is_file()
+
+
+def test_its_own_test_passes_as_it_is_made(made):
+    ended = own_tests(made)
+    assert ended.returncode == 0, ended.stdout
+    assert "3 passed" in ended.stdout
+
+
+def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path):
+    folder = new_swarm("idle", tmp_path)[0].parent
+    agent = folder / "agent.py"
+    text = agent.read_text()
+    head = text[: text.index("        heading_rad = robot")]
+    agent.write_text(f"{head}        return\n")
+    ended = own_tests(folder, "-k", "hear or move")
+    assert ended.returncode == 1
+    assert "2 failed" in ended.stdout
+
+
+def test_it_follows_ruffs_default_rules(made):
+    ended = python("ruff", "check", "--isolated", "--no-cache", ".", cwd=made)
+    assert ended.returncode == 0, ended.stdout
+
+
+@pytest.mark.parametrize("name", ["", "My", "2fast", "my-swarm", "a/b", "..", "a b", "a" * 41])
+def test_a_bad_name_is_refused_and_nothing_made(tmp_path, name):
+    with pytest.raises(BadInput, match="small letters"):
+        new_swarm(name, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine").mkdir()
+    code, out, errors = called(monkeypatch, capsys, "new", "mine", "--in", tmp_path)
+    assert (code, out) == (2, "")
+    assert errors.startswith(f"error: {tmp_path}/mine: ")
+    assert not list((tmp_path / "mine").iterdir())
+
+
+def test_a_place_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(BadInput) as refused:
+        new_swarm("mine", tmp_path / "absent")
+    assert str(tmp_path / "absent") in refused.value.where
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    (tmp_path / "spread.py").write_text(files_of("docs/api/metrics.md")["spread.py"])
+    (tmp_path / "s.toml").write_text(SCENARIO)
+    return tmp_path / "s.toml"
+
+
+@pytest.mark.parametrize("runners", [None, 2])
+def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alone(tmp_path, scenario, runners):
+    result = run_spread(scenario, runners, out=tmp_path / "run")
+    folder = RunFolder(tmp_path / "run")
+    ticks = folder.metrics()
+    assert list(folder.measured) == list(result.metrics)
+    assert (folder.measured["spread"].unit, film_of(folder, 0, "").facts["spread"].kind) == ("m", "level")
+    assert result.metrics["spread"].final == ticks["spread"][-1] > 0.0
+    (tmp_path / "spread.py").unlink()
+    again = repeat(tmp_path / "run", out=tmp_path / "again")
+    assert again.same
+    assert again.changes == ()
+    assert RunFolder(tmp_path / "again").metrics()["spread"].equals(ticks["spread"])
+
+
+def test_its_parameters_are_kept_with_the_run(tmp_path, scenario):
+    (tmp_path / "spread.py").write_text(CODE)
+    listed = 'metrics=["order", { metric = "spread.py:East", from_m = 1.0 }]'
+    result = run(scenario, overrides=[listed, "metrics.1.from_m=2.0"], out=tmp_path / "run")
+    (tmp_path / "spread.py").unlink()
+    again = repeat(tmp_path / "run")
+    assert again.changes == ()
+    assert again.result.metrics["east"] == result.metrics["east"]
+    east, two_metres_on = (run(tmp_path / "run" / "scenario.toml", overrides=over) for over in ([], [FROM_ZERO]))
+    assert two_metres_on.metrics["east"].final == pytest.approx((east.metrics["east"].final or 0.0) + 2.0)
+
+
+def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path, scenario, monkeypatch):
+    install(tmp_path / "site", "wind_metrics", {"east": "East"})
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    result = run(scenario, overrides=['metrics=["east"]'], out=tmp_path / "run")
+    assert "wind_metrics" in result.facts.modules
+    assert RunFolder(tmp_path / "run").metrics()["east"][-1] == result.metrics["east"].final
+    assert repeat(tmp_path / "run").changes == ()
+    (tmp_path / "site" / "wind_metrics.py").write_text(CODE + "# a word more\n")
+    (change,) = repeat(tmp_path / "run").changes
+    assert "wind_metrics" in change
+
+
+@pytest.mark.parametrize("names", [[], ["order"]])
+def test_without_the_standard_ones_a_run_has_those_that_are_listed(tmp_path, scenario, names):
+    settings = [f"metrics={names}", "standard_metrics=false"]
+    result = run(scenario, overrides=settings, out=tmp_path / "run")
+    assert list(result.metrics) == names
+    assert RunFolder(tmp_path / "run").metrics().columns == ["tick", "time_s", *names, "sent", "received", "in_range"]
+    assert result.record["ticks"]["rows"] == 10
+    assert not [name for name in result.counts if name.startswith("observer_failed")]
+    assert result.trajectory_sha256 == run(scenario).trajectory_sha256
+
+
+def test_it_changes_nothing_of_the_run(scenario):
+    assert run(scenario).trajectory_sha256 == run(scenario, overrides=["metrics=[]"]).trajectory_sha256
+
+
+def test_one_that_is_not_there_is_refused_before_the_run(scenario):
+    with pytest.raises(BadInput, match=r"s.toml: metrics\.0: .*'None'"):
+        Simulation(scenario, overrides=['metrics=["spread.py:None"]'])

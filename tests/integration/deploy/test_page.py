@@ -1,0 +1,234 @@
+"""The page."""
+
+import io
+import json
+import signal
+import sys
+import urllib.error
+import urllib.request
+
+import psutil
+import pytest
+from rich.console import Console
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import UI
+from swarmwire.deploy.live.live_view import PageBeside
+from swarmwire.deploy.simulation import Simulation, finished
+from tests.support.clocks import until
+from tests.support.deploy.page import chromium, family, paged
+from tests.support.deploy.runs import LOSSY, called
+
+TICKS = """(count) => new Promise((done) => {
+  const news = new EventSource("news"), ticks = [];
+  news.addEventListener("status", (event) => {
+    ticks.push(JSON.parse(event.data).tick);
+    if (ticks.length === count) { news.close(); done(ticks); }
+  });
+})"""
+
+
+@pytest.mark.parametrize("command", [["/none/such"], [sys.executable, "-c", "import sys; sys.exit('no page today')"]])
+def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, monkeypatch, capsys):
+    out = io.StringIO()
+    simulation = Simulation(LOSSY, overrides=["duration_s=0.5"], out=tmp_path / "run")
+    with PageBeside(simulation, tmp_path / "run", Console(file=out, width=40)) as page:
+        monkeypatch.setattr(page, "_command", command)
+        simulation.watch(page)
+        result = finished(simulation)
+    assert (result.ended, result.ticks) == ("duration", 5)
+    assert "no live view" in capsys.readouterr().err or out.getvalue() == "no page today\n"
+
+
+@pytest.mark.parametrize(("paused", "held"), [(True, "paused: swarmwire ctl resume"), (False, "going on")])
+def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path, monkeypatch, paused, held):
+    out = io.StringIO()
+    simulation = Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run")
+    page = PageBeside(simulation, tmp_path / "run", Console(file=out))
+    monkeypatch.setattr(page, "_command", [sys.executable, "-c", "import sys; sys.stdin.read()"])
+    simulation.watch(page)
+    with page, simulation:
+        simulation.step()
+        simulation.step()
+        if not paused:
+            simulation.controls.resume()
+        assert page.pid is not None
+        psutil.Process(page.pid).kill()
+        until(lambda: out.getvalue().endswith("\n"))
+        assert f"the run is {held}" in out.getvalue()
+        assert "swarmwire ui" in out.getvalue()
+        simulation.controls.set_speed(None)
+        simulation.controls.resume()
+        simulation.run()
+    assert simulation.result.ended == "duration"
+
+
+def test_a_run_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatch):
+    simulation = Simulation(LOSSY, overrides=["duration_s=0.5"], out=tmp_path / "run")
+    page = PageBeside(simulation, tmp_path / "run", Console(quiet=True))
+    monkeypatch.setattr(page, "_command", [sys.executable, "-c", "import sys; sys.stdin.read()"])
+    simulation.watch(page)
+    with page, simulation:
+        assert simulation.controls.paused
+        assert simulation.controls.speed == 1.0
+        simulation.controls.resume()
+        simulation.run()
+    assert simulation.result.ended == "duration"
+
+
+def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r'ui: needs fastapi and uvicorn: pip install "swarmwire\[ui\]"'):
+        UI.need("ui")
+    code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--ui", "--out", tmp_path / "run")
+    assert (code, errors) == (2, 'error: --ui: needs fastapi and uvicorn: pip install "swarmwire[ui]"\n')
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_page_of_no_run_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("RUST_LOG", "off")
+    for arguments in ([], ["3f2a"], [str(tmp_path)]):
+        code, _, errors = called(monkeypatch, capsys, "ui", *arguments)
+        assert code == 2
+        assert errors.startswith("error: ")
+        assert "run that goes on" in errors
+        assert errors.count("\n") == 1
+
+
+pytest.importorskip("fastapi", reason="needs the extra [ui]")
+pytest.importorskip("rerun", reason="needs the extra [view]")
+
+
+@pytest.fixture
+def run(tmp_path):
+    with paged(LOSSY, tmp_path / "run", "--no-rrd") as started:
+        yield started
+
+
+def at_tick(page, tick):
+    """The page has come to show this tick."""
+    page.wait_for_selector(f'#ticks[data-tick="{tick}"]')
+
+
+def ticks(page):
+    """The ticks of the next five looks at the run."""
+    return page.evaluate(TICKS, 5)
+
+
+def status(address):
+    """What the page would tell, read without a browser."""
+    with urllib.request.urlopen(f"{address}status", timeout=20) as answer:
+        return json.load(answer)
+
+
+def level(page, name):
+    return float(page.get_attribute(f"[data-name={name}] dd", "data-value"))
+
+
+def test_paused_is_paused_and_steps_are_ticks(run):
+    _, address = run
+    with chromium(address) as page:
+        at_tick(page, 1)  # which the page asked for, so that there is something to see
+        page.wait_for_selector("#state.paused")  # not at once: until its end a tick is told as running
+        assert ticks(page) == [1] * 5
+        for _ in range(3):
+            page.click("#step")
+        at_tick(page, 4)
+        assert ticks(page) == [4] * 5
+        page.click("#step10")
+        at_tick(page, 14)
+        page.keyboard.press("s")
+        at_tick(page, 15)
+        assert ticks(page) == [15] * 5
+        page.keyboard.press("+")
+        until(lambda: page.inner_text("#speed-now"), lambda told: told == "× 2")
+        page.keyboard.press(" ")
+        page.wait_for_selector("#state.running")
+        until(lambda: int(page.get_attribute("#ticks", "data-tick")), lambda tick: tick > 25)
+        page.keyboard.press(" ")
+        page.wait_for_selector("#state.paused")
+        paused_at = ticks(page)
+        assert len(set(paused_at)) == 1
+        assert paused_at[0] > 25
+
+
+def test_loss_slid_to_1_takes_the_network_apart_and_slid_back_it_is_one_again(run):
+    _, address = run
+    with chromium(address) as page:
+        at_tick(page, 1)
+        whole = level(page, "components")
+        slider = page.locator("#radio-loss")
+        slider.focus()
+        slider.press("End")
+        page.click("#step10")
+        at_tick(page, 11)
+        assert level(page, "components") == 20 > whole
+        assert page.inner_text("#events li >> nth=0").split("\n")[:2] == ["tick 1", "radio.loss = 1.0 by hand"]
+        slider.focus()
+        slider.press("Home")
+        page.click("#step")
+        at_tick(page, 12)
+        assert level(page, "components") == whole
+
+
+def test_robots_die_and_act_again_and_halves_part_and_heal(run):
+    _, address = run
+    with chromium(address) as page:
+        at_tick(page, 1)
+        page.select_option("#robot", "flock-3")
+        page.click("#kill")
+        page.wait_for_selector("text=next tick")
+        page.click("#step")
+        at_tick(page, 2)
+        assert level(page, "alive") == 19
+        page.wait_for_selector("#events li:has-text('kill: flock-3')")
+        page.click("#revive-all")
+        page.click("#halve-x")
+        page.click("#step")
+        at_tick(page, 3)
+        assert level(page, "alive") == 20
+        parted = level(page, "components")
+        assert parted > 1
+        page.click("#heal")
+        page.wait_for_selector("#heal:disabled")
+        page.click("#step")
+        at_tick(page, 4)
+        assert level(page, "components") < parted
+        assert page.is_disabled("#jam")
+        assert "disk radio" in page.inner_text("#jam-why")
+
+
+def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays(run):
+    process, address = run
+    with chromium(address) as page:
+        at_tick(page, 1)
+        page.click("#stop")
+        assert ticks(page) == [1] * 5
+        page.click("#stop")
+        page.wait_for_selector("#state.over")
+        assert page.is_disabled("#play")
+        assert "the run is over" in page.inner_text("#said")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 130
+
+
+def test_the_whole_of_it_listens_on_loopback_and_without_the_token_nothing_is_told(run):
+    process, address = run
+    sockets = [c for one in family(process.pid) for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+    assert len(sockets) == 3  # the page, rerun's pages and what draws in them
+    assert {socket.laddr.ip for socket in sockets} == {"127.0.0.1"}
+    origin = "/".join(address.split("/")[:3])
+    for path in ("/", "/status", "/news", "/do", f"/x{address.split('/')[3]}/"):
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(f"{origin}{path}", timeout=20)
+    until(lambda: status(address), lambda told: (told["state"], told["tick"]) == ("paused", 1))
+
+
+def test_nothing_reaches_beyond_a_narrow_window(run):
+    _, address = run
+    with chromium(address) as page:
+        at_tick(page, 1)
+        for width in (390, 800, 1400):
+            page.set_viewport_size({"width": width, "height": 900})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,267 @@
+"""`swarmwire radio`: probes of a radio, and radios fitted to logs."""
+
+import json
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.config.phy import Shadowing
+from swarmwire.deploy.cli.app import app
+from swarmwire.world.scenario_file import scenario_from
+from tests.support.deploy.runs import LOSSY, ROOT, called
+from tests.support.metrics.radio import csv_of, made
+
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
+REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
+HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m\n"
+SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def said(*arguments: str | Path) -> str:
+    done = CliRunner().invoke(app, ["radio", "probe", *map(str, arguments)])
+    if done.exception is not None:
+        raise done.exception
+    return done.stdout
+
+
+def contention(*arguments: str) -> dict[str, float]:
+    return json.loads(said(*arguments, "--runs", "2", "--measured-s", "0.5"))
+
+
+def coverage(*arguments: str | Path) -> dict[str, Any]:
+    return json.loads(said(*arguments, "--json"))
+
+
+def test_contention_costs_delivery_and_time():
+    few, many = (contention("ieee802154", "--contention", f"{nodes},20,0.1") for nodes in (2, 40))
+    assert few["delivery_ratio"] > 0.95 > many["delivery_ratio"]
+    assert few["mean_delay_s"] < many["mean_delay_s"]
+
+
+def test_values_of_the_radio_may_be_set():
+    assert contention("ideal", "--contention", "3,20,0.1", "--set", "radio.loss=1.0")["delivery_ratio"] == 0.0
+
+
+def test_a_disk_covers_its_circle_from_the_place_or_the_robot():
+    found = coverage(LOSSY, "--at", "-1,0", "--seed", "4")
+    assert (found["seed"], found["range_m"], found["sensitivity_dbm"], found["map"]["mean_dbm"]) == (4, 2.0, None, None)
+    assert found["map"]["at_m"] == [-1.0, 0.0]
+    assert 0.15 < found["in_range_share"] < 3.15 * 2.0**2 / 64
+    assert found["by_distance"]["delivery"]["high"][0] == 0.7
+    assert found["by_distance"]["delivery"]["high"][-1] == 0.0
+    robots = [coverage(LOSSY, *which)["map"]["at_m"] for which in ((), ("--from", "flock-0"), ("--from", "flock-19"))]
+    assert robots[0] == robots[1] != robots[2]
+
+
+def test_signals_have_a_strength_that_walls_and_distance_take():
+    found = coverage(WALLED, "--at", "0,1", "--bytes", "20", "--set", "radio.walls.crossing_db=60")
+    x_m, y_m, mean_dbm = (found["map"][name] for name in ("x_m", "y_m", "mean_dbm"))
+    column = min(range(len(x_m)), key=lambda i: abs(x_m[i]))
+    below, above = (mean_dbm[min(range(len(y_m)), key=lambda i: abs(y_m[i] - y))][column] for y in (2.5, 3.5))
+    assert above < below - 55.0
+    assert found["payload_bytes"] == 20
+    strength = found["by_distance"]["mean_dbm"]["mean"]
+    assert strength[0] > strength[-1]
+
+
+def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
+    jammed = ROOT / "scenarios" / "jammed.toml"
+    base, strong = (
+        coverage(jammed, "--from", "lead-0", "--set", f"robots.lead.radio.power_dbm={dbm}") for dbm in (-25.0, -5.0)
+    )
+    assert base["map"]["at_m"] == strong["map"]["at_m"]
+    by_distance = [found["by_distance"]["mean_dbm"]["mean"] for found in (base, strong)]
+    assert by_distance[1][5] == pytest.approx(by_distance[0][5] + 20.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "where", "key"),
+    [
+        (("x", "--contention", "2,20,0.1"), "radio", ""),
+        (("unit-disk", "--contention", "1,20,0.1"), "--contention", ""),
+        (("unit-disk",), "--contention", ""),
+        (("unit-disk", "--at", "0,0"), "--at", ""),
+        (("ideal", "--contention", "2,20,0.1", "--set", "radio.trace.file=a.csv"), "radio", "radio.trace"),
+        ((LOSSY, "--contention", "2,20,0.1"), "--contention", ""),
+        ((LOSSY, "--at", "0,9"), "--at", ""),
+        ((LOSSY, "--at", "nan,0"), "--at", ""),
+        ((LOSSY, "--at", "1"), "--at", ""),
+        ((LOSSY, "--at", "1,1", "--from", "flock-0"), "--from", ""),
+        ((LOSSY, "--from", "flock-20"), "--from", ""),
+        ((LOSSY, "--bytes", "101"), "--bytes", ""),
+        ((LOSSY, "--to", "a.txt"), "a.txt", ""),
+        ((ROOT / "scenarios" / "avoidance.toml",), str(ROOT / "scenarios" / "avoidance.toml"), "radio"),
+        ((REPLAYED,), str(REPLAYED), "radio.trace.others"),
+    ],
+)
+def test_what_makes_no_probe_is_refused(arguments, where, key):
+    with pytest.raises(BadInput) as error:
+        said(*arguments)
+    assert (error.value.where, error.value.key) == (where, key)
+
+
+def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, monkeypatch, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
+    to = ["--to", "fit.png", "--write", "radio.toml", "--power-dbm", "4", "--size", "400"]
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", *to)
+    assert (code, errors) == (0, "")
+    for words in ("path loss exponent", "standard error", "correlation distance", "bursts: mean", "root mean square"):
+        assert words in out
+    assert out.endswith("written: fit.png\nwritten: radio.toml\n")
+    assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
+    radio = tomllib.loads((here / "radio.toml").read_text())["radio"]
+    assert sorted(radio) == ["antenna", "bursts", "log_distance", "model", "shadowing"]
+    assert 42.0 < radio["log_distance"]["reference_loss_db"] < 46.0
+
+
+@pytest.mark.parametrize("farthest_m", [2.0, 9.0, 15.5, 400.0, 1e6])
+def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthest_m):
+    pytest.importorskip("matplotlib", reason="needs the extra [report]")
+    from swarmwire.metrics.drawing import canvas, radio_fit
+
+    drawn = []
+    monkeypatch.setattr(radio_fit, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
+    step = math.log10(farthest_m / 1.2) / 19
+    (here / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png", "--size", "400")
+    assert (code, errors) == (0, "")
+    axis, (low, high) = drawn[0].axes[0].xaxis, drawn[0].axes[0].get_xlim()
+    shown = [label.get_text() for label in axis.get_ticklabels() if low <= label.get_position()[0] <= high]
+    assert 2 <= len([text for text in shown if text]) <= 20
+
+
+def test_people_get_a_table_and_a_picture(tmp_path):
+    text = said(WALLED, "--to", tmp_path / "coverage.png", "--size", "400")
+    assert "sensitivity -101.0 dBm" in text
+    assert "% of the arena in range" in text
+    assert max(len(line) for line in text.splitlines() if "│" in line) <= 80
+    assert text.splitlines()[-1] == f"written: {tmp_path / 'coverage.png'}"
+    assert (tmp_path / "coverage.png").read_bytes().startswith(b"\x89PNG")
+    json.loads(said(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
+    assert "</svg>" in (tmp_path / "disk.svg").read_text()
+
+
+def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(here, monkeypatch, capsys):
+    (here / "log.csv").write_text(SMALL)
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "log.csv")
+    assert code == 0
+    for said in ("shadowing: needs positions", "losses: needs 100 packets, got 20"):
+        assert f"left out: {said}" in out
+    assert "log_distance" in tomllib.loads(out[out.index("# Fitted to") :])["radio"]
+
+
+def rows(count, rssi_dbm, distance_m, received=lambda _: True):
+    lines = (f"{i},a,b,{i},{rssi_dbm(i) if received(i) else ''},{distance_m(i)}\n" for i in range(count))
+    return HEAD + "".join(lines)
+
+
+def falling(i):
+    return -50.0 - 30.0 * math.log10(1 + i % 20)
+
+
+LOGS = {
+    "falls": rows(200, falling, lambda i: 1 + i % 20),
+    "strong": rows(200, lambda i: 90.0 + falling(i), lambda i: 1 + i % 20),
+    "rises": rows(200, lambda i: -60 + i % 20, lambda i: 1 + i % 20),
+    "one-place": rows(200, lambda _: -60, lambda _: 2, lambda i: i % 7),
+    "bursts": rows(2000, lambda _: -60, lambda _: 2, lambda i: i % 50 > 9),
+    "far": rows(200, falling, lambda i: 10.0 ** (i % 20)),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_whatever_is_written_a_scenario_takes(here, monkeypatch, capsys, name):
+    (here / "log.csv").write_text(LOGS[name])
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    assert (code, errors) == (0, "")
+    text = (here / "radio.toml").read_text()
+    radio = tomllib.loads(text)["radio"]
+    scenario = tomllib.loads((ROOT / "scenarios" / "flocking-lossy.toml").read_text())
+    whole = "model" in radio
+    assert whole == (name in ("falls", "strong"))
+    assert ("# Without path loss this is no radio yet" in text) == ("# Left out: path loss: " in text) == (not whole)
+    kept = {} if whole else {"range_m": 2.0}
+    taken = scenario_from({**scenario, "radio": {**kept, **radio}}, "radio.toml").radio
+    assert taken is not None
+    assert ("bursts" in radio) == (name == "bursts")
+
+
+@pytest.mark.parametrize(
+    ("text", "reasons"),
+    [
+        (f"{HEAD}0,a,b,0,-50,1\n", ("path loss: needs 10 ", "losses: needs 100 ")),
+        (
+            rows(150, falling, lambda _: 2, lambda _: False),
+            ("got 0", "losses: .*150"),
+        ),
+        (rows(50, lambda _: -60, lambda _: 2), ("path loss: .*distances", "losses: needs 100 ")),
+        (rows(50, lambda _: -60, lambda i: 1 + i), ("path loss: RSSI", "losses: needs 100 ")),
+    ],
+)
+def test_a_log_that_tells_nothing_is_refused_with_the_reasons_and_nothing_is_written(
+    here, monkeypatch, capsys, text, reasons
+):
+    (here / "log.csv").write_text(text)
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    assert (code, out) == (2, "")
+    assert errors.startswith("error: log.csv: ")
+    assert errors.count("\n") == 1
+    assert all(re.search(reason, errors) for reason in reasons)
+    assert not (here / "radio.toml").exists()
+
+
+def test_a_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypatch, capsys):
+    slow = (f"{i * 1e6},a,b,{i},{-60 if i % 50 > 9 else ''},2\n" for i in range(2000))
+    (here / "log.csv").write_text(HEAD + "".join(slow))
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv")
+    assert (code, out) == (2, "")
+    assert errors.startswith("error: log.csv: fitted radio.bursts.")
+    assert "no scenario takes" in errors
+
+
+def test_one_packet_is_no_packets(here, monkeypatch, capsys):
+    (here / "log.csv").write_text(SMALL)
+    assert "20 packets on 1 link, 20 received" in called(monkeypatch, capsys, "radio", "fit", "log.csv")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "where"),
+    [
+        (["log.csv", "--power-dbm", "nan"], "--power-dbm"),
+        (["log.csv", "--gain-dbi", "nan"], "--gain-dbi"),
+        (["log.csv", "--power-dbm", "inf"], "--power-dbm"),
+        (["absent.csv"], "absent.csv"),
+        (["log.csv", "--write", "radio.json"], "radio.json"),
+        (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml"),
+        (["log.csv", "--to", "fit.bmp"], "fit.bmp"),
+        (["log.csv", "--within", "0.5"], "--within"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, arguments, where):
+    (here / "log.csv").write_text(SMALL)
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
+    assert (code, out, errors.count("\n")) == (2, "", 1)
+    assert errors.startswith(f"error: {where}: ")
+
+
+def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
+    rows = [f"{0.1 * i},a,b,{i},{0.9 if i % 4 == 0 else 0.01 + 1e-5 * i}\n" for i in range(200)]
+    (here / "received[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
+    code, out, _ = called(monkeypatch, capsys, "radio", "fit", "received[1].csv")
+    assert code == 0
+    assert out.startswith("received[1].csv: 200 packets")
+    assert "no distribution of [radio.delays] fits" in " ".join(out.split())

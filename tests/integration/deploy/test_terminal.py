@@ -1,0 +1,255 @@
+"""Commands at a terminal: keys, the panel, Ctrl-C, and the commands of a world."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from swarmwire.agent.joining import JoinSettings, join
+from swarmwire.agent.runner import Arrivals
+from swarmwire.comms.errors import RunnerLost
+from swarmwire.deploy import RunFolder, repeat, run
+from tests.support.deploy.pseudo_terminal import terminal
+from tests.support.deploy.runs import LOSSY, called, swarmwire
+
+LONG = ["--set", "duration_s=3600"]
+FAULTY = """
+from swarmwire.agent import Agent, Robot
+
+class Faulty(Agent):
+    def step(self, robot: Robot) -> None:
+        if robot.time_s > 0.35:
+            raise ZeroDivisionError("too much")
+"""
+SHORT = ("--set", "duration_s=2")
+
+
+def tick(picture: str) -> int:
+    found = re.search(r"tick +(\d+)/36000", picture)
+    return int(found[1]) if found else -1
+
+
+def test_keys_pause_step_and_end_a_run(tmp_path):
+    with terminal("run", LOSSY, *LONG, "--out", tmp_path / "run") as user:
+        user.wait(lambda picture: "running" in picture and tick(picture) > 0)
+        assert user.changed()
+        user.type(" ")
+        stands = tick(user.wait(lambda picture: "paused" in picture))
+        for _ in range(3):
+            assert tick(user.wait(lambda _: True)) == stands
+        user.type("s")
+        assert tick(user.wait(lambda picture: tick(picture) > stands)) == stands + 1
+        user.type("x\x1b[A?")  # neither x nor an arrow means anything
+        assert tick(user.wait(lambda picture: "one tick, then pause again" in picture)) == stands + 1
+        user.type(" ")
+        user.wait(lambda picture: tick(picture) > stands + 1)
+        user.type("-")
+        user.wait(lambda picture: "at most" in picture)
+        user.type("q")
+        text = user.rest()
+        assert user.process.returncode == 130
+        assert not user.changed()
+        assert user.output.rfind(b"\x1b[?25h") > user.output.rfind(b"\x1b[?25l")  # the cursor is there again
+    after = text[text.rindex("─╯") :]
+    assert "interrupted" in after
+    assert "swarmwire view" in after
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["ended"] == "interrupted"
+    assert summary["ticks"] > stands + 1
+
+
+def test_ctrl_c_ends_a_run_in_real_time_over_runners_and_gives_the_terminal_back(tmp_path):
+    arguments = ["--runners", "2", "--realtime", "10", "--out", tmp_path / "run"]
+    with terminal("run", LOSSY, *LONG, *arguments, columns=120, rows=40) as user:
+        user.wait(lambda picture: "2 ready · 0 lost" in picture and tick(picture) > 0)
+        user.type("+")
+        user.wait(lambda picture: "real time x 20" in picture)
+        user.type("\x03")
+        user.rest()
+        assert user.process.returncode == 130
+        assert not user.changed()
+    realtime = json.loads((tmp_path / "run" / "summary.json").read_text())["realtime"]
+    assert realtime["factor"] == 20.0
+
+
+def test_a_run_that_fails_gives_the_terminal_back(tmp_path):
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    agent = ["--set", f"robots.flock.agent={tmp_path / 'faulty.py'}:Faulty", "--set", "robots.flock.params={}"]
+    with terminal("run", LOSSY, *agent, "--out", tmp_path / "run") as user:
+        text = user.rest()
+        assert user.process.returncode == 1
+        assert not user.changed()
+    assert "too much" in text[text.rindex("─╯") :]
+
+
+def test_without_a_terminal_there_are_plain_lines(tmp_path):
+    ended = swarmwire("run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
+    assert "\x1b" not in ended.stdout
+    lines = [line for line in ended.stdout.splitlines() if line.startswith("tick ")]
+    assert [line.split(",")[0] for line in lines] == ["tick 5/20", "tick 10/20", "tick 15/20", "tick 20/20"]
+    for line in lines:
+        assert re.search(r", order [\d.]+, largest_component [\d.]+, components \d+, link PDR so far [\d.]+$", line)
+
+
+def test_who_wants_quiet_gets_no_panel(tmp_path):
+    with terminal("run", LOSSY, "--set", "duration_s=1", "--quiet", "--out", tmp_path / "run") as user:
+        assert user.rest() == ""
+        assert user.process.returncode == 0
+
+
+def test_closing_the_terminal_ends_a_run_with_its_summary(tmp_path):
+    with terminal("run", LOSSY, *LONG, "--runners", "2", "--out", tmp_path / "run") as user:
+        user.wait(lambda picture: tick(picture) > 0)
+        user.close()
+        assert user.process.wait(20.0) == 129
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["ended"] == "interrupted"
+
+
+@contextmanager
+def world(folder: Path, *arguments: str | Path) -> Generator["subprocess.Popen[str]"]:
+    """A world in a process of its own that is ended with the test."""
+    command = [sys.executable, "-m", "swarmwire.deploy", "world", LOSSY, *SHORT, "--out", folder, *arguments]
+    process = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+def listens_at(process: "subprocess.Popen[str]") -> tuple[str, str]:
+    """Where a world listens, and what it says is to be typed elsewhere."""
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    while "listens at" not in line:
+        assert line, process.stderr and process.stderr.read()
+        line = process.stdout.readline()
+    found = re.search(r"listens at (\S+)[,;]", line)
+    assert found
+    return found[1], process.stdout.readline().strip()
+
+
+def test_two_terminals_make_the_same_run_as_one(tmp_path):
+    folder = tmp_path / "run"
+    with world(folder, "--listen", "tcp/127.0.0.1:0", "--observe", "tcp/127.0.0.1:0") as process:
+        endpoint, typed = listens_at(process)
+        assert typed == f"swarmwire join {endpoint} --robots 20"
+        first = subprocess.Popen(
+            [sys.executable, "-m", "swarmwire.agent.cli", "join", endpoint, "--robots", "5"],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().startswith("0 of 20 robots have agents; without: flock-0")
+            assert process.stdout.readline().startswith("5 of 20 robots have agents; without: flock-5")
+            second = swarmwire("join", endpoint, "--scenario", LOSSY)
+            assert (second.returncode, second.stderr.splitlines()[-1]) == (0, "the run is over")
+            out, errors = process.communicate(timeout=60.0)
+            assert first.wait(20.0) == 0
+        finally:
+            first.kill()
+            first.communicate()
+    assert process.returncode == 0
+    assert out.startswith("20 of 20 robots have agents\n")
+    assert len(re.findall(r" joined with .* before the first tick", errors)) == 2
+    summary = RunFolder(folder).summary
+    assert summary is not None
+    assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
+    assert [change["what"] for change in summary["runner_events"]] == ["joined", "joined"]
+    assert repeat(folder).same
+
+
+def test_a_run_that_cannot_be_observed_as_wanted_is_refused_before_anybody_joins(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        at = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        listening = ("--listen", "tcp/127.0.0.1:0", "--observe", at)
+        with world(tmp_path / "run", *listening) as process:
+            _, told = process.communicate()
+    assert process.returncode == 2
+    assert f"--observe: {at}: " in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "run").exists()
+
+
+def test_certificates_are_asked_for_beyond_this_machine(tmp_path, monkeypatch, capsys):
+    code, _, errors = called(monkeypatch, capsys, "world", LOSSY, "--listen", "tcp/0.0.0.0:0", "--out", tmp_path / "x")
+    assert code == 2
+    assert "ca, certificate and key" in errors
+    assert not (tmp_path / "x").exists()
+    code, _, errors = called(monkeypatch, capsys, "join", "tcp/10.0.0.5:7447")
+    assert code == 2
+    assert "beyond this machine" in errors
+
+
+@pytest.fixture
+def certs(tmp_path, monkeypatch, capsys) -> Path:
+    folder = tmp_path / "certs"
+    assert called(monkeypatch, capsys, "certs", "init", folder)[0] == 0
+    for name, purpose in (("world", "world"), ("r1", "runner"), ("r2", "runner"), ("eye", "observer")):
+        issue = ("certs", "issue", folder, name, "--for", purpose, "--host", "127.0.0.1")
+        code, _, errors = called(monkeypatch, capsys, *issue)
+        assert code == 0, errors
+    return folder
+
+
+def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
+    with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", "--certs", certs, "--name", "world") as process:
+        endpoint, typed = listens_at(process)
+        assert typed == f"swarmwire join {endpoint} --robots 20 --certs DIR"
+        stranger = swarmwire("join", endpoint, "--certs", certs, "--name", "eye")
+        assert stranger.returncode == 1
+        assert "let eye in" in stranger.stderr
+        pem = ("--ca", certs / "ca.pem", "--certificate", certs / "r1.pem", "--key", certs / "r1.key")
+        liar = swarmwire("join", endpoint, *pem, "--name", "r2")
+        assert liar.returncode == 1
+        assert "let r2 in" in liar.stderr
+        played = swarmwire("join", endpoint, "--certs", certs, "--name", "r1")
+        assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
+        _, errors = process.communicate(timeout=60.0)
+    assert "r1 joined with flock-0 … flock-19 (20 robots) before the first tick" in errors
+
+
+def test_in_a_terminal_it_shows_who_is_missing_and_ctrl_c_ends_the_waiting(tmp_path):
+    arguments = ("world", LOSSY, "--listen", "tcp/127.0.0.1:0", "--out", tmp_path / "run")
+    with terminal(*arguments) as window:
+        while "0 of 20 robots have agents" not in window.text:
+            assert window._read(), window.text
+        os.kill(window.process.pid, signal.SIGINT)
+        text = window.rest()
+    assert window.process.returncode == 130
+    assert "interrupted" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("nonsense",), "nonsense"),
+        (("tcp/127.0.0.1:1", "--robots", "0"), "got 0"),
+        (("tcp/127.0.0.1:1", "--robots", "1", "--names", "flock-0"), "--robots and --names"),
+        (("tcp/127.0.0.1:1", "--name", "a/*"), "a/*"),
+        (("tcp/127.0.0.1:1", "--scenario", "no.toml"), "no.toml"),
+    ],
+)
+def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why):
+    code, _, errors = called(monkeypatch, capsys, "join", *arguments)
+    assert code == 2
+    assert why in errors
+
+
+def test_where_nobody_listens_it_says_so():
+    with pytest.raises(RunnerLost, match="nobody answers at tcp/127.0.0.1:1$"):
+        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print)

@@ -1,0 +1,321 @@
+"""Animated pages and films of runs."""
+
+import re
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays
+from swarmwire.comms.truth import Group, Obstacle, Static
+from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
+from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color
+from swarmwire.metrics.drawing.film import NO_STATE, Film
+from swarmwire.metrics.drawing.scenario import _facts
+from swarmwire.metrics.drawing.swarm import in_range
+from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+SIZE_PX = 640
+FLOOR, OBSTACLE, MOVABLE = (0xF4, 0xF6, 0xF9), (0xD3, 0xD8, 0xDF), (0xEA, 0xD9, 0xBD)
+TICKS = range(0, 30, 2)
+NEAR = 40  # a colour of a film is that of the picture within so much
+
+
+def color_at(figure: FilmFigure, image: np.ndarray, x_m: float, y_m: float) -> tuple[int, ...]:
+    """What the picture shows at a place of the arena."""
+    column, up = figure._figure.axes[0].transData.transform((x_m, y_m))
+    return tuple(int(value) for value in image[int(len(image) - up), int(column)][:3])
+
+
+def shown(of: Film, index: int, *places_m) -> list[tuple[int, ...]]:
+    figure = FilmFigure(of, SIZE_PX)
+    image = figure.frame(index)
+    return [color_at(figure, image, *place_m) for place_m in places_m]
+
+
+def legend_of(of: Film) -> list[str]:
+    return [text.get_text() for text in FilmFigure(of, SIZE_PX)._figure.legends[0].get_texts()]
+
+
+def facts_of_scenario(static: Static) -> list[tuple[str, str]]:
+    return _facts(static, 1.0, 1.0)
+
+
+def robots_shown(of: Film, index: int) -> list[tuple[int, ...]]:
+    return shown(of, index, *of.pose[index, :, :2])
+
+
+@pytest.mark.parametrize("index", [0, 30])
+def test_robots_have_the_colour_of_their_group_where_they_are(index):
+    assert robots_shown(film(), index) == [robot_color(0), robot_color(0), robot_color(1)]
+
+
+def test_a_frame_shows_only_its_own_tick():
+    of = film(ticks=61)
+    figure = FilmFigure(of, SIZE_PX)
+    figure.frame(0)
+    image = figure.frame(60)
+    assert color_at(figure, image, *of.pose[0, 2, :2]) == FLOOR
+    np.testing.assert_array_equal(image, FilmFigure(of, SIZE_PX).frame(60))
+
+
+def test_the_dead_are_grey_from_the_tick_in_which_they_die():
+    alive = np.ones((31, 3), np.bool_)
+    alive[15:, 1] = False
+    of = film(alive=alive)
+    assert robots_shown(of, 14)[1] == robot_color(0)
+    assert robots_shown(of, 15) == [robot_color(0), DEAD, robot_color(1)]
+
+
+def test_states_colour_the_robots_that_are_in_them():
+    state = np.full((31, 3), NO_STATE)
+    state[:, 1], state[10:, 2] = 1, 0
+    of = film(state=state, state_names=("search", "rest"))
+    assert robots_shown(of, 0) == [OTHER_STATE, STATE_COLORS[1], OTHER_STATE]
+    assert robots_shown(of, 10)[2] == STATE_COLORS[0]
+
+
+def test_of_many_states_the_most_frequent_have_a_colour():
+    names = tuple(f"s{i}" for i in range(len(STATE_COLORS) + 1))
+    state = np.arange(31 * 3).reshape(31, 3) % len(names)
+    state[-1] = [0, 3, 4]
+    state[state == 3] = 4
+    state[-1, 1] = 3  # the rarest: seen once
+    of = film(state=state, state_names=names)
+    assert robots_shown(of, 30) == [STATE_COLORS[0], OTHER_STATE, STATE_COLORS[3]]
+
+
+def test_obstacles_of_every_shape_and_lights_stand_where_they_are():
+    seen = shown(film(), 0, *((o.x_m, o.y_m) for o in OBSTACLES), (LIGHT.x_m, LIGHT.y_m), (2.5, 0.5))
+    assert seen == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
+
+
+def test_obstacles_that_robots_push_look_otherwise_than_fixed_ones_and_the_legend_tells():
+    pillar, box, _ = OBSTACLES
+    static = replace(two_groups(), obstacles=((pillar, replace(box, mass_kg=0.2)),))
+    movable = np.broadcast_to([box.x_m, box.y_m, box.heading_rad], (31, 1, 3))
+    of = film(static=static, movable=movable)
+    assert shown(of, 0, (pillar.x_m, pillar.y_m), (box.x_m, box.y_m)) == [OBSTACLE, MOVABLE]
+    assert "movable" in legend_of(of)
+    assert "movable" not in legend_of(film())
+    assert {"1 cylinder", "1 movable box"} <= {text for _, text in facts_of_scenario(static)}
+
+
+@pytest.mark.parametrize(
+    ("given", "joined"),
+    [
+        ({}, True),
+        ({"alive": np.tile([False, True, True], (31, 1))}, False),
+        ({"static": replace(two_groups(), range_m=1.4)}, False),
+        ({"static": replace(two_groups(), range_m=None)}, False),
+        ({"static": replace(two_groups(), obstacles=((Obstacle("cylinder", -2.6, -1.0, radius_m=0.1),),))}, False),
+    ],
+)
+def test_links_join_robots_alive_in_range_and_sight(given, joined):
+    pixel_m = 0.02
+    across = [(-2.25, -1.0 + up * pixel_m) for up in (-1, 0, 1)]  # half way between two robots
+    assert (shown(film(**given), 0, *across) != [FLOOR] * 3) == joined
+
+
+def test_a_trail_follows_a_robot_that_moved_and_fades():
+    of = film(ticks=101)
+    pose = of.pose[100, 0]
+    near, far, beyond = shown(of, 100, *((pose[0] - behind, pose[1]) for behind in (0.4, 2.0, 3.0)))
+    assert sum(near) < sum(far) < sum(FLOOR)
+    assert beyond == FLOOR  # more than five seconds ago
+
+
+def flying(altitude_m: float) -> Film:
+    """A film in which the first robot, of a group of its own, hovers at this height below one of another group."""
+    body = replace(load_body("footbot"), radius_m=0.4)
+    groups = (Group("air", replace(body, altitude_m=altitude_m), 0, 1), Group("floor", body, 1, 3))
+    static = replace(two_groups(), groups=groups, robot_names=("air-0", "floor-0", "floor-1"))
+    of = film(static=static)
+    of.pose[:, 1, :2] = of.pose[:, 0, :2] + (0.15, 0.15)
+    return of
+
+
+def test_robots_that_fly_lie_above_those_on_the_floor():
+    assert robots_shown(flying(1.0), 0)[0] == robot_color(0)
+    assert robots_shown(flying(0.0), 0)[0] == robot_color(1)
+
+
+def test_only_robots_that_fly_cast_a_shadow():
+    beneath = (-2.7, -1.375)  # just outside the disc
+    (shadow,), (floor,) = shown(flying(1.0), 0, beneath), shown(flying(0.0), 0, beneath)
+    assert floor == FLOOR
+    assert sum(shadow) < sum(FLOOR) - 60
+
+
+def test_the_legend_tells_how_high_a_group_flies():
+    air, floor = legend_of(flying(1.0))[:2]
+    assert (air[:7], "1 m" in air, floor) == ("air (1)", True, "floor (2)")
+
+
+@pytest.mark.parametrize("index", [0, 30])
+def test_a_saved_picture_shows_what_the_frame_does(tmp_path, index):
+    from PIL import Image
+
+    figure = FilmFigure(film(), SIZE_PX)
+    frame = figure.frame(index).copy()
+    figure.save(index, tmp_path / "a.png")
+    saved = np.asarray(Image.open(tmp_path / "a.png").convert("RGB"))
+    assert max(saved.shape) == SIZE_PX
+    np.testing.assert_array_equal(saved, frame)
+
+
+def test_the_sides_of_a_frame_are_even_whatever_its_size():
+    for size_px in (101, 333, 480):
+        height, width, _ = FilmFigure(film(), size_px).frame(0).shape
+        assert height % 2 == width % 2 == 0
+        assert abs(max(height, width) - size_px) <= 1
+
+
+def test_only_metrics_that_have_values_are_plotted_unless_they_are_asked_for():
+    assert len(FilmFigure(film(), 300)._figure.axes) == 2
+    assert len(FilmFigure(film(), 300, ["order", "min_gap"])._figure.axes) == 3
+    assert len(FilmFigure(film(metrics={}), 300)._figure.axes) == 1
+
+
+def test_a_metric_of_the_users_own_is_plotted_by_its_numbers_alone():
+    axes = FilmFigure(film(metrics={"my_share": np.linspace(0.2, 0.5, 31)}), 300, ["my_share"])._figure.axes[1]
+    low, high = axes.get_ylim()
+    assert axes.get_title(loc="left") == "my share"
+    assert low <= 0.0
+    assert 0.5 < high < 0.6
+
+
+@pytest.mark.parametrize("size_m", [(1.0, 9.0), (9.0, 1.0), (40.0, 40.0)])
+def test_arenas_of_any_form_are_seen_whole(size_m):
+    static = replace(two_groups(), arena_size_m=size_m, obstacles=((),), lights=((),))
+    figure = FilmFigure(film(static=static, pose=np.zeros((31, 3, 3))), SIZE_PX)
+    image = figure.frame(0)
+    for x_m, y_m in ((-0.46, -0.46), (0.46, 0.46)):
+        assert color_at(figure, image, x_m * size_m[0], y_m * size_m[1]) == FLOOR
+
+
+def test_a_crowd_is_drawn():
+    robots, ticks = 300, 20
+    static = replace(
+        two_groups(),
+        groups=(Group("crowd", load_body("epuck"), 0, robots),),
+        robot_names=tuple(f"crowd-{i}" for i in range(robots)),
+    )
+    pose = np.random.default_rng(1).uniform(-2.5, 2.5, (ticks, robots, 3))
+    of = film(static=static, pose=pose, alive=np.ones((ticks, robots), np.bool_), time_s=np.arange(ticks) / 10)
+    assert robots_shown(replace(of, metrics={}), ticks - 1)[-1] == robot_color(0)
+
+
+@pytest.mark.parametrize(
+    ("size", "metrics", "where", "key"),
+    [(10, None, "--size", ""), (300, ["ordr"], "--metric", "ordr"), (300, ["order"] * 5, "--metric", "")],
+)
+def test_what_cannot_be_drawn_is_refused(size, metrics, where, key):
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (where, key)):
+        FilmFigure(film(), size, metrics)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "."])
+def test_a_path_that_cannot_be_written_is_refused(tmp_path, name):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / name)):
+        FilmFigure(film(), 300).save(0, tmp_path / name)
+    assert not any(tmp_path.iterdir())
+
+
+def test_pairs_are_of_those_alive_that_are_near_enough():
+    position_m = np.array([[0.0, 0.0], [1.0, 0.0], [2.5, 0.0], [0.0, 1.0]])
+    alive = np.array([True, True, True, False])
+    assert in_range(position_m, alive, 1.5, ()).tolist() == [[0, 1], [1, 2]]
+    assert in_range(position_m, alive, 1.4, ()).tolist() == [[0, 1]]
+    assert in_range(position_m, ~alive, 9.0, ()).tolist() == []
+    assert in_range(position_m, np.zeros(4, np.bool_), 9.0, ()).tolist() == []
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES, ids=lambda obstacle: obstacle.shape)
+def test_obstacles_are_in_the_way_as_they_are_in_the_air(obstacle: Obstacle):
+    centre = np.array([obstacle.x_m, obstacle.y_m])
+    position_m = centre + np.random.default_rng(4).uniform(-1.0, 1.0, (60, 2))
+    kernel = obstacle_arrays(((obstacle,),))
+    expected = {
+        (i, j) for i in range(60) for j in range(i + 1, 60) if not is_blocked(kernel, 0, *position_m[i], *position_m[j])
+    }
+    found = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
+    assert {(min(pair), max(pair)) for pair in found.tolist()} == expected
+    assert 0 < len(expected) < 60 * 59 / 2
+
+
+pytest.importorskip("matplotlib", reason="needs the extra [report]")
+
+
+@pytest.fixture(scope="module")
+def figure():
+    return FilmFigure(film(), 320)
+
+
+def off(shown, color):
+    return np.abs(shown.astype(int) - color).max()
+
+
+def robot_at(figure, tick):
+    """Row and column of the middle of the foot-bot."""
+    x, up = figure._figure.axes[0].transData.transform(film().pose[tick, 2, :2])
+    return int(figure.frame(tick).shape[0] - up), int(x)
+
+
+def test_a_gif_has_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
+    from PIL import Image
+
+    write_gif(tmp_path / "a.gif", (figure.frame(i) for i in TICKS), [figure.frame(0).copy()], 12.5)
+    with Image.open(tmp_path / "a.gif") as gif:
+        assert gif.n_frames == len(TICKS)
+        assert gif.info["loop"] == 0
+        for place, tick in enumerate(TICKS):
+            gif.seek(place)
+            assert gif.info["duration"] == 80
+            shown = np.asarray(gif.convert("RGB"))
+            assert off(shown[robot_at(figure, tick)], robot_color(1)) < NEAR
+            assert tuple(shown[1, 1]) == (255, 255, 255)
+
+
+def test_frames_that_do_not_differ_prolong_the_one_before(figure, tmp_path):
+    from PIL import Image
+
+    write_gif(tmp_path / "a.gif", (figure.frame(i) for i in (0, 0, 5)), [figure.frame(0).copy()], 10.0)
+    with Image.open(tmp_path / "a.gif") as gif:
+        assert gif.n_frames == 2
+        assert gif.info["duration"] == 200
+
+
+def test_an_mp4_decodes_to_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
+    import imageio_ffmpeg
+
+    write_mp4(tmp_path / "a.mp4", (figure.frame(i) for i in TICKS), 5.0)
+    decode = ["-i", tmp_path / "a.mp4", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    decoded = subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), *decode], capture_output=True, check=True, timeout=60)
+    assert re.search(rb"Video: h264.* yuv420p.* 5 fps", decoded.stderr)
+    frames = np.frombuffer(decoded.stdout, np.uint8).reshape(-1, *figure.frame(0).shape)
+    assert len(frames) == len(TICKS)
+    for shown, tick in zip(frames, TICKS, strict=True):
+        assert off(shown[robot_at(figure, tick)], robot_color(1)) < NEAR
+
+
+def test_twenty_robots_for_a_minute_make_a_small_gif(tmp_path):
+    """The size that READMEs bear: below 10 kB a frame, with links and trails that all move."""
+    ticks, robots = 60, 20
+    group = Group("flock", load_body("epuck"), 0, robots)
+    static = replace(two_groups(), groups=(group,), robot_names=tuple(map(str, range(robots))))
+    rng = np.random.default_rng(3)
+    heading = rng.uniform(-3, 3, robots) + np.cumsum(rng.normal(0, 0.1, (ticks, robots)), axis=0)
+    step = 0.05 * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    place = rng.uniform(-2, 2, (robots, 2)) + np.cumsum(step, axis=0)
+    pose = np.concatenate([place, heading[:, :, None]], axis=-1)
+    alive, time_s = np.ones((ticks, robots), np.bool_), np.arange(ticks) / 10
+    metrics = {"order": rng.uniform(size=ticks), "link_pdr": rng.uniform(size=ticks)}
+    figure = FilmFigure(film(static=static, pose=pose, alive=alive, time_s=time_s, metrics=metrics), 480)
+    samples = [figure.frame(i).copy() for i in range(0, ticks, 10)]
+    write_gif(tmp_path / "a.gif", (figure.frame(i) for i in range(ticks)), samples, 10.0)
+    assert (tmp_path / "a.gif").stat().st_size < 10_000 * ticks

@@ -1,0 +1,331 @@
+import json
+import shutil
+from hashlib import sha256
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.truth import EventRecord
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder import ticks, writer
+from swarmwire.metrics.run_folder.events import EventLog
+from swarmwire.metrics.run_folder.layout import RunLog
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.tables import TABLES
+from swarmwire.metrics.run_folder.verify import verify
+from tests.support.metrics.recorded import links, made_up_summary, record, wandering
+from tests.support.metrics.truths import static, tally, watch
+
+TICKS, ARENAS = 10, 2
+HASHES = ["a" * 64, "b" * 64]
+DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
+
+
+def seen_ticks(of):
+    kill = EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
+    ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED])
+    counted = tally({Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.RECEIVED: 1})
+    yield from wandering(of, TICKS, events=(kill,), finished=ended, tally=counted)
+
+
+def summarise(folder, of, recorded, **given):
+    """The summary of a run of these ticks, as deploy writes it."""
+    parts = {}
+    for observer in (Metrics(), RadioTally(), EventLog()):
+        watch(of, seen_ticks(of), observer)
+        parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
+    run = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
+    (folder / "summary.json").write_text(json.dumps({**run, **given}))
+
+
+def fill(folder, **given):
+    """A whole run folder, its summary changed by what is given."""
+    of = static(3, arenas=ARENAS)
+    recorded = record(folder, of, seen_ticks(of), packets=given.pop("share", 1.0))
+    summarise(folder, of, given.pop("record", recorded), **given)
+    log = RunLog(folder)
+    log.say("begins")
+    log.close()
+    (folder / "run.json").write_text(json.dumps({"format": 1, "seeds": [1, 2], "ticks": TICKS}))
+    (folder / "trajectory.digests").write_bytes(bytes(8 * (TICKS - 1)) + DIGEST)
+
+
+def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(tmp_path):
+    fill(tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    path = tmp_path / "events.parquet"
+    table = pl.read_parquet(path)
+    table.slice(1).write_parquet(path)
+    assert states(tmp_path) == {"events": State.DIFFERS}
+    summary["events"][0] |= {"singly": True, "robots": [[], ["flock-1"]]}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert states(tmp_path) == {}
+
+
+def states(folder):
+    return {finding.part: finding.state for finding in verify(folder) if not finding.good}
+
+
+def text_of(folder, part):
+    return next(finding.text for finding in verify(folder) if finding.part == part)
+
+
+def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
+    fill(tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*")}
+    findings = verify(tmp_path)
+    assert all(finding.good for finding in findings)
+    files = ("summary.json", "static.json", "log.txt", "run.json", "trajectory.digests", "run.rrd")
+    assert {finding.part for finding in findings} == {*files, *TABLES}
+    assert {finding.part for finding in findings if finding.state == State.NOT_RECORDED} == {
+        "run.rrd",
+        *({*TABLES} - {path.stem for path in tmp_path.glob("*.parquet")}),
+    }
+    assert {"ticks", "packets", "events"} <= {finding.part for finding in findings if finding.state == State.INTACT}
+    assert "20 rows" in text_of(tmp_path, "ticks")
+    assert "up to tick 9 (0.9 s)" in text_of(tmp_path, "ticks")
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("gone", "wrong"),
+    [
+        ("summary.json", {"summary.json": State.MISSING, "trajectory.digests": State.PARTIAL}),
+        ("static.json", {"static.json": State.MISSING}),
+        ("log.txt", {"log.txt": State.MISSING}),
+        ("run.json", {"run.json": State.MISSING}),
+        ("trajectory.digests", {"trajectory.digests": State.MISSING}),
+        ("ticks.parquet", {"ticks": State.MISSING}),
+        ("packets.parquet", {"packets": State.MISSING}),
+        ("events.parquet", {"events": State.MISSING}),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path, gone, wrong):
+    fill(tmp_path)
+    (tmp_path / gone).unlink()
+    assert states(tmp_path) == wrong
+
+
+@pytest.mark.parametrize("part", ["summary.json", "static.json", "ticks.parquet", "packets.parquet", "events.parquet"])
+@pytest.mark.parametrize("cut", [0.0, 0.5, 0.98])
+def test_what_was_cut_off_is_damaged(tmp_path, part, cut):
+    fill(tmp_path)
+    whole = (tmp_path / part).read_bytes()
+    (tmp_path / part).write_bytes(whole[: int(cut * len(whole))])
+    found = states(tmp_path)
+    assert found.pop(part.removesuffix(".parquet")) == State.DAMAGED
+    assert found == ({"trajectory.digests": State.PARTIAL} if part == "summary.json" else {})
+
+
+def test_bytes_turned_over_within_a_table_are_found(tmp_path):
+    fill(tmp_path)
+    path = tmp_path / "ticks.parquet"
+    data = bytearray(path.read_bytes())
+    for place in range(4, len(data) // 2):
+        data[place] ^= 0xFF
+    path.write_bytes(data)
+    assert states(tmp_path) == {"ticks": State.DAMAGED}
+
+
+def killed(folder, monkeypatch, in_chunk=3):
+    """A folder as a run leaves it that was killed: parts only."""
+    monkeypatch.setattr(writer, "join_parts", lambda *_: None)
+    monkeypatch.setattr(ticks, "MAX_TICKS", in_chunk)
+    fill(folder)
+    (folder / "summary.json").unlink()
+    (folder / "ticks" / "part-000003.parquet").unlink()  # the last tick's
+
+
+def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatch):
+    killed(tmp_path, monkeypatch)
+    (tmp_path / "ticks" / ".aside-part-000003.parquet").write_bytes(b"PAR1 half of it")
+    partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), State.PARTIAL)
+    assert states(tmp_path) == {"summary.json": State.MISSING, **partial}
+    assert "up to tick 8 (0.8 s); 3 parts" in text_of(tmp_path, "ticks")
+
+
+def test_a_run_killed_before_its_first_part_left_nothing(tmp_path, monkeypatch):
+    killed(tmp_path, monkeypatch)
+    for part in (tmp_path / "ticks").iterdir():
+        part.unlink()
+    assert states(tmp_path)["ticks"] is State.PARTIAL
+
+
+def test_parts_left_beside_the_whole_table_are_no_fault(tmp_path):
+    fill(tmp_path)
+    (tmp_path / "ticks").mkdir()
+    shutil.copy(tmp_path / "ticks.parquet", tmp_path / "ticks" / "part-000001.parquet")
+    assert states(tmp_path) == {}
+    assert "parts" in text_of(tmp_path, "ticks")
+
+
+def test_a_part_that_is_damaged_or_gone_is_named(tmp_path, monkeypatch):
+    killed(tmp_path, monkeypatch)
+    broken = tmp_path / "ticks" / "part-000001.parquet"
+    broken.write_bytes(broken.read_bytes()[:100])
+    assert states(tmp_path)["ticks"] is State.DAMAGED
+    assert "1 of 3 parts; ticks/part-000001.parquet" in text_of(tmp_path, "ticks")
+    broken.unlink()
+    assert states(tmp_path)["ticks"] is State.DAMAGED
+    assert "part-000001.parquet" in text_of(tmp_path, "ticks")
+
+
+def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
+    fill(tmp_path)
+    table = pl.read_parquet(tmp_path / "ticks.parquet")
+    table.filter(~pl.col("tick").is_in([4, 5])).write_parquet(tmp_path / "ticks.parquet")
+    assert states(tmp_path) == {"ticks": State.PARTIAL}
+    assert "2 ticks" in text_of(tmp_path, "ticks")
+
+
+@pytest.mark.parametrize(
+    ("change", "part", "hints"),
+    [
+        ({"by_arena": made_up_summary(11, arenas=ARENAS)["by_arena"]}, "ticks", ("10 ticks", "11")),
+        ({"events": []}, "events", ("20 rows", "0 events")),
+        ({"metrics": [{"order": {"final": 2.0}}] * 2}, "ticks", ("order", "2.0")),
+        ({"metrics": [{"speed": {"final": 2.0}}] * 2}, "ticks", ("speed",)),
+        ({"radio": [{"fates": {"received": 11}}] * 2}, "packets", ("10 received (arena 0)", "11")),
+        ({"metrics": [{"order": {}}] * 2}, "ticks", ("summary.json",)),
+        ({"radio": [{"fates": 3}] * 2}, "packets", ("summary.json",)),
+        ({"events": [1]}, "events", ("summary.json",)),
+    ],
+)
+def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, hints):
+    fill(tmp_path, **change)
+    assert states(tmp_path)[part] == State.DIFFERS
+    assert all(hint in text_of(tmp_path, part) for hint in hints)
+
+
+def test_an_arena_too_few_is_found(tmp_path):
+    fill(tmp_path)
+    pl.read_parquet(tmp_path / "ticks.parquet").filter(pl.col("arena") == 0).write_parquet(tmp_path / "ticks.parquet")
+    assert states(tmp_path) == {"ticks": State.DIFFERS}
+
+
+def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run_broken_off(tmp_path):
+    other = {"radio": [{"fates": {"received": 11}}] * 2}
+    rows = {"ticks": {"rows": 20, "dropped": 0}, "events": {"rows": 20, "dropped": 0}}
+    for number, given in enumerate(
+        [
+            {"share": 0.5},
+            {"record": {**rows, "packets": {"rows": 1, "dropped": 2, "share": 1.0}}},
+            {"ended": "interrupted"},
+            {"ended": "failed"},  # a runner was lost amid a tick
+            {"ended": "left"},
+        ]
+    ):
+        folder = tmp_path / f"{number}"
+        folder.mkdir()
+        fill(folder, **other, **given)
+        assert states(folder) == {}
+
+
+def test_copied_files_are_compared_with_their_sha256(tmp_path):
+    (tmp_path / "agent.py").write_text("pass\n")
+    listed = [{"path": "agent.py", "sha256": sha256(b"pass\n").hexdigest()}, {"path": "body.toml", "sha256": "0"}]
+    fill(tmp_path, files=listed)
+    assert states(tmp_path) == {"body.toml": State.MISSING}
+    (tmp_path / "agent.py").write_text("fail\n")
+    assert states(tmp_path) == {"agent.py": State.DIFFERS, "body.toml": State.MISSING}
+
+
+def test_what_is_no_run_folder_is_refused(tmp_path):
+    for folder in (tmp_path, tmp_path / "nowhere"):
+        with pytest.raises(BadInput, check=lambda error, folder=folder: error.where == str(folder)):
+            verify(folder)
+
+
+def test_a_recording_is_read_to_its_end(tmp_path):
+    pytest.importorskip("rerun", reason="needs the extra [view]")
+    from tests.support.metrics import recordings
+
+    fill(tmp_path)
+    of = static(3)
+    recordings.record(tmp_path / "run.rrd", of, recordings.moving(of, 7))
+    assert states(tmp_path) == {}
+    assert "up to tick 6" in text_of(tmp_path, "run.rrd")
+    whole = (tmp_path / "run.rrd").read_bytes()
+    (tmp_path / "run.rrd").write_bytes(whole[: len(whole) * 2 // 3])
+    assert states(tmp_path) == {"run.rrd": State.PARTIAL}
+    assert "closed" in text_of(tmp_path, "run.rrd")
+    (tmp_path / "run.rrd").write_bytes(b"no recording")
+    assert states(tmp_path) == {"run.rrd": State.DAMAGED}
+
+
+def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    fill(tmp_path)
+    shutil.copy(tmp_path / "log.txt", tmp_path / "run.rrd")
+    assert "not read" in text_of(tmp_path, "run.rrd")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "state"),
+    [
+        ("summary.json", b"{}", State.DAMAGED),
+        ("summary.json", b"[]", State.DAMAGED),
+        ("run.json", b"[]", State.DAMAGED),
+        ("run.json", b"\xff", State.DAMAGED),
+        ("log.txt", b"\xff\xfe", State.DAMAGED),
+        ("trajectory.digests", DIGEST, State.DIFFERS),
+        ("trajectory.digests", bytes(8 * TICKS), State.DIFFERS),
+    ],
+)
+def test_what_says_something_else_is_found(tmp_path, name, content, state):
+    fill(tmp_path)
+    (tmp_path / name).write_bytes(content)
+    assert states(tmp_path)[name] == state
+
+
+def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypatch):
+    def breaks(*_):
+        raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
+
+    fill(tmp_path)
+    monkeypatch.setattr("swarmwire.metrics.run_folder.reader.scan_files", breaks)
+    with pytest.raises(BadInput, match="ticks.*assertion failed.*swarmwire verify"):
+        RunFolder(tmp_path).ticks()
+    monkeypatch.setattr(TABLES["ticks"], "compare", breaks)
+    assert states(tmp_path)["ticks"] == State.DAMAGED
+
+
+def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
+    fill(tmp_path)
+    for name in ("summary.json", "run.json", "trajectory.digests", "log.txt"):
+        (tmp_path / name).unlink()
+        (tmp_path / name).mkdir()
+    found = states(tmp_path)
+    assert [found[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
+        State.DAMAGED
+    ] * 4
+
+
+def test_a_table_of_other_columns_is_damaged(tmp_path):
+    fill(tmp_path)
+    pl.DataFrame({"x": [1]}).write_parquet(tmp_path / "packets.parquet")
+    assert states(tmp_path) == {"packets": State.DAMAGED}
+    assert "no column" in text_of(tmp_path, "packets")
+
+
+def test_inputs_are_compared_with_the_summary(tmp_path):
+    data = b"inputs"
+    recorded = {"sha256": sha256(data).hexdigest(), "first_tick": 3, "ticks": 7}
+    fill(tmp_path, inputs=recorded)
+    assert states(tmp_path) == {"inputs/actions.frames": State.MISSING}
+    (tmp_path / "inputs").mkdir()
+    (tmp_path / "inputs" / "actions.frames").write_bytes(data)
+    assert states(tmp_path) == {}
+    (tmp_path / "inputs" / "actions.frames").write_bytes(data + b"!")
+    assert states(tmp_path) == {"inputs/actions.frames": State.DIFFERS}
+
+
+def test_a_recording_that_was_made_and_is_gone_is_missing(tmp_path):
+    recorded = {"rows": TICKS, "dropped": 0}
+    fill(tmp_path, share=0.0, record={"ticks": recorded, "events": recorded, "rrd": recorded})
+    assert states(tmp_path) == {"run.rrd": State.MISSING}

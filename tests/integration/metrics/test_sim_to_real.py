@@ -1,0 +1,269 @@
+"""Sim-to-real comparison."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import RunFolder, sweep
+from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.metrics.campaign.folder import select
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.sim_to_real.comparison import (
+    MetricRow,
+    RadioRow,
+    RadioValue,
+    SimToReal,
+    Spread,
+    compare_sim_to_real,
+)
+from swarmwire.metrics.sim_to_real.report import (
+    COLUMNS,
+    RADIO_COLUMNS,
+    left_out,
+    meanings,
+    metric_cells,
+    radio_cells,
+    verdict,
+)
+from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, measured_log, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.statistics.sample import UNKNOWN
+from tests.support.deploy.campaign import InThisProcess
+from tests.support.deploy.runs import LOSSY
+from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, watched
+
+NAMES = (
+    "order",
+    "order_velocity",
+    "speed",
+    "cohesion",
+    "min_gap",
+    "throughput",
+    "link_pdr",
+    "collisions",
+    "coverage_time_s",
+)
+MEASURES = [METRICS[name]() for name in NAMES]
+SEEDS = range(1, 8)
+PHASES_S = (0.03, 0.0, 0.09, 0.05, 0.01, 0.07)
+NOTHING = np.empty(0)
+METRIC_NAMES = ("order", "min_gap")
+
+
+def emulated_run(of: Watched, seed: int) -> EmulatedRun:
+    metrics, tally = Metrics(MEASURES), RadioTally()
+    values = []
+    for observer in (metrics, tally):
+        observer.begin(of.static)
+    for truth in of.truths:
+        metrics.see(truth)
+        tally.see(truth)
+        values.append(metrics.values[:, 0].copy())
+    series = dict(zip(NAMES, np.array(values).T, strict=True))
+    return EmulatedRun(seed, series, tally.end(None)["radio"][0], len(of.truths) / of.static.rate_hz)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Runs with seven seeds."""
+    watched_runs = [watched(seed=seed) for seed in SEEDS]
+    many = tuple(emulated_run(of, seed) for of, seed in zip(watched_runs, SEEDS, strict=True))
+    return watched_runs, EmulatedRuns("small", many, 10, 6)
+
+
+def compared(emulated: EmulatedRuns, of: Watched, folder) -> SimToReal:
+    logs = read_real_logs(as_logs(of, folder, phase_s=PHASES_S))
+    return compare_sim_to_real(emulated, measured_log(logs, MEASURES, of.static), MEASURES)
+
+
+def test_a_run_is_near_itself(runs, tmp_path):
+    watched_runs, many = runs
+    alone = replace(many, runs=many.runs[:1])
+    found = compared(alone, watched_runs[0], tmp_path)
+    rows = {row.metric.name: row for row in found.rows}
+    for name, within in (("order", 0.03), ("cohesion", 0.01), ("min_gap", 0.01), ("speed", 0.005)):
+        assert rows[name].distance < within, name
+        assert rows[name].emulated.median == pytest.approx(rows[name].log, abs=within), name
+        assert rows[name].within is True, name
+    pdr = next(row for row in found.radio if row.of.name == "total pdr")
+    assert pdr.of.log == pytest.approx(pdr.emulated.median, abs=0.01)
+    assert pdr.within is None
+    assert "campaign" in verdict(found)
+
+
+def test_another_seed_lies_within_the_spread(runs, tmp_path):
+    found = compared(runs[1], watched(seed=11), tmp_path)
+    within = [row.within for row in found.judged]
+    assert len(within) == 6
+    assert sum(within) >= 5  # of six each is outside once in eight times
+    radio = [row.within for row in found.judged_radio]
+    assert len(radio) == len(found.radio) == 5
+    assert verdict(found).startswith(f"{sum(within) + sum(radio)} of 11 ")
+    assert f"{sum(within)} of 6 metrics, {sum(radio)} of 5 " in verdict(found)
+
+
+def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
+    found = compared(runs[1], watched("robots.flock.params.speed_mps=0.05", seed=11), tmp_path)
+    assert found.rows[0].metric.name == "speed"
+    assert found.rows[0].within is False
+    assert found.rows[0].distance > 2.0 * found.rows[0].reach
+    assert ": speed" in verdict(found)
+
+
+def test_what_is_not_compared_has_its_reason(runs, tmp_path):
+    found = compared(runs[1], watched(seed=11), tmp_path)
+    assert "contacts" in found.not_in_log["collisions"]
+    assert "range" in found.not_in_log["link_pdr"]  # some were out of it
+    assert found.undefined == ()
+    assert found.never == ("coverage_time_s",)
+    lines = left_out(found)
+    assert any("collisions: " in line for line in lines)
+    assert any(line.endswith(": coverage_time_s") for line in lines)
+    assert any("p-values" in line for line in meanings(found))
+
+
+def test_a_metric_that_neither_side_can_have_is_passed_over_one_that_one_has_is_told(runs, tmp_path):
+    _, many = runs
+    nothing = np.full(200, np.nan)
+    neither = tuple(replace(run, series={"target_best": nothing, "order": nothing}) for run in many.runs)
+    log = measured_log(read_real_logs(as_logs(watched(seed=11), tmp_path)), MEASURES)
+    log = replace(log, series={"target_best": nothing, "order": log.series["order"]})
+    found = compare_sim_to_real(replace(many, runs=neither), log, [METRICS["target_best"](), METRICS["order"]()])
+    assert (found.undefined, found.never, found.rows) == (("order",), (), ())
+
+
+def test_metrics_that_the_run_did_not_keep_are_told(runs, tmp_path):
+    _, many = runs
+    poor = replace(many, runs=tuple(replace(run, series={"order": run.series["order"]}) for run in many.runs))
+    found = compared(poor, watched(seed=11), tmp_path)
+    assert "speed" in found.not_in_run
+    assert [row.metric.name for row in found.rows] == ["order"]
+
+
+def test_only_the_time_in_common_is_compared(runs, tmp_path):
+    of = watched(seed=11)
+    short = Watched()
+    short.static, short.truths = of.static, of.truths[:101]
+    found = compared(runs[1], short, tmp_path)
+    assert found.duration_s == pytest.approx(9.9, abs=0.11)
+    assert all(len(values) <= 101 for row in found.rows for values in row.runs)
+    assert found.radio == ()  # runs have their totals of 20 s alone
+    assert "20 s" in found.not_compared["total pdr"]
+    assert any("packets sent, total pdr, " in line for line in left_out(found))
+
+
+def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhile(tmp_path):
+    """Afterwards nothing is sent any more, which the time that is compared does not know."""
+    of = watched("radio.range_m=20", "duration_s=10", out=tmp_path / "run")
+    kept = runs_of_folder(tmp_path / "run", NAMES)
+    run = kept.runs[0]
+    quiet = {name: np.append(count, np.zeros(100)) for name, count in run.counts.items()}
+    longer = replace(run, duration_s=20.0, counts=quiet)
+    found = compared(replace(kept, runs=(longer,)), of, tmp_path / "logs")
+    rows = {row.of.name: row for row in found.radio}
+    assert list(rows) == ["packets sent", "total pdr"]
+    assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.04)
+    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
+    assert found.not_compared.keys() == {"latency p50", "latency p90", "latency p99"}
+
+
+def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tmp_path):
+    """It is silent from the tenth second on, after which the run that it is held against ends."""
+    of = runs[0][0]
+    folder = as_logs(of, tmp_path)
+    for robot in folder.iterdir():
+        for name in ("sent.csv", "received.csv"):
+            head, *rows = (robot / name).read_text().splitlines(keepends=True)
+            early = [row for row in rows if float(row.split(",")[0]) < BEGAN_S + 10.0]
+            (robot / name).write_text("".join([head, *early]))
+    logs = read_real_logs(folder)
+    half = Watched()
+    half.static, half.truths = of.static, of.truths[:100]
+    short = replace(runs[1], runs=(emulated_run(half, 1),))
+    found = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static, 10.0), MEASURES)
+    rows = {row.of.name: row for row in found.radio}
+    assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.03)
+    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
+    whole = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static), MEASURES)
+    assert whole.radio == ()
+    assert all(length in whole.not_compared["total pdr"] for length in ("19.9 s", "10 s"))
+
+
+def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, tmp_path):
+    watched_runs, many = runs
+    folder = as_logs(watched_runs[0], tmp_path, about={"radio": {"kind": "world"}})
+    for path in folder.glob("*/received.csv"):  # such robots do not know when a packet was sent
+        head, *rows = (line.split(",") for line in path.read_text().splitlines())
+        at = head.index("latency_s")
+        path.write_text(
+            "\n".join(",".join(row) for row in [head, *([*of[:at], "", *of[at + 1 :]] for of in rows)]) + "\n"
+        )
+    logs = read_real_logs(folder)
+    measures = [*MEASURES, METRICS["latency_air"](), METRICS["latency_agent"]()]
+    log = measured_log(logs, measures, watched_runs[0].static)
+    found = compare_sim_to_real(many, log, measures)
+    assert [row.of.name for row in found.radio][2:] == [f"latency to agent {p}" for p in ("p50", "p90", "p99")]
+    assert found.radio[2].of.runs[0] == many.runs[0].radio["latency_agent_s"]["p50"]
+    assert found.radio[2].of.log == pytest.approx(found.radio[2].of.runs[0], abs=0.011)
+    assert "latency_agent" in found.not_in_log["latency_air"]
+    assert "latency_agent" in log.series
+
+
+def test_two_runs_have_no_spread(runs, tmp_path):
+    two = replace(runs[1], runs=runs[1].runs[:2])
+    found = compared(two, watched(seed=11), tmp_path)
+    assert not found.judged
+    assert verdict(found).startswith("2 runs ")
+
+
+def test_a_metric_has_a_text_for_each_column():
+    row = MetricRow(METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, 0.125, 0.05, 0.04, UNKNOWN, (NOTHING,), NOTHING)
+    cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
+    assert cells["metric"].startswith("min_gap")
+    assert cells["emulated"] == "0.2 (0.1 to 0.3)"
+    assert (cells["log"], cells["distance"], cells["spread"], cells["KS"]) == ("0.25", "0.05", "0.04", "0.125")
+    assert cells["within"] == "no"
+
+
+def test_a_single_run_has_a_value_and_no_spread():
+    row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, 0.0, 0.0, nan, UNKNOWN, (NOTHING,), NOTHING)
+    cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
+    assert cells["emulated"] == "0.5"
+    assert cells["within"] not in ("yes", "no")
+
+
+def test_a_number_of_the_radio_has_a_text_for_each_column():
+    value = RadioValue("latency, median", "s", "how long", (0.01, 0.02, 0.03), log=0.02, grain=0.0)
+    row = RadioRow(value, Spread(0.01, 0.02, 0.03), 3)
+    cells = dict(zip(RADIO_COLUMNS, radio_cells(row), strict=True))
+    assert cells["radio"] == "latency, median [s]"
+    assert (cells["log"], cells["within"]) == ("0.02", "yes")
+
+
+def test_of_a_run_folder(tmp_path):
+    watched("duration_s=3", seed=2, out=tmp_path / "run")
+    of = runs_of_folder(tmp_path / "run", METRIC_NAMES)
+    folder = RunFolder(tmp_path / "run")
+    assert (of.robots, of.rate_hz, [run.seed for run in of.runs]) == (6, 10, [2])
+    assert of.runs[0].series.keys() == set(METRIC_NAMES)
+    assert np.array_equal(of.runs[0].series["order"], folder.metrics()["order"].to_numpy(), equal_nan=True)
+    assert of.runs[0].duration_s == pytest.approx(3.0)
+
+
+def test_of_a_campaigns_point(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
+    short = [*SMALL, "duration_s=3"]
+    sweep(LOSSY, seeds=[1, 2], vary={"radio.loss": [0.3, 0.6]}, overrides=short, out=tmp_path / "c")
+    of = runs_of_campaign(select(f"{tmp_path / 'c'}@radio.loss=0.6"), METRIC_NAMES, 10, 6)
+    assert [run.seed for run in of.runs] == [1, 2]
+    assert all(len(run.series["order"]) == 30 for run in of.runs)
+    first, *_ = (tmp_path / "c" / "series").glob("*.parquet")
+    first.write_bytes(first.read_bytes()[:-1])
+    with pytest.raises(BadInput) as told:
+        runs_of_campaign(select(f"{tmp_path / 'c'}@radio.loss=0.6"), METRIC_NAMES, 10, 6)
+    assert told.value.where == str(first)

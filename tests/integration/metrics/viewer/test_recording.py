@@ -1,0 +1,417 @@
+"""Recordings for the viewer, and pictures taken of them."""
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.packets import Fate
+from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import check_recording
+from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
+from swarmwire.metrics.viewer.style import DEAD, FATES, packed
+from tests.support.clocks import StillClock
+from tests.support.metrics.recordings import class_names, column, moving, record, series
+from tests.support.metrics.truths import edges, static, tally, truth, watch
+
+rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
+
+OBSTACLES = (Obstacle("cylinder", 1.0, 1.0, radius_m=0.2), Obstacle("box", -1.0, 0.0, 0.5, size_m=(0.6, 0.2)))
+
+
+@pytest.fixture(autouse=True)
+def strict():
+    """Rerun only warns of bad data unless it is told otherwise."""
+    rerun.set_strict_mode(True)
+    yield
+    rerun.set_strict_mode(False)
+
+
+@pytest.mark.parametrize("arena", [0, 1])
+def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, arena):
+    of = static(3, arenas=2, obstacles=OBSTACLES)
+    ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
+    record(tmp_path / "run.rrd", of, ticks, arena=arena)
+    positions = column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")
+    vectors = column(tmp_path / "run.rrd", "/world/headings", "Arrows2D:vectors")
+    assert list(positions) == list(vectors) == list(range(40))
+    for seen in ticks:
+        pose = seen.pose[3 * arena : 3 * arena + 3]
+        assert positions[seen.tick] == pose[:, :2].astype(np.float32).tolist()
+        x, y = np.array(vectors[seen.tick]).T
+        np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
+
+
+def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
+    of = static(2)
+    leds = np.zeros((2, 8), np.int64)
+    leds[1, 2] = 0x0080FF  # the one to the left
+    pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])
+    dark = truth(of, 3, pose=pose), truth(of, 4, pose=pose)
+    lit = truth(of, 1, pose=pose, leds=leds), truth(of, 2, pose=pose, leds=leds)
+    record(tmp_path / "run.rrd", of, [truth(of, 0, pose=pose), *lit, *dark])
+    positions = column(tmp_path / "run.rrd", "/world/leds", "Points2D:positions")
+    np.testing.assert_allclose(positions.pop(1), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    np.testing.assert_allclose(positions.pop(2), [[1.0 - 0.042, 2.0]], atol=1e-6)
+    assert positions == {3: []}
+    assert column(tmp_path / "run.rrd", "/world/leds", "Points2D:colors")[1] == [0x0080FFFF]
+
+
+def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
+    of = static(3, arenas=2)
+    [seen] = moving(of, 1, edges=edges((0, 1), (3, 5)))
+    record(tmp_path / "run.rrd", of, [seen], arena=1)
+    strips = column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")
+    assert strips == {0: [seen.pose[[3, 5], :2].astype(np.float32).tolist()]}
+
+
+@pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 10])])
+def test_links_of_large_swarms_are_thinned(tmp_path, robots, expected):
+    of = static(robots)
+    record(tmp_path / "run.rrd", of, moving(of, 12, edges=edges((0, 1))))
+    assert list(column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")) == expected
+
+
+def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
+    of, metrics = static(4), Metrics()
+    expected = {metric.name: {} for metric in metrics.metrics}
+    ticks = list(moving(of, 30, edges=edges((0, 1)), contact_onsets=np.array([[1, 0]])))
+    metrics.begin(of)
+    for seen in ticks:
+        metrics.see(seen)
+        for name, value in metrics.latest.items():
+            expected[name][seen.tick] = value[0]
+    record(tmp_path / "run.rrd", of, ticks)
+    drawn = {}
+    for plot in ("shares", "distances", "times", "numbers"):
+        drawn |= series(tmp_path / "run.rrd", plot)
+    valued = {name for name, values in expected.items() if not all(map(np.isnan, values.values()))}
+    assert drawn.keys() == valued
+    assert {"order", "components", "collisions", "min_gap"} <= valued
+    assert not {"target_best", "rejoin_median"} & valued
+    for name, values in drawn.items():
+        assert values == {tick: pytest.approx(expected[name][tick], nan_ok=True) for tick in values}
+        assert all(np.isnan(expected[name][tick]) for tick in expected[name].keys() - values.keys())
+
+
+def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tmp_path):
+    of = static(4)
+    counts = [{Fate.RECEIVED: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
+    record(tmp_path / "run.rrd", of, [truth(of, tick, tally=tally(count)) for tick, count in enumerate(counts)])
+    drawn = series(tmp_path / "run.rrd", "packets")
+    assert drawn.keys() == {"received", "lost"}
+    assert min(drawn["lost"]) == 12
+    for fate, name in ((Fate.RECEIVED, "received"), (Fate.LOST, "lost")):
+        for tick, value in drawn[name].items():
+            last = [count[fate] for count in counts[max(0, tick - 9) : tick + 1]]
+            assert value == pytest.approx(10 * sum(last) / len(last))
+    link_pdr = series(tmp_path / "run.rrd", "shares")["link_pdr"]
+    received, in_range = (
+        sum(sum(count[f] for f in fates) for count in counts[-10:])
+        for fates in ([Fate.RECEIVED], [Fate.RECEIVED, Fate.LOST])
+    )
+    assert link_pdr[39] == pytest.approx(received / in_range)
+
+
+def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
+    of = static(3)
+    of = replace(of, groups=(replace(of.groups[0], stop=2), Group("b", of.groups[0].body, 2, 3)))
+    states = ("", "search", "carry")
+    alive = [[True, True, True], [True, True, True], [True, False, True], [True, True, True], [True, True, True]]
+    at = [[0, 0, 0], [1, 0, 0], [1, 0, 2], [1, 1, 2], [1, 1, 2]]
+    ticks = [
+        truth(of, tick, alive=np.array(living), state=np.array(state), states=states)
+        for tick, (living, state) in enumerate(zip(alive, at, strict=True))
+    ]
+    record(tmp_path / "run.rrd", of, ticks)
+    named = class_names(tmp_path / "run.rrd")
+    for entity, archetype in (("robots", "Points2D"), ("headings", "Arrows2D")):
+        classes = column(tmp_path / "run.rrd", f"/world/{entity}", f"{archetype}:class_ids")
+        assert {tick: [named[one][0] for one in row] for tick, row in classes.items()} == {
+            0: ["flock", "flock", "b"],
+            1: ["flock: search", "flock", "b"],
+            2: ["flock: search", "dead", "b: carry"],
+            3: ["flock: search", "flock: search", "b: carry"],
+        }
+    grey = named[0][1]
+    assert grey == packed(DEAD, 255)
+    assert len({color for _, color in named.values()}) == len(named)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    (colors,) = column(tmp_path / "run.rrd", "/legend", "Points2D:colors").values()
+    assert dict(zip(legend, colors, strict=True)) == dict(named.values())
+
+
+def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_all(tmp_path):
+    of, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
+    ticks = [truth(of, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
+    record(tmp_path / "run.rrd", of, ticks)
+    (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
+    *shown, more = legend
+    assert shown == ["? caf\u00e9", "state 0", "state 1", "state 2", "state 3"]
+    assert "5" in more
+
+
+def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
+    of = static(3, arenas=2)
+    own = ReceptionRecords(
+        arena=np.array([1, 1, 1, 0, 1]),
+        sender=np.array([0, 1, 2, 0, 0]),
+        receiver=np.array([1, 2, 0, 1, -1]),
+        receivers=np.array([1, 1, 1, 1, 2]),
+        **dict.fromkeys(
+            ("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns", "size_bytes", "tag"), np.zeros(5, int)
+        ),
+        fate=np.array([Fate.LOST, Fate.RECEIVED, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
+    )
+    first, second = moving(of, 2)
+    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second], arena=1)
+    lines = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips")
+    position_m = first.pose[3:, :2].astype(np.float32)
+    assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
+    colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
+    assert [color >> 8 for color in colors] == [packed(FATES[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
+
+
+def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
+    of = static(2, arenas=2)
+    kill = EventRecord(0, 0.15, "kill", False, np.array([True, False, True, True]))
+    elsewhere, here = (
+        EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
+        for changed in ([True, True, False, False], [False, False, True, False])
+    )
+    happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))
+    record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]], arena=1)
+    told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
+    assert "2 robots" in told[0][0]
+    assert (told[1], told[3], len(told)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
+    assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [1, 3]
+
+
+def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp_path, monkeypatch):
+    calls = []
+    for name in ("log", "send_columns"):
+        original = getattr(rerun.RecordingStream, name)
+        monkeypatch.setattr(
+            rerun.RecordingStream,
+            name,
+            lambda *args, original=original, **more: (calls.append(args[1]), original(*args, **more)),
+        )
+    of, metrics, clock = static(150), Metrics(), StillClock()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, clock)
+    for observer in (metrics, recording):
+        observer.begin(of)
+    sent = []
+    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.RECEIVED: 150})):
+        calls.clear()
+        clock.time_ns += 7 * NS_PER_S // 10
+        for observer in (metrics, recording):
+            observer.see(seen)
+        sent.append([call for call in calls if call.startswith("world/")])
+    assert [bool(names) for names in sent] == [False, False, True] * 3
+    assert set(sent[5]) == set(sent[8]) >= {"world/robots", "world/headings", "world/links", "world/selected"}
+    assert len(set(sent[5])) == len(sent[5]) < 10
+    recording.end(None)
+
+
+def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.metrics.viewer.recording.RerunRecording._send_bytes", 10_000)
+    record(tmp_path / "run.rrd", static(100), moving(static(100), 20))
+    chunks = rerun.chunk.RrdReader(str(tmp_path / "run.rrd")).stream().filter(content="/world/headings")
+    rows = [
+        len(batch)
+        for batch in (chunk.to_record_batch() for chunk in chunks)
+        if "Arrows2D:vectors" in batch.schema.names
+    ]
+    assert sum(rows) == 20
+    assert len(rows) > 3
+
+
+def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, monkeypatch):
+    of, metrics = static(3), Metrics()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
+    watch(of, moving(of, 4), metrics, recording)
+    monkeypatch.setattr(rerun.TextLog, "columns", refuse)
+    recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
+    with pytest.raises(ValueError, match="refused"):
+        recording.end(None)
+    assert check_recording(tmp_path / "run.rrd")[0] is State.INTACT
+    assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
+
+
+def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    monkeypatch.setattr("swarmwire.metrics.viewer.layout.about", refuse)
+    with pytest.raises(ValueError, match="refused"):
+        recording.begin(static(3))
+    recording.end(None)
+    state, told = check_recording(tmp_path / "run.rrd")
+    assert state is State.PARTIAL
+    assert "closed" not in told
+
+
+def refuse(*_, **__):
+    raise ValueError("refused")
+
+
+def view_names(path):
+    [blueprint] = rerun.chunk.RrdReader(str(path)).blueprints()
+    batches = [chunk.to_record_batch() for chunk in rerun.chunk.RrdReader(str(path)).stream(store=blueprint)]
+    names = "ViewBlueprint:display_name"
+    return {name for batch in batches if names in batch.schema.names for [name] in batch[names].to_pylist()}
+
+
+@pytest.mark.parametrize(("radio", "size_m"), [(True, (8.0, 6.0)), (True, (2.0, 9.0)), (False, (8.0, 6.0))])
+def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, size_m):
+    of = replace(static(2, radio=radio), arena_size_m=size_m)
+    record(tmp_path / "run.rrd", of, moving(of, 1))
+    names = view_names(tmp_path / "run.rrd")
+    assert "Robot flock-0" in names
+    assert len(names) == (11 if radio else 8)
+
+
+def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(tmp_path):
+    of = static(3, obstacles=OBSTACLES)
+    contents = []
+    for path in (tmp_path / "a.rrd", tmp_path / "b.rrd"):
+        record(path, of, moving(of, 5, edges=edges((0, 1)), tally=tally({Fate.RECEIVED: 2})))
+        chunks = list(rerun.chunk.RrdReader(str(path)).stream())
+        assert {name for chunk in chunks for name in chunk.timeline_names} == {"tick", "sim_time"}
+        columns = {(chunk.entity_path, name) for chunk in chunks for name in chunk.to_record_batch().schema.names}
+        logged = {key for key in columns if key[1] not in {"rerun.controls.RowId", "tick", "sim_time"}}
+        contents.append({key: repr(column(path, *key)) for key in logged})  # NaN is no NaN's equal
+    assert contents[0] == contents[1]
+    assert len(contents[0]) > 20
+
+
+def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
+    of = static(3, radio=False)
+    record(tmp_path / "run.rrd", of, moving(of, 3))
+    assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
+    assert column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips") == {}
+    assert series(tmp_path / "run.rrd", "packets") == {}
+    assert series(tmp_path / "run.rrd", "shares").keys() == {"order", "order_velocity"}
+
+
+def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
+    triangle = Obstacle("polygon", 1.0, -1.0, np.pi / 2, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 0.5)))
+    of = static(2, obstacles=(*OBSTACLES, triangle), lights=((Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)),))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (outlines,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert [len(outline) for outline in outlines] == [49, 5, 4]
+    assert np.allclose(outlines[2], [[1.0, -1.0], [1.0, 0.0], [0.5, -1.0], [1.0, -1.0]], atol=1e-6)
+    assert column(tmp_path / "run.rrd", "/world/lights", "Points2D:positions") == {None: [[0.5, -0.25], [1.0, 1.5]]}
+    dark = static(2)
+    record(tmp_path / "dark.rrd", dark, moving(dark, 2))
+    assert column(tmp_path / "dark.rrd", "/world/lights", "Points2D:positions") == {}
+
+
+def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
+    pushed = Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0), mass_kg=1.0)
+    of = static(2, obstacles=(*OBSTACLES, pushed))
+    ticks = (truth(of, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
+    record(tmp_path / "run.rrd", of, ticks)
+    (fixed,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
+    assert len(fixed) == len(OBSTACLES)
+    found = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
+    assert np.allclose(found[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
+    assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
+
+
+def test_the_floor_is_one_picture_below_all_else(tmp_path):
+    of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
+    record(tmp_path / "run.rrd", of, moving(of, 2))
+    (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
+    grey = np.array(buffer).reshape(384, 512)
+    assert (grey[0, 0], grey[-1, -1], grey.min(), grey.max()) == (90, 30, 30, 90)  # the first row is the lowest
+    assert np.mean(grey == 30) == pytest.approx(np.pi / 4 / 48, rel=0.02)
+    bare = static(2)
+    record(tmp_path / "bare.rrd", bare, moving(bare, 2))
+    assert column(tmp_path / "bare.rrd", "/world/floor", "Image:buffer") == {}
+
+
+def test_an_arena_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
+        record(tmp_path / "run.rrd", static(2, arenas=2), [], arena=2)
+
+
+def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire-metrics\[view\]"):
+        RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+
+
+def test_where_there_is_no_room_it_fails_at_once_and_leaves_no_file(tmp_path):
+    resource = pytest.importorskip("resource", reason="needs limits as Unix has them")
+    recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (25_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            recording.begin(static())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    recording.end(None)
+    assert list(tmp_path.iterdir()) == []
+
+
+pytest.importorskip("rerun", reason="needs the extra [view]")
+
+
+@pytest.fixture
+def rrd(tmp_path):
+    of, metrics = static(3), Metrics()
+    recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
+    x_m = np.linspace(-2, 2, 3)
+    poses = (np.column_stack([x_m, np.full(3, 0.1 * tick), np.zeros(3)]) for tick in range(20))
+    watch(of, (truth(of, tick, pose=pose) for tick, pose in enumerate(poses)), metrics, recording)
+    recording.end(None)
+    return tmp_path / "run.rrd"
+
+
+def picture(rrd, name, at_s=None):
+    png = rrd.with_name(name)
+    try:
+        render_png(rrd, png, at_s, size=(640, 360))
+    except NoGraphics as fault:
+        pytest.skip(str(fault))
+    return png.read_bytes()
+
+
+def test_a_picture_has_the_size_asked_for_and_shows_the_time_asked_for(rrd):
+    last_s = 19 / static(3).rate_hz
+    first, last, end = picture(rrd, "0.png", 0.0), picture(rrd, "19.png", last_s), picture(rrd, "end.png")
+    assert struct.unpack(">II", first[16:24]) == (640, 360)
+    assert first != last
+    assert last == end
+
+
+def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/dev/null")
+    monkeypatch.setenv("VK_DRIVER_FILES", "/dev/null")
+    with pytest.raises(NoGraphics, match="mesa-vulkan-drivers"):
+        render_png(rrd, rrd.with_name("none.png"))
+
+
+@pytest.mark.parametrize("tick", [-1, 20])
+def test_a_time_that_was_not_recorded_is_refused(rrd, tick):
+    with pytest.raises(BadInput, check=lambda error: error.where == "--at" and "recorded" in error.expected):
+        picture(rrd, "none.png", tick / static(3).rate_hz)
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "none.rrd")):
+        render_png(tmp_path / "none.rrd", tmp_path / "none.png")
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.jpg"])
+def test_what_is_no_png_by_name_is_refused(rrd, name):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(rrd.with_name(name))):
+        render_png(rrd, rrd.with_name(name))
+    assert not rrd.with_name(name).exists()

@@ -1,0 +1,326 @@
+"""Every driver, on a rig of each kind: driving, and links that fail."""
+
+from collections.abc import Iterator
+from math import pi
+from threading import Event, Thread
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent.drivers.driver import Command, DriverLost
+from swarmwire.agent.on_robot.safety import Watchdog
+from swarmwire.comms.clock import to_s
+from tests.support.clocks import until
+from tests.support.robots.faulty_link import Before, ByteByByte, CutAfter, FaultyLink, Late, Nothing
+from tests.support.robots.rig import OwnWireRig, Rig, made_up_readings, opened, readings, sense_until_lost
+from tests.support.robots.rigs import ON_ONE_RIG, RIGS
+
+SLACK_S = 2.0  # of a machine that is busy
+OWN = [name for name, kind in RIGS.items() if issubclass(kind, OwnWireRig)]
+ON_OWN_WIRE = pytest.mark.parametrize("rig", OWN, indirect=True)
+
+
+def with_sensor(name: str) -> pytest.MarkDecorator:
+    """Only rigs that have it."""
+    return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name in kind.measures()], indirect=True)
+
+
+def test_a_driver_measures_what_its_robot_and_gateway_have(connected: Rig) -> None:
+    assert connected.driver.measures == connected.measures()
+    assert connected.driver.measures <= connected.body.sensors.keys()
+    assert connected.driver.measures <= connected.gateway.sensors
+
+
+@ON_ONE_RIG
+@given(data=st.data())
+def test_a_reading_comes_back_as_exactly_as_the_wire_can_tell_it(connected: Rig, data: st.DataObject) -> None:
+    connected.come_back(data.draw(made_up_readings(connected.body, connected.driver.measures)))
+
+
+def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:
+    for name in connected.driver.measures:
+        assert {field.partition(".")[0] for field in connected.driver.sense(frozenset({name}))} == {name}
+    assert connected.driver.sense(frozenset()) == {}
+
+
+@with_sensor("proximity")
+def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
+    proximity = connected.body.proximity
+    assert proximity is not None
+    on_the_left = proximity.angle_rad > 0.0
+    sensed = connected.come_back({"proximity.value": 0.5 * on_the_left[None, :]})
+    assert (sensed["proximity.value"][0, on_the_left] > 0.4).all()
+    assert (sensed["proximity.value"][0, ~on_the_left] < 0.1).all()
+
+
+@with_sensor("compass")
+@pytest.mark.parametrize("heading_rad", [0.0, 0.5 * pi, -0.5 * pi, 3.0])
+def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig, heading_rad: float) -> None:
+    sensed = connected.come_back({"compass.heading_rad": np.array([heading_rad])})
+    assert sensed["compass.heading_rad"][0] == pytest.approx(heading_rad, abs=1e-5)
+
+
+@with_sensor("odometry")
+@ON_ONE_RIG
+@given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
+def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list[tuple[float, float]]) -> None:
+    left_m, right_m = (
+        float(connected.driver.sense(frozenset({"odometry"}))[f"odometry.{side}_m"][0]) for side in ("left", "right")
+    )
+    for left, right in gone:
+        left_m, right_m = left_m + left * connected.farthest_m, right_m + right * connected.farthest_m
+        connected.come_back({"odometry.left_m": np.array([left_m]), "odometry.right_m": np.array([right_m])})
+
+
+@ON_ONE_RIG
+@given(share=st.floats(-0.5, 0.5), turn=st.floats(-0.5, 0.5))
+def test_speeds_within_the_limits_arrive_as_they_are(connected: Rig, share: float, turn: float) -> None:
+    linear_mps, angular_radps = share * connected.body.max_linear_mps, turn * connected.body.max_angular_radps
+    connected.driver.act(Command(linear_mps, angular_radps))
+    connected.until_told(linear_mps, angular_radps)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_speeds_beyond_the_limits_are_cut_to_them(connected: Rig, sign: int) -> None:
+    body = connected.body
+    connected.driver.act(Command(sign * 10.0 * body.max_linear_mps, 0.0))
+    connected.until_told(sign * body.max_linear_mps, 0.0)
+    connected.driver.act(Command(0.0, sign * 10.0 * body.max_angular_radps))
+    connected.until_told(0.0, sign * body.max_angular_radps)
+
+
+def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connected: Rig) -> None:
+    red, dark = 0xFF0000, 0
+    shown = dict.fromkeys(range(connected.body.led_count), dark)
+    for which in shown:
+        for colour in (red, dark, red):
+            connected.driver.act(Command(0.01 * (which + 1), leds={which: colour}))
+            connected.driver.sense(frozenset())
+            shown |= connected.told().leds
+            assert shown[which] == colour
+    assert set(shown.values()) <= {red}
+
+
+def test_an_open_driver_has_told_its_robot_to_rest(rig: Rig) -> None:
+    rig.connect()
+    rig.until_told(0.0, 0.0)
+
+
+def test_a_robot_is_told_to_rest_when_its_driver_is_closed(connected: Rig) -> None:
+    connected.driver.act(Command(0.05, 0.0))
+    connected.until_told(0.05, 0.0)
+    connected.driver.close()
+    connected.until_told(0.0, 0.0)
+    connected.driver.close()
+
+
+@pytest.fixture(autouse=True)
+def soon_lost(rig: Rig) -> None:
+    """A robot that is silent for a moment counts as lost, before any driver is made."""
+    rig.silent_s = 0.3 if isinstance(rig, OwnWireRig) else 1.0
+
+
+def test_nobody_at_the_address_is_told_at_once(rig: Rig) -> None:
+    rig.gateway.close()
+    rig.connect_s = 0.3
+    driver = rig.made_driver(rig.address)
+    with pytest.raises(DriverLost):
+        driver.open()
+    with pytest.raises(DriverLost):
+        driver.sense(frozenset())
+    with pytest.raises(DriverLost):
+        driver.act(Command())
+
+
+def test_a_robot_that_dies_is_lost_in_time_and_found_again_when_it_lives(connected: Rig) -> None:
+    connected.publish(readings(0.0))
+    connected.driver.sense(frozenset({"odometry"}))
+    connected.publish(readings(0.0), alive=False)
+    began_ns = connected.clock.now_ns()
+    sense_until_lost(connected)
+    took_s = to_s(connected.clock.now_ns() - began_ns)
+    assert took_s < connected.silent_s + SLACK_S
+
+    connected.connect_s = 0.3
+    assert not opened(connected.made_driver(connected.address))
+    connected.publish(readings(0.0))
+    until(lambda: opened(connected.driver))
+    connected.come_back(readings(0.01))
+
+
+def test_a_dead_robot_takes_no_command(connected: Rig) -> None:
+    connected.publish(readings(0.0), alive=False)
+    connected.told()
+    connected.driver.act(Command(0.05, 0.0))
+    sense_until_lost(connected)
+    assert all(linear_mps == 0.0 for linear_mps, _ in connected.told().speeds)
+
+
+def test_a_robot_that_is_revived_is_at_rest(connected: Rig) -> None:
+    connected.driver.act(Command(0.05, 0.0))
+    connected.until_told(0.05, 0.0)
+    connected.publish(readings(0.0), alive=False)
+    connected.publish(readings(0.0))
+    connected.until_told(0.0, 0.0)
+
+
+def test_odometry_goes_on_after_the_gateway_was_closed_and_opened_again(connected: Rig) -> None:
+    connected.come_back(readings(0.0))
+    far_m = 0.8 * connected.farthest_m
+    connected.come_back(readings(far_m))
+    connected.gateway.close()
+    sense_until_lost(connected)
+
+    connected.reopen()
+    connected.publish(readings(far_m + 0.01))  # it rolled on for a moment
+    connected.driver.open()
+    connected.come_back(readings(far_m + 0.01))
+    connected.come_back(readings(2.0 * far_m))
+
+
+def test_a_driver_that_reconnects_has_its_robot_at_rest_first(connected: Rig) -> None:
+    connected.driver.act(Command(0.05, 0.0))
+    connected.until_told(0.05, 0.0)
+    connected.driver.open()
+    connected.until_told(0.0, 0.0)
+    connected.driver.act(Command(0.03, 0.0))
+    connected.until_told(0.03, 0.0)
+
+
+def test_another_thread_stops_the_motors_while_this_one_reads(connected: Rig) -> None:
+    driver, done = connected.driver, Event()
+    driver.act(Command(0.05, 1.0))
+    connected.until_told(0.05, 1.0)
+
+    def read() -> None:
+        while not done.is_set():
+            driver.sense(driver.measures)
+
+    reader = Thread(target=read)
+    reader.start()
+    driver.stop()
+    connected.until_told(0.0, 0.0)
+    done.set()
+    reader.join()
+    assert all(connected.same_speeds(speeds, (0.0, 0.0)) for speeds in connected.told().speeds)
+
+
+def test_a_stopped_robot_drives_on_with_the_next_command(connected: Rig) -> None:
+    connected.driver.act(Command(0.05, 0.0))
+    connected.driver.stop()
+    connected.driver.act(Command(0.03, 0.0))
+    connected.until_told(0.03, 0.0)
+
+
+def test_a_watchdog_stops_a_robot_whose_agent_falls_silent(connected: Rig) -> None:
+    watchdog = Watchdog(0.1, connected.driver.stop, connected.clock)
+    watchdog.start()
+    try:
+        connected.driver.act(Command(0.05, 1.0))
+        watchdog.feed()
+        connected.until_told(0.05, 1.0)
+        connected.until_told(0.0, 0.0)
+        until(lambda: watchdog.stops == 1)
+    finally:
+        watchdog.end()
+
+
+def test_to_stop_a_robot_that_is_not_connected_does_nothing(rig: Rig) -> None:
+    driver = rig.made_driver(rig.address)
+    driver.stop()
+    driver.close()
+    driver.stop()
+    assert rig.told().speeds == []
+
+
+@pytest.fixture
+def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
+    """A link that passes everything on, with the rig's driver open at its end."""
+    with FaultyLink(rig.address_of_link()) as made:
+        rig.connect(made.address)
+        rig.told()
+        yield made
+        rig.driver.close()
+
+
+@ON_OWN_WIRE
+def test_answers_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
+    link.answers = ByteByByte()
+    for travel_m in (0.1, 0.2, 0.3):
+        rig.come_back(readings(travel_m))
+
+
+@ON_OWN_WIRE
+def test_commands_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
+    link.commands = ByteByByte()
+    for linear_mps in (0.05, -0.02):
+        rig.driver.act(Command(linear_mps, 1.0))
+        rig.until_told(linear_mps, 1.0)
+
+
+@ON_OWN_WIRE
+def test_garbage_ends_the_connection_and_a_new_one_reads_on(rig: OwnWireRig, link: FaultyLink) -> None:
+    link.answers = Before(b"\x77")
+    sense_until_lost(rig)
+    assert rig.driver.counts()["garbage"] == 1
+    until(lambda: opened(rig.driver))
+    rig.come_back(readings(0.1))
+
+
+@ON_OWN_WIRE
+@pytest.mark.parametrize("size", [0, 1, 60])
+def test_a_robot_that_falls_silent_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
+    link.answers = CutAfter(size)
+    sense_until_lost(rig)
+    assert rig.driver.counts()["silences"] == 1
+    link.answers = Nothing()
+    until(lambda: opened(rig.driver))
+    rig.come_back(readings(0.1))
+
+
+@ON_OWN_WIRE
+@pytest.mark.parametrize("size", [0, 1, 60])
+def test_a_robot_that_hangs_up_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
+    link.answers = CutAfter(size, hang_up=True)
+    sense_until_lost(rig)
+    assert rig.driver.counts()["hung_up"] == 1
+    link.answers = Nothing()
+    until(lambda: opened(rig.driver))
+    rig.come_back(readings(0.1))
+
+
+@ON_OWN_WIRE
+def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_comes(
+    rig: OwnWireRig, link: FaultyLink
+) -> None:
+    rig.come_back(readings(0.1))
+    link.answers = late = Late()
+    rig.publish(readings(0.2))
+    before = rig.driver.sense(frozenset({"odometry"}))
+    assert before["odometry.left_m"] == pytest.approx(0.1, abs=1e-3)
+    assert rig.driver.counts()["late_answers"] >= 1
+    late.let_go.set()
+    rig.come_back(readings(0.2))
+    assert "hung_up" not in rig.driver.counts()
+
+
+@ON_OWN_WIRE
+def test_a_robot_that_cannot_be_reached_is_not_waited_for_by_who_stops_it(rig: OwnWireRig, link: FaultyLink) -> None:
+    link.answers, link.commands = CutAfter(0), CutAfter(0)
+    began_ns = rig.clock.now_ns()
+    for _ in range(100):
+        rig.driver.stop()
+    assert rig.clock.now_ns() - began_ns < 1_000_000_000
+    sense_until_lost(rig)
+
+
+@ON_OWN_WIRE
+def test_a_robot_goes_on_as_it_was_told_when_its_link_is_lost(rig: OwnWireRig, link: FaultyLink) -> None:
+    rig.driver.act(Command(0.05, 0.0))
+    rig.until_told(0.05, 0.0)
+    link.answers = CutAfter(0, hang_up=True)
+    sense_until_lost(rig)
+    told = rig.told().speeds
+    assert all(np.isclose(linear_mps, 0.05, atol=1e-3) for linear_mps, _ in told)

@@ -1,0 +1,104 @@
+"""A schedule of faults is played, and the checks of the soak find what must not be."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from tests.support.deploy.runs import record_run
+from tests.tools.soak import invariants
+from tests.tools.soak.invariants import Broken
+from tests.tools.soak.plan import draw
+from tests.tools.soak.plays import play
+from tests.tools.soak.samples import Sample, flatness
+
+ROBOTS = ("a", "b")
+JOINED = ("joined", "r0", ROBOTS, -1)
+FLAT = Sample(0.0, "a world", 0, 400.0, 200.0, 60, 38, 0.0, 20.0, 0)
+
+
+def test_a_schedule_is_drawn_from_its_seed_and_everything_holds(tmp_path):
+    plan = draw(8)
+    assert plan == draw(8)
+    assert (plan.family, bool(plan.faults)) == ("wait", True)
+    assert all(play(plan, tmp_path))
+
+
+def test_a_seed_draws_every_family_and_every_fault():
+    plans = [draw(seed) for seed in range(1, 201)]
+    assert {plan.family for plan in plans} == {
+        "wait", "goes on", "real time", "own runners", "world killed", "campaign"
+    }  # fmt: skip
+    faults = {fault.what for plan in plans for fault in plan.faults}
+    assert faults == {"killed", "frozen", "frozen too long", "slowed", "leaves"}
+
+
+def summary(*changes):
+    """The part of a summary with these runner changes, each counted."""
+    rows = [{"what": what, "runner": runner, "robots": robots, "tick": tick} for what, runner, robots, tick in changes]
+    kinds = [what for what, *_ in changes]
+    return {
+        "runner_events": rows,
+        "counts": {"runners_lost": kinds.count("lost"), "runners_left": kinds.count("left")},
+    }
+
+
+def test_a_robot_of_two_runners_or_of_none_is_found():
+    good = summary(JOINED, ("lost", "r0", ROBOTS, 4), ("joined", "r1", ("a",), 5), ("returned", "r0", ("b",), 6))
+    assert invariants.owners_are_known(good, ROBOTS)
+    for changes in (
+        (JOINED, ("joined", "r1", ("a",), 4)),  # taken twice
+        (JOINED, ("lost", "r1", ("a",), 4)),  # of another runner
+        (JOINED, ("lost", "r0", ("a",), 4), ("lost", "r0", ("a",), 5)),  # lost twice
+        (("joined", "r0", ("a",), -1), ("lost", "r0", ("a",), 4)),  # begins without an agent for b
+    ):
+        with pytest.raises(Broken):
+            invariants.owners_are_known(summary(*changes), ROBOTS)
+    with pytest.raises(Broken):
+        invariants.owners_are_known({**summary(JOINED, ("lost", "r0", ROBOTS, 4)), "counts": {}}, ROBOTS)
+
+
+def test_fates_that_do_not_add_up_and_crashes_are_found():
+    assert invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2, "lost": 1}}})
+    with pytest.raises(Broken):
+        invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2}}})
+    assert invariants.nobody_crashed({"r0": {"0": 3, "-9": 1}})
+    with pytest.raises(Broken):
+        invariants.nobody_crashed({"r0": {"0": 3, "-6": 1}})
+
+
+def test_a_run_that_differs_and_a_folder_with_a_missing_file_are_found(tmp_path):
+    folder = tmp_path / "run"
+    record_run(folder, overrides=["duration_s=0.5", "robots.flock.count=3"])
+    for check in (invariants.folder_is_whole, invariants.repeats, invariants.undisturbed):
+        assert check(folder)
+    scenario = folder / "scenario.toml"
+    scenario.write_text(scenario.read_text().replace("loss = 0.3", "loss = 0.4"))
+    (folder / "static.json").unlink()
+    for check in (invariants.folder_is_whole, invariants.repeats, invariants.undisturbed):
+        with pytest.raises(Broken):
+            check(folder)
+
+
+def test_processes_and_files_that_are_left_are_found(tmp_path):
+    command = (sys.executable, "-c", "input()")
+    with subprocess.Popen(command, env={"TMPDIR": str(tmp_path)}, stdin=subprocess.PIPE) as process:
+        with pytest.raises(Broken, match=f"left: {process.pid} "):
+            invariants.nobody_is_left(tmp_path, 0)
+        process.communicate(b"\n")
+    assert invariants.nobody_is_left(tmp_path, 0)
+    assert invariants.nothing_is_left(tmp_path)
+    (tmp_path / "sw-1").mkdir()
+    with pytest.raises(Broken):
+        invariants.nothing_is_left(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("growth", "found"),
+    [({}, set()), ({"rss_mib": 0.01}, set()), ({"rss_mib": 0.1}, {"memory, MiB"}), ({"threads": 1}, {"threads"})],
+)
+def test_growth_over_an_hour_is_found(growth, found):
+    hour = [replace(FLAT, at_s=10.0 * n, tick=100 * n, cpu_s=3.0 * n) for n in range(361)]
+    rows = [replace(of, **{key: getattr(of, key) + n * by for key, by in growth.items()}) for n, of in enumerate(hour)]
+    assert {one.what for one in flatness({"a world": rows}, 3600.0) if not one.holds} == found

@@ -1,0 +1,374 @@
+"""The radio and the tracker of robots behind gateways."""
+
+import math
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import zenoh
+
+from swarmwire.agent.radios import world_radio
+from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
+from swarmwire.agent.radios.world_radio import WorldRadio
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.packets import (
+    BROADCAST,
+    NO_TX_STATUSES,
+    Payloads,
+    ReceivedPackets,
+    SentPackets,
+    TxResult,
+    TxStatuses,
+)
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.radio_bridge import encode_bridged
+from swarmwire.comms.wire.robot_network import open_swarm
+from swarmwire.comms.wire.sessions import close_session
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
+from swarmwire.world.gateways.tracker import EmulatedTracker
+from tests.support.clocks import FakeClock, until
+from tests.support.metrics.truths import static
+from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, peers, received_by, words
+
+MEASURES = ("range_m", "bearing_rad")
+AIR = BridgedRadio(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))
+ROWS = {"flock-1": 1, "flock-2": 2}  # flock-0 is not driven from elsewhere
+POSE = np.array([[1.0, 2.0, 0.5], [-1.0, 0.25, math.pi], [3.0, 0.0, -1.0]])
+ALL = np.ones(3, np.bool_)
+
+
+class DatedClock(FakeClock):
+    """A clock with a date."""
+
+    def utc_ns(self) -> int:
+        return self.time_ns
+
+
+@contextmanager
+def bridged(medium=AIR):
+    """A bridge, and a function that makes sessions that can call it."""
+    bridge, sessions = RadioBridge(Network(listen=ANY_PORT), KEYS, ROWS, medium), []
+    endpoints = bridge.open()
+
+    def session():
+        sessions.append(open_swarm(Network(connect=endpoints)))
+        return sessions[-1]
+
+    try:
+        yield bridge, session
+    finally:
+        for one in sessions:
+            one.close()
+        bridge.close()
+        bridge.close()
+
+
+def joined(session, own="flock-1", clock=None, **given) -> WorldRadio:
+    """A radio that has joined, and hears the bridge."""
+    radio = WorldRadio(session, KEYS, ROBOTS, own, clock or WallClock(), **given)
+    radio.open()
+    return radio
+
+
+def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPackets:
+    """Receiver, sender, sequence, and time of each packet, sorted; each is a word with its sequence."""
+    columns = [np.array(column, np.int64) for column in zip(*packets, strict=True)]
+    receiver, sender, sequence, at_ns = columns
+    payloads = payloads or Payloads.of([Word(number=float(number)).encode() for number in sequence])
+    given = {"range_m": 0.5 + sender, "bearing_rad": -0.5 * sender}
+    return ReceivedPackets(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
+
+
+def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
+    """Return once the radio hears what the bridge publishes, and nothing of it is on its way any more."""
+    row = ROWS[radio._own]
+    number = 1000
+
+    def reached() -> bool:
+        nonlocal number
+        number += 1
+        bridge.publish(0, received((row, 0, number, 0)), NO_TX_STATUSES)
+        return len(radio.received(0)[0]) > 0
+
+    until(reached)
+    number += 1
+    bridge.publish(0, received((row, 0, number, 0)), NO_TX_STATUSES)
+    until(lambda: number in radio.received(0)[0].sequence.tolist())
+
+
+def taken(bridge: RadioBridge, packets: int) -> SentPackets:
+    parts: list[SentPackets] = []
+    until(lambda: parts.append(bridge.take()) or sum(map(len, parts)) >= packets)
+    return SentPackets.joined(parts)
+
+
+def test_a_robot_learns_what_the_worlds_radio_gives():
+    with bridged() as (_, session):
+        radio = joined(session())
+        assert radio.measures == MEASURES
+        assert radio.needs == {"radio.range", "radio.bearing", "radio.tx_status"}
+        assert radio.terms == AIR.terms(1)
+
+
+def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
+    with bridged() as (bridge, session):
+        one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
+        payloads = Payloads.of([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
+        one.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
+        sent = taken(bridge, 2)
+        assert (sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()) == (
+            [1, 1],
+            [BROADCAST, 2],
+            [-1, 7],
+        )
+        assert [sent.payloads.row(i) for i in range(2)] == [payloads.row(i) for i in range(2)]
+        for number in range(5):
+            two.send(words(float(number), row=2))
+        sent = taken(bridge, 5)
+        assert sent.sender.tolist() == [2] * 5
+        assert [Word.decode(sent.payloads.row(i)).number for i in range(5)] == [0, 1, 2, 3, 4]
+        assert len(bridge.take()) == 0
+        assert bridge.counts() == {"packets_from_robots": 7}
+
+
+def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packets():
+    with bridged() as (bridge, session):
+        one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
+        exchange(bridge, one)
+        exchange(bridge, two)
+        shared = Payloads.of([Word(number=8).encode(), Word(number=9).encode()])
+        table = ReceivedPackets(
+            np.array([0, 1, 1, 2]),
+            np.array([1, 0, 2, 0]),
+            np.array([4, 8, 9, 8]),
+            np.array([5, 6, 7, 8]),
+            {"range_m": np.arange(4.0), "bearing_rad": -np.arange(4.0)},
+            np.array([1, 0, 1, 0]),
+            shared,
+        )
+        told = TxStatuses(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, TxResult.QUEUE_FULL, 0]))
+        bridge.publish(7, table, told)
+        found: list[tuple[ReceivedPackets, TxStatuses]] = []
+
+        def of(radio: WorldRadio, packets: int) -> tuple[ReceivedPackets, TxStatuses]:
+            found.clear()
+            until(lambda: found.append(radio.received(NS_PER_S)) or len(found[-1][0]) == packets)
+            return found[-1]
+
+        its, tx_status = of(one, 2)
+        assert (its.receiver.tolist(), its.sender.tolist(), its.sequence.tolist()) == ([1, 1], [0, 2], [8, 9])
+        assert its.given["range_m"].tolist() == [1.0, 2.0]
+        assert its.given["bearing_rad"].tolist() == [-1.0, -2.0]
+        assert [Word.decode(its.payloads.row(at)).number for at in its.payload] == [8, 9]
+        assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([1], [4])
+        assert tx_status.result.tolist() == [TxResult.QUEUE_FULL]
+        its, tx_status = of(two, 1)
+        assert (its.receiver.tolist(), its.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
+
+
+def test_nothing_received_is_no_frame(monkeypatch):
+    with bridged() as (bridge, _):
+        published: list[int] = []
+        encode = "swarmwire.world.gateways.radio_bridge.encode_bridged"
+        monkeypatch.setattr(encode, lambda *_: published.append(1) or b"")
+        bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # nobody behind the bridge received it
+        assert not published
+        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_TX_STATUSES)
+        assert len(published) == 2
+
+
+def test_times_are_the_agents_own_by_how_old_a_packet_was_when_its_tick_began():
+    with bridged() as (bridge, session):
+        log, clock = KeptLog(), DatedClock()
+        radio = joined(session(), clock=clock, log=log)
+        exchange(bridge, radio)
+        log.received_packets.clear()
+        bridge.publish(20, received((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_TX_STATUSES)
+        until(lambda: len(radio._inbox._waiting) == 1)
+        clock.time_ns += 10_000_000
+        its, _ = radio.received(5 * NS_PER_S)
+        assert its.received_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
+        (packet,) = log.received_packets
+        assert (packet.sender, packet.sequence, packet.to) == (0, 5, BROADCAST)
+        assert (packet.latency_ns, packet.distance_m, packet.given) == (None, 0.5, True)
+
+
+def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
+    with bridged() as (bridge, session):
+        log = KeptLog()
+        radio = joined(session(), log=log)
+        large = Payloads.of([bytes(20), bytes(21)])
+        radio.send(SentPackets(np.full(2, 1), np.full(2, BROADCAST), large))
+        assert taken(bridge, 2).payloads.sizes.tolist() == [20, 21]
+        assert [(packet.sequence, packet.fate) for packet in log.sent_packets] == [(0, "sent"), (1, "too_large")]
+        assert radio.counts() == {"packets_sent": 1, "packets_too_large": 1}
+
+
+@pytest.mark.parametrize(
+    ("own", "robots", "medium", "said"),
+    [
+        ("flock-0", ROBOTS, AIR, "expected a robot that the world lends its radio to: flock-1, flock-2"),
+        ("flock-1", ROBOTS, None, "expected a world with a radio; this run has none"),
+        ("flock-1", ROBOTS[::-1], AIR, "expected the robots of the world, in its order: flock-0, flock-1, flock-2"),
+    ],
+)
+def test_a_robot_that_does_not_fit_the_world_is_refused_in_one_line(own, robots, medium, said):
+    with bridged(medium) as (_, session), pytest.raises(BadInput, match=said) as caught:
+        WorldRadio(session(), KEYS, robots, own, WallClock()).open()
+    assert "\n" not in str(caught.value)
+
+
+def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
+    session = open_swarm(Network(listen=ANY_PORT))
+    clock = DatedClock()
+    try:
+        with pytest.raises(BadInput, match="expected a world that lends its radio to flock-1; none in the network"):
+            WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
+    finally:
+        close_session(session)
+    assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
+
+
+def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
+    with bridged() as (bridge, session):
+        peer = session()
+        radio = joined(peer)
+        key = KEYS.bridge_sent("flock-1")
+        other = frames.encode("actions", 1, {"rows": np.array([2]), "command": np.zeros((4, 1))})
+        for data in (b"", b"garbage", frames.encode("tick", 1, {}), other):
+            peer.put(key, data)
+        peer.put(key, bytes(2**20 + 1))
+        peer.put(KEYS.bridge_sent("flock-0"), b"")
+        peer.put(KEYS.bridge_sent("*"), b"")
+        radio.send(words(3.0, row=1))
+        assert taken(bridge, 1).sender.tolist() == [1]
+        counts = bridge.counts()
+        del counts["packets_from_robots"]
+        assert counts == {"frames_malformed": 4, "frames_of_nobody": 2, "frames_oversized": 1}
+
+
+def bad_frames() -> list[bytes]:
+    """Frames that no robot can use, most of them almost right."""
+    good = frames.decode(encode_bridged(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_TX_STATUSES))
+
+    def changed(name, value) -> bytes:
+        return frames.encode("tick", 3, {**good.arrays, name: value})
+
+    numbers = good.arrays["received/numbers"]
+    return [
+        b"",
+        frames.encode("end", 3, {}),
+        frames.encode("tick", -1, good.arrays),
+        frames.encode("tick", 3, {}),
+        encode_bridged(3, 1, received((2, 0, 1, 1)), NO_TX_STATUSES),
+        encode_bridged(3, 1, ReceivedPackets.none(MEASURES), TxStatuses(np.array([2]), np.array([1]), np.array([0]))),
+        changed("received/numbers", numbers[:4]),
+        changed("received/numbers", numbers[0]),
+        changed("received/numbers", numbers.astype(np.float64)),
+        changed("received/numbers", numbers + np.array([[0], [3], [0], [0], [0]])),
+        changed("received/numbers", numbers + np.array([[0], [0], [0], [0], [1]])),
+        changed("received/numbers", numbers - np.array([[0], [0], [0], [0], [1]])),
+        changed("received/given", good.arrays["received/given"][:1]),
+        changed("received/given", good.arrays["received/given"][0]),
+        changed("received/offset", good.arrays["received/offset"][:-1]),
+        changed("received/offset", good.arrays["received/offset"][::-1]),
+        changed("received/offset", np.empty(0, np.int64)),
+        changed("received/data", good.arrays["received/data"][:-1]),
+    ]
+
+
+def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it():
+    with bridged() as (bridge, session):
+        radio = joined(session())
+        exchange(bridge, radio)
+        bad = bad_frames()
+        for data in bad:
+            bridge.session.put(KEYS.bridge_received("flock-1"), data)
+        whole = zenoh.CongestionControl.BLOCK  # a busy machine drops no part of it
+        bridge.session.put(KEYS.bridge_received("flock-1"), bytes(2**20 + 1), congestion_control=whole)
+        bridge.publish(4, received((1, 0, 5, 1)), NO_TX_STATUSES)
+        assert received_by(radio, 1) == [(0, 5, 5.0)]
+        counts = radio.counts()
+        assert (counts["frames_malformed"], counts["frames_oversized"]) == (len(bad), 1)
+
+
+def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch):
+    monkeypatch.setattr(world_radio, "MAX_WAITING", 10)
+    with bridged() as (bridge, session):
+        radio = joined(session())
+        exchange(bridge, radio)
+        for tick in range(14):
+            bridge.publish(tick, received((1, 0, tick, tick * NS_PER_S // 10)), NO_TX_STATUSES)
+        until(lambda: radio.counts().get("frames_dropped") == 4)
+        assert [number for _, number, _ in received_by(radio, 10)] == list(range(10))
+
+
+def test_after_the_run_neither_side_is_hurt():
+    with bridged() as (bridge, session):
+        radio = joined(peer := session())
+        bridge.close()
+        radio.send(words(1.0))
+        close_session(peer)
+        radio.send(words(1.0))
+        radio.close()
+        assert radio.counts()["packets_refused"] == 1
+
+
+@contextmanager
+def seen(of, robots):
+    """The world's tracker of a run, and a robot's that listens to it."""
+    with peers(2) as (world, robot):
+        listens = RobotsTracker(robot, KEYS, robots)
+        listens.open()
+        clock = DatedClock()
+        tells = EmulatedTracker(world, KEYS, clock)
+        tells.begin(of)
+        yield tells, listens, clock, world
+        tells.end()
+
+
+def test_robots_alive_are_told_in_every_tick_with_the_date():
+    of = static(3)
+    with seen(of, of.robot_names) as (tells, listens, clock, _):
+        alive = np.array([True, False, True])
+
+        def told() -> bool:
+            tells.tell(POSE, alive)
+            return listens.pose("flock-2", clock.utc_ns()) is not None
+
+        until(told)
+        assert [listens.pose(name, clock.utc_ns()) for name in of.robot_names] == [
+            tuple(POSE[0]),
+            None,
+            tuple(POSE[2]),
+        ]
+        clock.time_ns += 2_000_000_000
+        assert listens.pose("flock-0", clock.utc_ns()) is None
+        tells.tell(POSE + 1.0, alive)
+        until(lambda: listens.pose("flock-2", clock.utc_ns()) == tuple(POSE[2] + 1.0))
+        assert listens.counts() == {"poses_malformed": 0, "poses_of_unknown": 0}
+        assert tells.counts() == {}
+
+
+def test_of_several_arenas_the_first_is_told():
+    of = static(1, arenas=3)
+    with seen(of, of.robot_names) as (tells, listens, clock, _):
+
+        def told() -> bool:
+            tells.tell(POSE, ALL)
+            return listens.pose("flock-0", clock.utc_ns()) is not None
+
+        until(told)
+        assert listens.pose("flock-0", clock.utc_ns()) == tuple(POSE[0])
+
+
+def test_a_network_that_is_gone_is_counted_and_harms_no_run():
+    of = static(3)
+    with seen(of, of.robot_names) as (tells, _, _, world):
+        world.close()
+        tells.tell(POSE, ALL)
+        assert tells.counts() == {"tracker_poses_refused": 3}
+        tells.end()

@@ -1,0 +1,294 @@
+"""The gateway answers nodes behind a bridge and nodes of rmw_zenoh, which another library speaks for."""
+
+import json
+from math import cos, sin
+
+import numpy as np
+import pytest
+import zenoh
+from zenoh.ext import Int64, z_deserialize
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.robots.ros2.links import close
+from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
+from swarmwire.world.gateways.ros2.publishers import Rate
+from tests.support.clocks import until
+from tests.support.comms.robots.ros2 import independent
+from tests.support.world.gateways import (
+    ALIVE,
+    PROPER,
+    TICK_NS,
+    TWIST,
+    TWIST_STAMPED,
+    UTC_NS,
+    DatedStillClock,
+    readings,
+    ros_node,
+    turtlebot,
+)
+
+# pycdr2 has arrays for types that are lists in fact:
+# pyright: reportIndexIssue=false
+
+
+TOPICS = {
+    "scan": "sensor_msgs/msg/LaserScan",
+    "odom": "nav_msgs/msg/Odometry",
+    "imu": "sensor_msgs/msg/Imu",
+    "battery_state": "sensor_msgs/msg/BatteryState",
+    "illuminance": "sensor_msgs/msg/Illuminance",
+}
+GO = independent.twist(0.1, -0.5).serialize()
+
+
+def dds(kind: str) -> str:
+    package, _, name = kind.split("/")
+    return f"{package}::msg::dds_::{name}_"
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_topic_is_told_to_bridges_and_to_rmw_alike(topic):
+    with ros_node() as node:
+        bridge = node.subscribe(f"flock_1/{topic}")
+        rmw = node.subscribe(f"0/flock_1/{topic}/{dds(TOPICS[topic])}/*")
+        until(lambda: (node.publish(), bridge and rmw)[1])
+        assert bridge[-1].attachment is None
+        attached = z_deserialize(tuple[Int64, Int64, bytes], rmw[0].attachment)
+        assert int(attached[0]) == 1
+        assert UTC_NS <= int(attached[1]) <= UTC_NS + 10**12
+        assert rmw[0].key_expr.__str__().rsplit("/", 1)[1].startswith("RIHS01_")
+        kind = independent.BY_KIND[TOPICS[topic]]
+        assert kind.deserialize(rmw[0].payload.to_bytes()).header.stamp.sec >= UTC_NS // 10**9
+
+
+def test_readings_are_told_in_units_and_signs_of_ros():
+    with ros_node(full_lux=800.0, north_deg=0.0) as node:
+        scan = node.message("flock_1/scan", TOPICS["scan"])
+        assert (scan.angle_min, len(scan.ranges)) == (0.0, 360)
+        assert scan.angle_max == pytest.approx(np.deg2rad(359.0))
+        assert scan.angle_increment == pytest.approx(np.deg2rad(1.0))
+        assert (scan.range_min, scan.range_max, scan.scan_time) == pytest.approx((0.12, 3.5, 0.2))
+        assert [scan.ranges[ray] for ray in (0, 90)] == [np.inf, 0.5]
+        imu = node.message("flock_1/imu", TOPICS["imu"])
+        assert (imu.linear_acceleration.x, imu.linear_acceleration.y, imu.angular_velocity.z) == (1.0, 2.0, 0.3)
+        assert (imu.orientation.z, imu.orientation.w) == pytest.approx((sin(0.25), cos(0.25)))
+        battery = node.message("flock_1/battery_state", TOPICS["battery_state"])
+        assert (battery.percentage, battery.voltage) == (0.5, 11.0)
+        assert node.message("flock_1/illuminance", TOPICS["illuminance"]).illuminance == 200.0
+        odom = node.message("flock_1/odom", TOPICS["odom"])
+        assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_footprint")
+
+
+def test_odometry_is_where_the_wheels_say_that_the_base_is_whether_or_not_anybody_listened():
+    with ros_node() as node:
+        rolled = dict(readings())
+        for tick in range(5):
+            for wheel in ("left_m", "right_m"):
+                rolled[f"odometry.{wheel}"] = np.array([0.0, 0.02 * tick])
+            node.publish(rolled)
+        came = node.subscribe("flock_1/odom")
+        odom = independent.Odometry.deserialize(node.first(came, rolled).payload.to_bytes())
+        assert odom.pose.pose.position.x == pytest.approx(0.08)
+
+
+def test_nothing_is_made_for_topics_without_subscribers(monkeypatch):
+    with ros_node() as node:
+        monkeypatch.setattr(node.gateway._messages, "encode", lambda *_: pytest.fail("encoded for nobody"))
+        for _ in range(10):
+            node.publish()
+
+
+@pytest.mark.parametrize(("rate_hz", "due"), [(0.0, 11), (10.0, 11), (5.0, 6), (3.0, 4), (30.0, 11)])
+def test_a_sensor_tells_at_its_own_rate(rate_hz, due):
+    rate = Rate(rate_hz)
+    assert sum(rate.is_due(tick * TICK_NS) for tick in range(11)) == due
+
+
+def test_a_lost_reading_is_not_told():
+    with ros_node() as node:
+        lost = {name: np.full_like(value, np.nan) for name, value in readings().items()}
+        imu, scan = node.subscribe("flock_1/imu"), node.subscribe("flock_1/scan")
+        node.first(scan, lost)
+        assert not imu
+        node.first(imu)
+
+
+@pytest.mark.parametrize(
+    ("key", "stamped", "attachment"),
+    [
+        ("flock_1/cmd_vel", False, None),
+        ("flock_1/cmd_vel", True, None),
+        (TWIST, False, PROPER),
+        (TWIST_STAMPED, True, PROPER),
+    ],
+)
+def test_a_command_drives_the_robot_that_it_names(key, stamped, attachment):
+    twist = independent.twist(0.1, -0.5)
+    message = independent.TwistStamped(independent.header(5, "base_link"), twist) if stamped else twist
+    with ros_node() as node:
+        node.session.put(key, message.serialize(), attachment=attachment)
+        assert node.told() == (0.1, -0.5)
+        assert not node.gateway.take().drive.any()
+        assert node.gateway.counts() == {}
+
+
+def test_a_session_as_rmw_zenoh_opens_one_hears_and_drives_and_finds_others_of_its_kind():
+    """A peer that connects to the gateway as its router, and to other peers of which that one tells it."""
+    with ros_node() as node:
+        config = {
+            "mode": "peer",
+            "connect": {"endpoints": [node.addresses[0]]},
+            "listen": {"endpoints": ["tcp/localhost:0"]},
+            "scouting": {"delay": 1, "multicast": {"enabled": False}, "gossip": {"enabled": True}},
+        }
+        one, other = (zenoh.open(zenoh.Config.from_json5(json.dumps(config))) for _ in range(2))
+        try:
+            scans, said = (
+                one.declare_subscriber(f"0/flock_1/scan/{dds(TOPICS['scan'])}/*"),
+                other.declare_subscriber("0/x"),
+            )
+            until(lambda: (node.publish(), scans.try_recv())[1], lambda sample: sample is not None)
+            one.put(TWIST, GO, attachment=PROPER)
+            assert node.told() == (0.1, -0.5)
+            until(lambda: (one.put("0/x", b"hello"), said.try_recv())[1], lambda sample: sample is not None)
+        finally:
+            close(one)
+            close(other)
+
+
+def test_a_base_without_commands_stops_by_itself_once():
+    with ros_node() as node:
+        node.session.put("flock_1/cmd_vel", GO)
+        assert node.told() == (0.1, -0.5)
+        node.clock.time_ns += 499_000_000
+        assert not node.gateway.take().drive.any()
+        node.clock.time_ns += 2_000_000
+        assert node.told() == (0.0, 0.0)
+        node.clock.time_ns += 10**12
+        assert not node.gateway.take().drive.any()
+        assert node.gateway.counts() == {"command_timeouts": 1}
+
+
+def test_a_base_that_was_told_to_rest_needs_no_more_commands():
+    with ros_node() as node:
+        node.session.put("flock_1/cmd_vel", independent.twist(0.0, 0.0).serialize())
+        assert node.told() == (0.0, 0.0)
+        node.clock.time_ns += 10**12
+        assert not node.gateway.take().drive.any()
+
+
+def test_what_is_no_command_is_counted_and_leaves_the_last_one():
+    with ros_node() as node:
+        broken = [b"", b"\0\1\0\0", GO[:-1], GO + bytes(8), b"\7" * 52, independent.twist(np.nan, 0.0).serialize()]
+        for payload in broken:
+            node.session.put("flock_1/cmd_vel", payload)
+        for attachment in (None, b"", PROPER[:-1]):
+            node.session.put(TWIST, GO, attachment=attachment)
+        node.session.put(TWIST_STAMPED, GO, attachment=PROPER)
+        until(node.gateway.counts, lambda counts: counts == {"malformed": len(broken) + 1, "no_attachment": 3})
+        assert not node.gateway.take().drive.any()
+
+
+def test_the_newest_of_several_commands_counts():
+    with ros_node() as node:
+        for speed in (0.05, 0.06, 0.07):
+            node.session.put("flock_1/cmd_vel", independent.twist(speed, 0.0).serialize())
+        last: list[float] = []
+        until(lambda: (last.append(node.told()[0]), last[-1])[1], lambda speed: speed == 0.07)
+
+
+def tokens(node, pattern: str) -> set[str]:
+    return {str(reply.ok.key_expr) for reply in node.session.liveliness().get(pattern)}
+
+
+def test_foreign_tools_find_nodes_and_topics_of_every_robot():
+    with ros_node() as node:
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        shown = {"/".join(token.split("/")[5:12]) for token in rmw}
+        for robot in ("flock_0", "flock_1"):
+            assert f"NN/%/%{robot}/base" in shown
+            for topic, kind in TOPICS.items():
+                assert f"MP/%/%{robot}/base/%{robot}%{topic}/{dds(kind)}" in {t.rsplit("/", 1)[0] for t in shown}
+            assert any(token.startswith(f"MS/%/%{robot}/base/%{robot}%cmd_vel/") for token in shown)
+        assert len({tuple(token.split("/")[3:5]) for token in rmw}) == 14  # ids of nodes and topics are their own
+        bridge = until(lambda: tokens(node, "@/*/@ros2_lv/**"), lambda found: len(found) == 13)
+        assert any("/MP/flock_1§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64c1" in t for t in bridge)
+        assert any("/MS/flock_1§cmd_vel/geometry_msgs§msg§Twist/" in t for t in bridge)
+
+
+def test_stamped_commands_are_announced_where_the_user_says_so():
+    with ros_node(stamped=True, distro="humble") as node:
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        assert sum("cmd_vel/geometry_msgs::msg::dds_::TwistStamped_/TypeHashNotSupported/" in t for t in rmw) == 2
+
+
+def test_a_dead_robot_is_silent_vanishes_and_takes_no_command_until_it_lives_again():
+    with ros_node() as node:
+        came = node.subscribe("flock_1/imu")
+        node.first(came)
+        node.session.put("flock_1/cmd_vel", GO)
+        node.told()
+        node.publish(alive=np.array([True, False]))
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 7)
+        assert not any("flock_1" in token for token in rmw)
+        came.clear()
+        assert node.told() == (0.0, 0.0)
+        node.session.put("flock_1/cmd_vel", GO)
+        node.session.put("flock_0/cmd_vel", GO)  # in order: it comes after that
+        commands = until(node.gateway.take, lambda commands: commands.drive.any())
+        assert commands.drive.tolist() == [True, False]
+        node.publish(alive=np.array([True, False]))
+        assert not came
+        node.publish(alive=ALIVE)
+        until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        node.first(came)
+
+
+def test_the_clock_is_told_to_whoever_subscribes_as_stamps_have_it():
+    with ros_node() as node:
+        imu, clock = node.subscribe("flock_1/imu"), node.subscribe("0/clock/rosgraph_msgs::msg::dds_::Clock_/*")
+        until(lambda: (node.publish(), imu and clock)[1])
+        until(lambda: (node.publish(), {stamp(of) for of in imu} & {time(of) for of in clock})[1])
+
+
+def stamp(sample: zenoh.Sample) -> int:
+    return independent.stamp_ns(independent.Imu.deserialize(sample.payload.to_bytes()).header)
+
+
+def time(sample: zenoh.Sample) -> int:
+    shown = independent.Clock.deserialize(sample.payload.to_bytes()).clock
+    return shown.sec * 10**9 + shown.nanosec
+
+
+def test_all_robots_answer_at_one_endpoint_which_is_free_after_the_close():
+    with ros_node() as node:
+        address = node.addresses[0]
+        assert node.addresses == (address, address)
+        again = gateway(address)
+        with pytest.raises(BadInput, match=f"ros2: address: cannot listen on {address}"):
+            again.open()
+    again.open()
+    again.close()
+    again.close()
+
+
+def gateway(address: str, names=("flock-0",)) -> Ros2Gateway:
+    return Ros2Gateway(names, turtlebot(), address, Ros2GatewayOptions(), DatedStillClock())
+
+
+def test_an_address_that_is_no_endpoint_is_refused():
+    with pytest.raises(BadInput, match="ros2: address: expected an endpoint of zenoh such as tcp/"):
+        gateway("127.0.0.1:7447")
+
+
+def test_robots_whose_names_are_one_in_ros_are_refused():
+    with pytest.raises(BadInput, match="where this robot is called flock_0"):
+        gateway("", names=("flock-0", "flock_0"))
+
+
+def test_a_body_with_few_senses_tells_those():
+    few = Ros2Gateway(["a"], load_body("kilobot"), "", Ros2GatewayOptions(), DatedStillClock())
+    few.open()
+    few.publish(0, {"light.value": np.zeros((1, 1))}, np.ones(1, np.bool_))
+    few.close()

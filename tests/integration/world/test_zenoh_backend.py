@@ -1,0 +1,454 @@
+"""The backend of runners in a network."""
+
+import os
+import queue
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from swarmwire.agent import runner
+from swarmwire.agent.local_backend import LocalBackend
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
+from swarmwire.comms.packets import ReceivedPackets
+from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.join import GroupInfo, JoinLimits, JoinRequest, SessionInfo
+from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
+from swarmwire.world.backends import zenoh_backend
+from swarmwire.world.backends.join_policy import JoinPolicy
+from swarmwire.world.backends.registry import RunnerEvent, RunnerHealth
+from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
+from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
+from tests.support.clocks import TIMEOUT_S, until
+
+RUN = "r1"
+ROWS = [0, 1, 2, 3, 4]
+OFFER = SessionInfo(RUN, "s", "", "1", 10, None, (GroupInfo("flock", "a:B", "f" * 64, 3, ()),))
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    with tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp") as directory:  # a socket's path must be short
+        yield unix_endpoint(f"{directory}/world")
+
+
+def parts(agent: str, *rows: list[int]) -> list[Assignment]:
+    return [assignment(group(spec(agent), own)) for own in rows]
+
+
+@contextmanager
+def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[LockstepBackend]:
+    backend = LockstepBackend(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
+    try:
+        backend.open()
+        yield backend
+    finally:
+        backend.close()
+
+
+@contextmanager
+def processes(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator["subprocess.Popen[bytes]"]:
+    """An agent host and its runners; none is left afterwards, whatever happened."""
+    command = [sys.executable, "-m", "swarmwire.agent.agent_host", endpoint, RUN, spec(agent), *names]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=environment
+    ) as agent_host:
+        try:
+            yield agent_host
+        finally:
+            if agent_host.stdin is not None:
+                agent_host.stdin.close()  # the life line: it ends all that are left
+            agent_host.wait(10.0)
+
+
+@contextmanager
+def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseException | None]"]:
+    """A runner in this process; its end is put into the queue."""
+    ends: queue.SimpleQueue[BaseException | None] = queue.SimpleQueue()
+
+    def play() -> None:
+        try:
+            runner.run(endpoint, RUN, name)
+        except BaseException as error:  # noqa: BLE001 - the test asks how it ended
+            ends.put(error)
+        else:
+            ends.put(None)
+
+    playing = threading.Thread(target=play)
+    playing.start()
+    try:
+        yield ends
+    finally:
+        playing.join(20.0)
+        assert not playing.is_alive()
+
+
+def three_ticks(backend: LockstepBackend, rows: list[int]) -> None:
+    for tick in range(3):
+        backend.act(tick, one_group(tick, rows), ReceivedPackets.none(MEASURES))
+
+
+def on_receive(before: Actions | None) -> ReceivedPackets:
+    return ReceivedPackets.none(MEASURES) if before is None else received_from(before.sent, ROWS)
+
+
+@pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
+def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[list[int]]) -> None:
+    local = LocalBackend(assignment(group(spec("Chatter"), ROWS)))
+    local.start()
+    before: Actions | None = None
+    names = [f"r{i}" for i in range(len(rows))]
+    with processes(endpoint, names) as agent_host:
+        with opened(endpoint, parts("Chatter", *rows)) as backend:
+            backend.start()
+            for tick in range(6):
+                acting = [row for row in ROWS if (row + tick) % 4]  # robots drop out and come back
+                expected = local.act(tick, one_group(tick, acting), on_receive(before))
+                got = backend.act(tick, one_group(tick, acting), on_receive(before))
+                assert plain(got) == plain(expected)
+                assert len(expected.sent) == 3 * len(acting)
+                before = expected
+            assert not backend.counts()
+        assert agent_host.wait(10.0) == 0  # told that the run is over, they leave by themselves
+    assert agent_host.stdout is not None
+
+
+def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
+    keys = Keys(RUN)
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
+        backend.start()
+        with open_runner(endpoint) as foreign:
+            for key in (keys.answer("r0"), keys.answer("stranger"), keys.alive("stranger")):
+                foreign.put(key, b"\xc1 no frame")
+            foreign.put(keys.answer("r0"), frames.encode("actions", 10**9, {}))
+            foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
+            foreign.delete(keys.answer("r0"))
+            asked = [
+                foreign.get(key, payload=payload)
+                for key, payload in (
+                    (keys.join("x"), b"\xc1"),
+                    (keys.any_join, JoinRequest().encode()),
+                    (keys.join("x"), JoinRequest().encode()),
+                )
+            ]
+            names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
+            tick = 0
+            while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
+                got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                tick += 1
+                assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
+            errors = [reply.err for replies in asked for reply in replies]
+        texts = [error.payload.to_string() if error else "granted" for error in errors]
+        assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
+        got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+        assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
+        assert set(backend.counts()) == names | {"bad_join", "refused_join"}
+
+
+def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) -> None:
+    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 it is robots 0 and 4 whose compass shows more than 0
+    with processes(endpoint, ["a", "b"], "Vanishing") as agent_host:
+        with opened(endpoint, slots) as backend:
+            backend.start()
+            with pytest.raises(RunnerLost) as caught:
+                three_ticks(backend, ROWS)
+            assert caught.value.robots == "flock-0, flock-3, flock-4"
+            assert caught.value.runner in {"a", "b"}
+            assert "gone" in caught.value.reason
+        assert agent_host.stdout is not None
+        assert agent_host.stdout.readline().split()[1] == b"3"  # the agent host tells the exit code
+
+
+def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"], "Failing") as agent_host:
+        with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as backend:
+            backend.start()
+            with pytest.raises(AgentFailed) as caught:
+                three_ticks(backend, [0, 1, 2, 3])
+        assert agent_host.wait(10.0) == 0
+    assert caught.value.robots == "flock-0"
+    assert "NotDeclared" in caught.value.traceback
+    assert "print(robot.proximity)" in caught.value.traceback
+
+
+def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoint: str) -> None:
+    with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as backend:
+        with pytest.raises(AgentFailed) as caught:
+            backend.start()
+        backend.close()
+        assert ends.get(timeout=20.0) is None
+    assert caught.value.robots == "flock-0, flock-1"
+    assert "no memory left" in caught.value.traceback
+
+
+def test_an_agent_that_is_not_there_ends_the_run_with_the_reason(endpoint: str) -> None:
+    fails = pytest.raises(AgentFailed, match="no such name: 'Nowhere'")
+    with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as backend, fails:
+        backend.start()
+
+
+def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
+        backend.start()
+        with thread(endpoint, "r1") as ends:
+            tick = 0
+            while "refused_join" not in backend.counts():
+                backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                tick += 1
+            end = ends.get(timeout=20.0)
+        backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))  # that it left does not matter
+        backend.close()
+    assert isinstance(end, RunnerLost)
+    assert end.reason == "all robots are taken"
+
+
+def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
+    for _ in range(8):  # a world that listens but cannot answer yet is but a moment: one try would rarely meet it
+        with thread(endpoint, "r0") as ends:
+            with opened(endpoint, parts("Counter", [0])) as backend:
+                backend.start()
+            assert ends.get(timeout=20.0) is None
+
+
+def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
+    with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
+        runner.run(endpoint, RUN, "r0")
+
+
+def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(zenoh_backend, "POLL_S", TIMEOUT_S)  # it would answer nobody while it waits for more to come
+    keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
+    with opened(endpoint, slots) as backend, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
+        started = others.submit(backend.start)
+        for row in ROWS:
+            (reply,) = asking.get(keys.join(f"r{row}"), payload=JoinRequest().encode(), timeout=TIMEOUT_S)
+            assert reply.ok is not None
+            asking.put(keys.answer(f"r{row}"), frames.encode("ready", -1, {}))
+        started.result(TIMEOUT_S)
+
+
+def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
+    with opened(endpoint, parts("Counter", [0, 1]), timeout_s=0.05) as backend, pytest.raises(RunnerLost) as caught:
+        backend.start()
+    assert caught.value.robots == "flock-0, flock-1"
+    assert caught.value.reason == "no answer for 0.05 s"
+
+
+def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
+    backend = LockstepBackend(
+        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), BackendHooks(lambda: "its process ended")
+    )
+    try:
+        with pytest.raises(RunnerLost, match="its process ended"):
+            backend.start()
+    finally:
+        backend.close()
+
+
+def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -> None:
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
+        backend.start()
+        second = LockstepBackend(endpoint, "other", parts("Counter", [0]), TIMEOUT_S, WallClock())
+        with pytest.raises(BadInput, match="expected an endpoint that is free"):
+            second.open()
+        second.close()
+        got = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
+        assert got.linear_mps.tolist() == [1.0]
+
+
+def test_a_socket_in_a_directory_that_is_not_there_is_bad_input(endpoint: str) -> None:
+    with pytest.raises(BadInput), opened(endpoint.replace("world", "nowhere/world"), parts("Counter", [0])):
+        pass
+
+
+def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
+    path = endpoint.split("/", 1)[1]
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(path)
+    assert Path(path).is_socket()
+    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
+        backend.start()
+        assert backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0]
+
+
+def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
+    backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, WallClock())
+    backend.close()
+    backend.open()
+    backend.close()
+    backend.close()
+
+
+def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
+    """A world in a process of its own, killed without a word."""
+    program = f"""
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.world.backends.zenoh_backend import LockstepBackend
+from tests.integration.world.test_zenoh_backend import RUN, parts
+
+backend = LockstepBackend({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())
+backend.start()
+print("started", flush=True)
+input()
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
+    ) as world:
+        try:
+            with thread(endpoint, "r0") as ends:
+                assert world.stdout is not None
+                assert world.stdout.readline() == b"started\n"
+                world.kill()
+                assert ends.get(timeout=20.0) is None
+        finally:
+            world.kill()
+
+
+def kill_one(agent_host: "subprocess.Popen[bytes]") -> None:
+    child = psutil.Process(agent_host.pid).children()[0]
+    child.kill()
+    child.wait(20.0)
+
+
+def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
+    with ExitStack() as later, processes(endpoint, ["a", "b"]) as agent_host:
+        around = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        later.callback(backend.close)
+        backend.start()
+        for tick in range(2):
+            backend.act(tick, one_group(tick, [0, 1, 2]), ReceivedPackets.none(MEASURES))
+        kill_one(agent_host)
+        got = backend.act(2, one_group(2, [0, 1, 2]), ReceivedPackets.none(MEASURES))
+        steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
+        assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
+        assert backend.counts() == {"runners_lost": 1, "runners_joined_late": 1}
+        backend.close()
+
+
+def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
+    with processes(endpoint, ["a", "b"]) as agent_host:
+        asked: list[bool] = []
+        around = BackendHooks(stopped=lambda: bool(asked))
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        try:
+            backend.start()
+            kill_one(agent_host)
+            asked.append(True)
+            with pytest.raises(Interrupted):
+                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
+        finally:
+            backend.close()
+
+
+class LeapingClock(WallClock):
+    """The wall clock, which a test may set forward."""
+
+    def __init__(self) -> None:
+        self.ahead_ns = 0
+
+    def now_ns(self) -> int:
+        return super().now_ns() + self.ahead_ns
+
+
+def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
+    clock = LeapingClock()
+    with thread(endpoint, "r0") as ends:
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
+        with closing(backend):
+            backend.start()
+            for tick in range(3):
+                actions = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+            assert not backend.counts()
+            assert backend.health() == RunnerHealth(ready=1, lost=0)
+        assert ends.get(timeout=20.0) is None
+
+
+def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
+    """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
+    clock, waits = LeapingClock(), list[RunnerHealth]()
+    with processes(endpoint, ["a"]) as agent_host:
+
+        def frozen() -> bool:
+            if backend.health().ready and not waits:
+                waits.append(backend.health())
+                clock.ahead_ns += to_ns(10 * TIMEOUT_S)
+                child.resume()
+            return False
+
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, BackendHooks(stopped=frozen))
+        with closing(backend):
+            backend.start()
+            child = psutil.Process(agent_host.pid).children()[0]
+            waits.clear()
+            child.suspend()
+            actions = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
+            assert actions.linear_mps.tolist() == [1.0]
+            assert waits[0].waits_s > 0
+            assert waits[0].waits_for == "a, which plays flock-0"
+            assert backend.health() == RunnerHealth(ready=1, lost=0)
+            backend.close()
+
+
+class Told:
+    """What a backend told, and what a test does upon it."""
+
+    def __init__(self) -> None:
+        self.changes: list[RunnerEvent] = []
+        self.free: list[tuple[str, ...]] = []
+        self.endpoints: tuple[str, ...] = ()
+
+    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
+        self.changes.append(change)
+        self.free.append(free)
+
+    def opened(self, endpoints: tuple[str, ...]) -> None:
+        self.endpoints = endpoints
+
+
+def backend_at(endpoint: str, told: Told, limits: JoinLimits) -> LockstepBackend:
+    whole = [assignment(group(spec("Counter"), [0, 1, 2]))]
+    around = BackendHooks(changed=told.changed, opened=told.opened)
+    return LockstepBackend(
+        endpoint, RUN, whole, 20.0, WallClock(), around, "stand", policy=JoinPolicy(OFFER, True, limits=limits)
+    )
+
+
+def test_who_takes_robots_and_builds_no_agents_loses_them(endpoint: str) -> None:
+    told, keys = Told(), Keys(RUN)
+    with closing(backend_at(endpoint, told, JoinLimits(join_s=0.2))) as backend:
+        backend.open()
+        assert told.endpoints == (endpoint,)
+        with closed_after(open_runner(endpoint)) as idler:
+            asked = [
+                idler.get(keys.session_info("idler")),
+                idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
+            ]
+            until(lambda: (backend._take_in(), told.changes)[1])
+            replies = [next(iter(replies)) for replies in asked]
+    assert all(reply.ok is not None for reply in replies)
+    session_info = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None
+    assert session_info is not None
+    assert session_info.groups[0].robots == 3
+    reason = "its agents were not ready within 0.2 s"
+    assert told.changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
+    assert [sorted(free) for free in told.free] == [["flock-0", "flock-1", "flock-2"]]

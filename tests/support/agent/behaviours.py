@@ -1,0 +1,102 @@
+"""Behaviours in a world of one robot."""
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.agent.behaviours import PsoSearchPositioned
+from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
+from swarmwire.agent.behaviours.pso.variants import BestPlace
+from swarmwire.agent.host import agent_group
+from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.comms.messages import Message
+from swarmwire.comms.packets import Payloads, ReceivedPackets
+from swarmwire.comms.tick_io import Actions, GroupReadings
+from tests.support.agent.hosts import group
+
+HERE = (1.0, -2.0)
+RAYS_RAD = np.deg2rad([17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0])
+
+
+class One:
+    """One particle; every step says what it senses and hears: the first best from robot 1, the next from 2, …"""
+
+    def __init__(self, kind: type[ParticleSwarm[Any]] = PsoSearchPositioned, **params: Any) -> None:
+        self.tick, self.place = 0, HERE
+        self.wheels_m, self.heading_rad, self.brightness = [5.0, 6.0], 0.0, 0.1
+        self.rays = np.zeros(8)
+        self._host = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
+
+    def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
+        k = len(bests)
+        zeros = np.zeros(k, np.int64)
+        given = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
+        payloads = Payloads.of([best.encode() for best in bests])
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), payloads)
+        fields = {
+            "proximity.value": self.rays[None, :],
+            "compass.heading_rad": np.array([self.heading_rad]),
+            "odometry.left_m": np.array([self.wheels_m[0]]),
+            "odometry.right_m": np.array([self.wheels_m[1]]),
+            "light.value": np.full((1, 8), self.brightness / 8.0),
+            "positioning.x_m": np.array([self.place[0]]),
+            "positioning.y_m": np.array([self.place[1]]),
+        }
+        actions = self._host.act(
+            (self.tick, self.tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
+        )
+        self.tick += 1
+        return actions
+
+    def steps(self, count: int) -> list[Actions]:
+        return [self.step() for _ in range(count)]
+
+    @property
+    def memory(self) -> Particle:
+        return self._host._state
+
+    def vector(self, name: str) -> tuple[float, float]:
+        return float(getattr(self.memory, f"{name}_x")[0]), float(getattr(self.memory, f"{name}_y")[0])
+
+
+def place(brightness: float, x_m: float, y_m: float) -> BestPlace:
+    return BestPlace(brightness=brightness, x_m=x_m, y_m=y_m)
+
+
+class Walker:
+    """An e-puck at 10 Hz; `n` of them differ in their draws alone."""
+
+    def __init__(self, kind: type[VectorAgent[Any]], word: type[Message] | None = None, n: int = 1, **params: Any):
+        self._host = agent_group(group("", list(range(n)), body="epuck", params=params), kind)
+        self._word, self._n, self._tick = word, n, 0
+
+    @property
+    def memory(self) -> Any:
+        return self._host._state
+
+    def step(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> Actions:
+        """Neighbours, as range in m and bearing in rad, are received by all.
+
+        A thing is near in direction `near_rad`.
+        """
+        k, n = len(neighbours), self._n
+        table = np.tile(np.array(neighbours, np.float64).reshape(-1, 2), (n, 1))
+        zeros, receiver = np.zeros(n * k, np.int64), np.repeat(np.arange(n), k)
+        given = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
+        payloads = Payloads.of([self._word().encode()] * (n * k) if self._word else [])
+        received = ReceivedPackets(receiver, zeros + n, zeros, zeros, given, np.arange(n * k), payloads)
+        value = np.zeros((n, 8))
+        if near_rad is not None:
+            value[:] = np.maximum(np.cos(RAYS_RAD - near_rad), 0.0) ** 4
+        time = (self._tick, self._tick * 10**8, 10**8)
+        self._tick += 1
+        return self._host.act(time, GroupReadings(np.arange(n), {"proximity.value": value}), received)
+
+    def first_turns_rad(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> np.ndarray:
+        """How far each turns on the spot before it first goes straight, (n,), positive to the left."""
+        turned, turning = np.zeros(self._n), np.ones(self._n, np.bool_)
+        for step in range(60):
+            actions = self.step(*(neighbours if step == 0 else ()), near_rad=near_rad if step == 0 else None)
+            turning &= actions.linear_mps == 0.0
+            turned += np.where(turning, 0.1 * actions.angular_radps, 0.0)
+        return turned

@@ -1,0 +1,117 @@
+"""The page: a browser, and a stand-in for a run."""
+
+import contextlib
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from swarmwire.deploy.live.following import RunGone
+from swarmwire.deploy.live.remote_control import Refused
+
+QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+         "--disable-background-networking", "--disable-component-update", "--disable-sync")  # fmt: skip
+PATIENCE_MS = 60_000  # of a machine that is busy
+
+
+@contextlib.contextmanager
+def paged(scenario: Path, out: Path, *options: str) -> Generator[tuple["subprocess.Popen[str]", str]]:
+    """`swarmwire run --ui`, once it has told the page's address; whatever it started ends with the block."""
+    command = [sys.executable, "-m", "swarmwire.deploy", "run", str(scenario), "--ui", "--out", str(out), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        try:
+            said = ""
+            while (found := re.search(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", said)) is None:
+                line = process.stdout.readline()
+                assert line, said
+                said += line
+            yield process, found[1]
+        finally:
+            for one in reversed(family(process.pid)):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    one.kill()
+
+
+def family(pid: int) -> list[psutil.Process]:
+    """The process and all that it started; nothing if it has ended."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
+    return []
+
+
+@contextlib.contextmanager
+def chromium(address: str) -> Generator[Any]:
+    """A page of chromium at this address, which shows no viewer: drawing it takes all that a small machine has.
+
+    What goes wrong on the page fails the test.
+    """
+    sync = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("needs chromium")
+    faults: list[str] = []
+    with sync.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=list(QUIET))
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.set_default_timeout(PATIENCE_MS)
+        page.route("**/re_viewer*", lambda route: route.abort())
+        page.on("pageerror", lambda error: faults.append(str(error)) if address in str(error.stack) else None)
+        page.on(
+            "response",
+            lambda answer: faults.append(answer.url) if answer.url.startswith(address) and not answer.ok else None,
+        )
+        try:
+            page.goto(address)
+            yield page
+        finally:
+            browser.close()
+    assert not faults, faults
+
+
+class StandIn:
+    """Keeps what it was asked for; refuses events that are not known, and is gone once `gone` is set."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Any]] = []
+        self.tick, self.state, self.gone = 0, "running", False
+        self.told = threading.Event()  # a status was asked for
+
+    def status(self) -> dict[str, Any]:
+        if self.gone:
+            raise RunGone("nobody answers")
+        self.told.set()
+        metrics = {"order": 0.5, "rejoin_median": None}
+        return {"tick": self.tick, "ticks": 100, "time_s": self.tick / 10, "state": self.state, "metrics": metrics,
+                "measures_ms": 1.5, "alive": 3}  # fmt: skip
+
+    def pause(self) -> None:
+        self.asked.append(("pause", None))
+
+    def resume(self) -> None:
+        self.asked.append(("resume", None))
+
+    def step(self, n: int = 1) -> None:
+        self.asked.append(("step", n))
+
+    def speed(self, factor: float | None) -> None:
+        self.asked.append(("speed", factor))
+
+    def stop(self) -> None:
+        self.asked.append(("stop", None))
+
+    def event(self, table: dict[str, Any]) -> int:
+        if table.get("do") != "kill":
+            raise Refused("do: expected something that can happen")
+        self.asked.append(("event", table))
+        return 7
+
+    def end(self, number: int) -> None:
+        self.asked.append(("end", number))

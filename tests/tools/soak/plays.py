@@ -1,0 +1,299 @@
+"""Plays one schedule of faults, and checks its invariants: `play`."""
+
+import os
+import signal
+import tempfile
+import threading
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from swarmwire.comms.errors import RunnerLost
+from swarmwire.deploy import repeat, sweep
+from swarmwire.deploy.config import Listening, Recording
+from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.metrics.run_folder.layout import DIGESTS
+from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.verify import verify
+from tests.support.clocks import until
+from tests.support.deploy.campaign import rows_in, scenario_in, series_in
+from tests.tools.soak import invariants
+from tests.tools.soak.actors import Actors, Nursed
+from tests.tools.soak.invariants import Broken
+from tests.tools.soak.plan import ROBOTS, TIMEOUT_S, Plan
+from tests.tools.soak.processes import PYTHON, SCENARIO, Supervised, environment, family
+
+RATE_HZ = 10
+SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+ENDS = {signal.SIGKILL: -9, signal.SIGTERM: 130, signal.SIGINT: 130, signal.SIGHUP: 129}
+BEGIN_S, END_S = 240.0, 120.0  # on a machine that is busy
+EACH_S = 0.02
+SEEDS, LOSSES = 6, [0.0, 0.5]
+LONG = "duration_s=20"
+MAX_KILLS = 3
+LIMIT_S = 240.0
+STACKS_S = 10.0  # for a process that is aborted to write where it stood
+
+
+def play(plan: Plan, folder: Path) -> list[str]:
+    """What held of a schedule, a line each; Broken if an invariant did not. Its files are left in the folder."""
+    plays = {"own runners": _play_own_runners, "world killed": _play_killed_world, "campaign": _play_campaign}
+    return plays.get(plan.family, _play_joined)(plan, folder)
+
+
+def _play_joined(plan: Plan, folder: Path) -> list[str]:
+    """What held; Broken if something did not."""
+    with own_temporary(folder / "tmp") as env:
+        actors = Actors(plan, folder, env)
+        simulation = Simulation(
+            SCENARIO,
+            overrides=overrides(plan),
+            out=folder / "run",
+            realtime=plan.speed if plan.family == "real time" else None,
+            record=Recording(rrd=False),
+            listening=Listening(("tcp/127.0.0.1:0",), start_with=_start_with(plan), observer=actors),
+        )
+        if plan.family != "real time":
+            simulation.controls.set_speed(plan.speed)
+        simulation.watch(actors)
+        actors.start()
+        try:
+            result = finished(simulation)
+        finally:
+            actors.close()
+        told = [f"{result.ticks} ticks, {result.ended}"]
+        if (result.ended, result.ticks) != ("duration", plan.ticks):
+            raise invariants.Broken(f"it ended as {result.ended} after {result.ticks} of {plan.ticks} ticks")
+        return told + held(plan, folder)
+
+
+def held(plan: Plan, folder: Path) -> list[str]:
+    """The invariants of a run that ended."""
+    run = folder / "run"
+    summary = invariants.read_summary(run)
+    robots = [f"swarm-{at}" for at in range(ROBOTS)]
+    return [
+        invariants.fates_add_up(summary),
+        invariants.owners_are_known(summary, robots, all_played=not plan.late),
+        invariants.folder_is_whole(run),
+        invariants.undisturbed(run) if plan.family == "wait" else invariants.repeats(run),
+        *nothing_left(folder),
+    ]
+
+
+def nothing_left(folder: Path, *, killed: bool = False) -> list[str]:
+    """Neither processes nor files, but what a killed world leaves to the next."""
+    temporary = folder.absolute() / "tmp"
+    return [invariants.nobody_is_left(temporary, os.getpid()), invariants.nothing_is_left(temporary, killed=killed)]
+
+
+def overrides(plan: Plan) -> list[str]:
+    """The scenario's values."""
+    return [
+        f"robots.swarm.count={ROBOTS}",
+        "robots.swarm.place={ how = 'disc', radius_m = 2.0 }",
+        f"duration_s={plan.ticks / RATE_HZ}",
+        f"run.on_runner_loss={plan.on_loss}",
+        f"run.runner_timeout_s={TIMEOUT_S}",
+    ]
+
+
+@contextmanager
+def own_temporary(temporary: Path) -> Generator[Mapping[str, str]]:
+    """The environment of a schedule, whose temporary files, also those of this process, are in a folder of its own."""
+    env = environment(temporary.absolute())
+    before, os.environ["XDG_RUNTIME_DIR"] = os.environ.get("XDG_RUNTIME_DIR"), env["XDG_RUNTIME_DIR"]
+    tempfile.tempdir, cached = env["TMPDIR"], tempfile.tempdir
+    try:
+        yield env
+    finally:
+        tempfile.tempdir = cached
+        if before is None:
+            del os.environ["XDG_RUNTIME_DIR"]
+        else:
+            os.environ["XDG_RUNTIME_DIR"] = before
+
+
+def _start_with(plan: Plan) -> int | None:
+    return sum(plan.robots[: len(plan.robots) - plan.late]) if plan.late else None
+
+
+def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
+    """What held; Broken if something did not."""
+    with own_temporary(folder / "tmp") as env:
+        actors = Nursed(plan, folder, env)
+        simulation = Simulation(
+            SCENARIO,
+            overrides=overrides(plan),
+            out=folder / "run",
+            runners=len(plan.robots),
+            record=Recording(rrd=False),
+        )
+        simulation.controls.set_speed(plan.speed)
+        simulation.watch(actors)
+        for own in actors.runners.values():
+            own.stay_away()
+        actors.start()
+        failed = ""
+        try:
+            finished(simulation)
+        except RunnerLost as error:
+            failed = str(error)
+        finally:
+            actors.close()
+        summary = invariants.read_summary(folder / "run")
+        expected = "failed" if failed else "duration"
+        if summary["ended"] != expected or (failed and plan.on_loss != "stop"):
+            raise invariants.Broken(f"it ended as {summary['ended']}: {failed or summary['error']}")
+        run = folder / "run"
+        robots = [f"swarm-{at}" for at in range(ROBOTS)]
+        return [
+            f"{summary['ticks']} ticks, {summary['ended']}",
+            invariants.fates_add_up(summary),
+            "no owners" if failed else invariants.owners_are_known(summary, robots, own=True),
+            invariants.folder_is_whole(run),
+            invariants.repeats(run) if summary["ticks"] else "no tick to repeat",
+            *nothing_left(folder),
+        ]
+
+
+def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
+    """What held; Broken if something did not."""
+    rng = np.random.default_rng([plan.seed, 13])
+    number, after_s = SIGNALS[int(rng.integers(len(SIGNALS)))], float(rng.uniform(0.0, 3.0))
+    with own_temporary(folder / "tmp") as env:
+        sets = [word for one in overrides(plan) for word in ("--set", one)]
+        command = (*PYTHON, "swarmwire.deploy", "run", str(SCENARIO), *sets, "--set", "duration_s=1000", "--out",
+                   str(folder / "run"), "--runners", str(len(plan.robots)), "--no-rrd")  # fmt: skip
+        world = Supervised("world", lambda: command, folder / "world.log", env)
+        world.tend(0)
+        try:
+            _begun(folder / "run" / DIGESTS, world)
+            threading.Event().wait(after_s)
+            if rng.random() < 0.3:
+                world.send(signal.SIGSTOP)
+                threading.Event().wait(0.5)
+            world.send(number)
+            world.send(signal.SIGCONT)
+            if not world.ended_within(END_S):
+                raise Broken(f"the world did not end within {END_S:g} s of {number.name}")
+            until(lambda: not [one for one in family(os.getpid()) if one.is_running() and one.status() != "zombie"])
+        finally:
+            world.kill()
+            code = world.end()
+        if code != ENDS[number]:
+            raise Broken(f"{number.name}: exit code {code}; {(folder / 'world.log').read_text()[-600:]}")
+        return [
+            f"{number.name} after {after_s:.1f} s",
+            *_left_behind(folder, number),
+            *nothing_left(folder, killed=number == signal.SIGKILL),
+        ]
+
+
+def _begun(digests: Path, world: Supervised) -> None:
+    """Return once the run has ticked."""
+    for _ in range(int(BEGIN_S / EACH_S)):
+        if digests.exists():
+            return
+        if world.pid is None:
+            break
+        threading.Event().wait(EACH_S)
+    raise Broken("the run did not begin")
+
+
+def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
+    run = folder / "run"
+    if number != signal.SIGKILL:
+        summary = invariants.read_summary(run)
+        if summary["ended"] != "interrupted":
+            raise Broken(f"it ended as {summary['ended']}")
+        return [invariants.fates_add_up(summary), invariants.folder_is_whole(run), invariants.repeats(run)]
+    bad = [one for one in verify(run) if one.state in (State.DAMAGED, State.DIFFERS)]
+    if bad:
+        raise Broken("; ".join(f"{one.part}: {one.state}, {one.text}" for one in bad))
+    for path in (folder / "tmp" / "own" / "swarmwire").glob("*.json"):
+        path.unlink()  # whoever looks for runs next does that
+    again = repeat(run)
+    if again.same is False:
+        raise Broken(f"repeat differs from tick {again.first_difference} on")
+    return ["what is left of the folder can be read", f"repeated {again.compared} ticks, the same"]
+
+
+def _play_campaign(plan: Plan, folder: Path) -> list[str]:
+    """What held; Broken if something did not."""
+    rng = np.random.default_rng([plan.seed, 14])
+    with own_temporary(folder / "tmp") as env:
+        scenario, campaign = scenario_in(folder), folder / "campaign"
+        asked = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch", "2",
+                 "--out", str(campaign))  # fmt: skip
+        told: list[str] = []
+
+        def start(arguments: Sequence[str]) -> Supervised:
+            command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
+            made = Supervised("sweep", lambda: command, folder / "sweep.log", {**env, "PYTHONFAULTHANDLER": "1"})
+            made.tend(0)
+            return made
+
+        def resumed() -> Sequence[str]:
+            return ("--resume", str(campaign), "--retry-failed") if (campaign / "campaign.json").exists() else asked
+
+        for _ in range(int(rng.integers(1, MAX_KILLS + 1))):
+            one = start(resumed())
+            try:
+                threading.Event().wait(float(rng.uniform(0.5, 7.0)))
+                told.append(_break(one, rng))
+                _await_end(one, folder / "sweep.log")
+                until(lambda: not [child for child in family(os.getpid()) if child.status() != "zombie"])
+            finally:
+                one.kill()
+                one.end()
+        last = start(resumed())
+        try:
+            _await_end(last, folder / "sweep.log")
+        finally:
+            last.kill()
+            code = last.end()
+        if code != 0:
+            raise Broken(f"the last resume ended with {code}: {(folder / 'sweep.log').read_text()[-600:]}")
+        return [", ".join(told), each_run_once(campaign, scenario, folder / "whole"), *nothing_left(folder)]
+
+
+def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
+    """The campaign's tables have each run exactly once, as those of one that was left alone."""
+    sweep(scenario, out=whole, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], batch=2, workers=1)
+    got, expected = rows_in(campaign), rows_in(whole)
+    numbers = [row["run"] for row in got]
+    if sorted(numbers) != list(range(SEEDS * len(LOSSES))):
+        raise Broken(f"the table has the runs {sorted(numbers)}")
+    if got != expected:
+        raise Broken("rows differ from those of a campaign that was left alone")
+    if not series_in(campaign).equals(series_in(whole), null_equal=True):
+        raise Broken("series differ from those of a campaign that was left alone")
+    return f"{len(numbers)} runs, each once, the same as without faults"
+
+
+def _await_end(one: Supervised, log: Path) -> None:
+    """Return when it has ended; Broken, with where each of its threads stood, if it takes too long."""
+    if one.ended_within(LIMIT_S):
+        return
+    if one.pid is not None:
+        for process in family(one.pid):
+            with suppress(psutil.NoSuchProcess):  # some end at this very moment
+                process.send_signal(signal.SIGABRT)
+    one.send(signal.SIGABRT)
+    one.ended_within(STACKS_S)
+    raise Broken(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
+
+
+def _break(one: Supervised, rng: np.random.Generator) -> str:
+    if rng.random() < 0.5 and one.pid is not None:
+        workers = family(one.pid)
+        if workers:
+            workers[int(rng.integers(len(workers)))].kill()
+            return "worker killed"
+    number = (signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM)[int(rng.integers(4))]
+    one.send(number)
+    return f"campaign {number.name}"

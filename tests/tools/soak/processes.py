@@ -1,0 +1,146 @@
+"""Processes of a soak, which start again some time after they ended, and steps that act on them."""
+
+import heapq
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from itertools import count
+from pathlib import Path
+
+import psutil
+
+from swarmwire.comms.clock import to_ns
+from tests.support.deploy.runs import ROOT
+
+SCENARIO = Path(__file__).parent / "soak.toml"
+PYTHON = (sys.executable, "-m")
+LET_GO_S = 10.0  # how long a process that is asked to end may take
+
+
+class Supervised:
+    """One process of a soak.
+
+    Attributes:
+        starts: how often it was started.
+        codes: exit codes so far; negative: the signal that ended it.
+    """
+
+    def __init__(
+        self, name: str, command: Callable[[], Sequence[str]], log: Path, env: Mapping[str, str], again_s: float = 0.0
+    ) -> None:
+        """`command` is asked for at each start; the process is started again `again_s` after it ended."""
+        self.name, self.again_s, self.starts, self.codes = name, again_s, 0, list[int]()
+        self._command, self._log, self._env = command, log, env
+        self._process: subprocess.Popen[bytes] | None = None
+        self._due_ns: int | None = 0
+        self.frozen = False
+
+    def tend(self, now_ns: int) -> None:
+        """Note that it ended; start it if that is due."""
+        if self._process is not None and (code := self._process.poll()) is not None:
+            self.codes.append(code)
+            self._process, self.frozen = None, False
+            if self._due_ns is None:
+                self._due_ns = now_ns + to_ns(self.again_s)
+        if self._process is None and self._due_ns is not None and now_ns >= self._due_ns:
+            self._due_ns = None
+            with self._log.open("ab") as log:
+                self._process = subprocess.Popen(
+                    self._command(), env=dict(self._env), stdin=subprocess.DEVNULL, stdout=log, stderr=log
+                )
+            self.starts += 1
+
+    def stay_away(self) -> None:
+        """It is started no more."""
+        self.again_s = float("inf")
+        self._due_ns = sys.maxsize
+
+    def after(self, again_s: float) -> None:
+        """From now on it is started again so long after it ended."""
+        self.again_s = again_s
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process that runs; None if none does."""
+        return None if self._process is None or self._process.poll() is not None else self._process.pid
+
+    def send(self, number: signal.Signals) -> bool:
+        """Send a signal; whether there was somebody to get it."""
+        if self._process is None or self._process.poll() is not None:
+            return False
+        self._process.send_signal(number)
+        if number in (signal.SIGSTOP, signal.SIGCONT):
+            self.frozen = number == signal.SIGSTOP
+        return True
+
+    def ended_within(self, limit_s: float) -> bool:
+        """Whether it ends by itself in this time."""
+        if self._process is None:
+            return True
+        try:
+            self._process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def end(self) -> int | None:
+        """Wait for it to end, and help if it does not; its exit code, None if it did not run."""
+        if self._process is None:
+            return None
+        try:
+            return self._process.wait(LET_GO_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            return self._process.wait(LET_GO_S)
+
+    def kill(self) -> None:
+        """Kill it and all that it started."""
+        if self._process is None or self._process.poll() is not None:
+            return
+        for one in (*family(self._process.pid), self._process):
+            one.kill()
+
+
+def family(pid: int) -> list[psutil.Process]:
+    """What a process started, and what these did; nothing if it is gone."""
+    try:
+        return psutil.Process(pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        return []
+
+
+def environment(temporary: Path) -> Mapping[str, str]:
+    """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
+    own = temporary / "own"
+    own.mkdir(parents=True, mode=0o700)
+    return {
+        **os.environ,
+        "TMPDIR": str(temporary),
+        "XDG_RUNTIME_DIR": str(own),
+        "PYTHONPATH": str(ROOT),
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+
+
+Steps = Generator[float]
+
+
+class Agenda:
+    """Generators that are under way, each taken up again when it is due."""
+
+    def __init__(self) -> None:
+        self._due: list[tuple[int, int, Steps]] = []
+        self._serial = count()
+
+    def begin(self, steps: Steps, now_ns: int) -> None:
+        """Have it act now, and go on when it wants to."""
+        wait_s = next(steps, None)
+        if wait_s is not None:
+            heapq.heappush(self._due, (now_ns + to_ns(wait_s), next(self._serial), steps))
+
+    def step(self, now_ns: int) -> None:
+        """All that is due."""
+        while self._due and self._due[0][0] <= now_ns:
+            self.begin(heapq.heappop(self._due)[2], now_ns)

@@ -1,0 +1,145 @@
+"""`python -m tests.tools.soak.schedules --count 200 --seed 1`: random schedules of faults, each in its own process.
+
+A schedule that fails is named with its seed; `--only SEED` plays it alone, and shows what it does.
+"""
+
+import argparse
+import contextlib
+import faulthandler
+import json
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+import traceback
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarmwire.comms.clock import WallClock, to_ns, to_s
+from tests.tools.soak.invariants import Broken
+from tests.tools.soak.plan import draw
+from tests.tools.soak.plays import play
+from tests.tools.soak.processes import family
+
+
+def main() -> int:
+    """The exit code: 0 if all held."""
+    parser = argparse.ArgumentParser("python -m tests.tools.soak.schedules", description=__doc__)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1, help="of the first; the others follow")
+    parser.add_argument("--jobs", type=int, default=2, help="how many are played at the same time")
+    parser.add_argument("--only", type=int, metavar="SEED", help="this one, here")
+    parser.add_argument("--out", type=Path, help="a file for a line of each, as it is over")
+    given = parser.parse_args()
+    if given.only is not None:
+        return play_one(given.only)
+    return play_all(range(given.seed, given.seed + given.count), given.jobs, given.out)
+
+
+LIMIT_S = 600.0  # of one schedule, on a machine that is busy
+EACH_S = 0.05
+HUNG = -1
+
+
+@dataclass(frozen=True)
+class Playing:
+    """A schedule that is being played."""
+
+    seed: int
+    said: Path
+    began_ns: int
+
+
+def play_one(seed: int) -> int:
+    """Play a schedule here, and tell: 0 if all held."""
+    plan = draw(seed)
+    print(f"{seed}: {plan}", flush=True)
+    faulthandler.dump_traceback_later(LIMIT_S - 10.0)
+    folder = Path(tempfile.mkdtemp(prefix="schedule-"))
+    try:
+        held = play(plan, folder)
+    except Broken as broken:
+        print(f"BROKEN: {broken}; its files: {folder}", flush=True)
+        return 1
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    shutil.rmtree(folder)
+    print("held: " + "; ".join(held), flush=True)
+    return 0
+
+
+def play_all(seeds: Iterable[int], jobs: int, out: Path | None) -> int:
+    """Play all, so many at the same time, and tell of each: 0 if all held."""
+    clock, tally, broken = WallClock(), Counter[str](), list[int]()
+    to_come, now = list(seeds), dict[int, Playing]()
+    count = len(to_come)
+    with tempfile.TemporaryDirectory(prefix="schedules-") as folder:
+        while to_come or now:
+            while to_come and len(now) < jobs:
+                seed = to_come.pop(0)
+                said = Path(folder, str(seed))
+                now[_started(seed, said)] = Playing(seed, said, clock.now_ns())
+            for pid, one in list(now.items()):
+                took_ns = clock.now_ns() - one.began_ns
+                code = _code(pid, is_late=took_ns > to_ns(LIMIT_S))
+                if code is None:
+                    continue
+                del now[pid]
+                said, kind = one.said.read_text(errors="replace"), draw(one.seed).family
+                how = "held" if code == 0 else "HUNG" if code == HUNG else "BROKEN"
+                if code != 0:
+                    broken.append(one.seed)
+                    print(said)
+                tally[f"{kind}: {how}"] += 1
+                done = sum(tally.values())
+                print(f"{done}/{count} seed {one.seed}: {how}, {kind}, {to_s(took_ns):.1f} s", flush=True)
+                if out is not None:
+                    with out.open("a") as file:
+                        file.write(json.dumps([one.seed, code, round(to_s(took_ns), 1), said]) + "\n")
+            threading.Event().wait(EACH_S)
+    for name, times in sorted(tally.items()):
+        print(f"{name:24} {times}")
+    print(f"{count - len(broken)} of {count} held" + (f"; broken: {broken}" if broken else ""))
+    return 1 if broken else 0
+
+
+def _started(seed: int, said: Path) -> int:
+    """The process id of a child that plays a schedule. This process has no session of zenoh, or the child had none."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child:
+        return child
+    code = 1
+    try:
+        output = os.open(said, os.O_WRONLY | os.O_CREAT)
+        os.dup2(output, 1)
+        os.dup2(output, 2)
+        code = play_one(seed)
+    except BaseException:  # noqa: BLE001 - the last frame of this process
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _code(pid: int, *, is_late: bool) -> int | None:
+    """The exit code of a child; None while it goes on. One that is late is killed with all that it started."""
+    ended, status = os.waitpid(pid, os.WNOHANG)
+    if ended:
+        return os.waitstatus_to_exitcode(status)
+    if not is_late:
+        return None
+    for one in family(pid):
+        with contextlib.suppress(Exception):
+            one.kill()
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    return HUNG
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,397 @@
+"""Behaviours in which robots follow their neighbours: flocking and consensus."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarmwire.agent.behaviours import Consensus, LennardJonesFlocking, MinimalistFlocking, Vicsek
+from swarmwire.agent.behaviours.consensus import Value
+from swarmwire.agent.behaviours.lennard_jones_flocking import Here
+from swarmwire.agent.host import agent_group
+from swarmwire.agent.testing import Trial, assert_rows_independent
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.packets import Payloads, ReceivedPackets
+from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.deploy import Simulation, run
+from tests.support.agent.hosts import group
+
+PAPER = Path(__file__).parents[4] / "scenarios" / "papers" / "scenarios" / "vicsek.toml"
+SIDE_M, RANGE_M, WAY_M = 5.0, 1.0, 0.03
+SHORT = ["duration_s=20"]
+CONSENSUS_PAPER = Path(__file__).parents[4] / "scenarios" / "papers" / "scenarios" / "consensus.toml"
+FULL, RING = "radio.range_m=3", "radio.range_m=0.8"
+BASE_M, MAX_MPS = 0.14, 0.1
+SCENARIO = Path("scenarios/behaviours/lennard_jones_flocking.toml")
+RAYS = load_body("flockbot").proximity
+assert RAYS is not None
+RESPONSE = RAYS.response
+DIAMETER_M = 0.07
+ANGLES = [-30, 0, 30, 60, 90, 120, 150, 180, 210, 240, 270, 300]
+STRAIGHT, LEFT, RIGHT = (0.1, 0.0), (0.0, 2.0), (0.0, -2.0)
+Seen = dict[int, float]  # angle of a ray in degrees: distance in diameters
+NOTHING: Seen = {}
+
+
+def wrapped(x: FloatArray, side: float) -> FloatArray:
+    return x - side * np.round(x / side)
+
+
+def neighbours(place_m: FloatArray, range_m: float) -> FloatArray:
+    """1 where two of the particles (n, 2) are in range on the torus, each of itself, too; (n, n)."""
+    apart = wrapped(place_m[:, None, :] - place_m[None, :, :], SIDE_M)
+    return (np.hypot(apart[..., 0], apart[..., 1]) <= range_m).astype(np.float64)
+
+
+def next_step(
+    place_m: FloatArray, theta: FloatArray, noise: FloatArray, way_m: float = WAY_M
+) -> tuple[FloatArray, ...]:
+    """Vicsek et al. (1995), equations 1 and 2: places and directions one step on, both from those of now."""
+    near = neighbours(place_m, RANGE_M)
+    mean = np.arctan2(near @ np.sin(theta), near @ np.cos(theta))
+    moved = place_m + way_m * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    return wrapped(moved, SIDE_M), mean + noise
+
+
+def noise_of(simulation: Simulation, tick: int, noise_rad: float) -> FloatArray:
+    """What the particles draw in a tick, by the keys of their draws."""
+    keys = np.array([derive_key("robot", simulation.static.seeds[0], i) for i in range(100)], np.uint64)
+    return noise_rad * (uniform(keys, tick, 0, 0, purpose("noise of the direction")) - 0.5)
+
+
+def off(a: FloatArray, b: FloatArray) -> float:
+    return float(np.abs(wrapped(a - b, 2.0 * np.pi)).max())
+
+
+@pytest.mark.parametrize("noise_rad", [0.0, 1.0, 5.0])
+def test_a_tick_is_a_step_of_the_model_for_the_same_noise(noise_rad: float) -> None:
+    """But for rounding, which grows where neighbours nearly cancel."""
+    with Simulation(PAPER, overrides=[*SHORT, f"robots.particles.params.noise_rad={noise_rad}"]) as simulation:
+        world = simulation.world
+        place_m = world.pose[:, :2].copy()
+        # Nothing is received in the first tick, so it only turns each by its noise.
+        theta = world.pose[:, 2] + noise_of(simulation, 0, noise_rad)
+        for tick in range(20):
+            simulation.step()
+            assert off(world.pose[:, 2], theta) < 1e-7  # the heading at a tick's end is the direction of its step
+            place_m, theta = next_step(place_m, theta, noise_of(simulation, tick + 1, noise_rad))
+            assert np.abs(wrapped(world.pose[:, :2] - place_m, SIDE_M)).max() < 1e-7
+    assert np.count_nonzero(neighbours(place_m, RANGE_M)) > 300  # of 100 that would hear themselves alone
+
+
+def test_rows_are_independent() -> None:
+    assert_rows_independent(Vicsek, Trial(body="point"))
+
+
+def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) -> float:
+    """The mean order over the second half of a run."""
+    given = {"duration_s": ticks, "robots.particles.params.noise_rad": noise_rad, "radio.range_m": range_m}
+    given["robots.particles.count"] = count
+    seen: list[float] = []
+    with Simulation(PAPER, overrides=[f"{key}={value}" for key, value in given.items()]) as simulation:
+        for _ in range(ticks):
+            simulation.step()
+            heading = simulation.world.pose[:, 2]
+            seen.append(float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean())))
+    return float(np.mean(seen[ticks // 2 :]))
+
+
+def test_a_lost_packet_counts_for_nothing() -> None:
+    """So with every packet lost nobody turns but by noise, of which there is none."""
+    told = run(PAPER, overrides=[*SHORT, "robots.particles.params.noise_rad=0", "radio.loss=1"])
+    metric = told.metrics["order"]
+    assert metric.min == pytest.approx(metric.max, abs=1e-12)
+
+
+def told(*others: float, **params: float) -> float:
+    """What a robot comes to that starts with 1 and hears these numbers in its first step."""
+    zeros = np.zeros(len(others), np.int64)
+    payloads = Payloads.of([Value(value=other).encode() for other in others])
+    received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
+    host = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
+    actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
+    (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
+    (value,) = actions.values.value.tolist()
+    assert Value.decode(payload).value == value  # what it says to others is what it tells
+    return value
+
+
+@pytest.mark.parametrize(("others", "value"), [((), 1.0), ((2.0,), 1.1), ((2.0, 4.0), 1.4), ((1.0, 1.0), 1.0)])
+def test_a_robot_takes_up_a_share_of_each_difference(others: tuple[float, ...], value: float) -> None:
+    assert told(*others, gain=0.1) == pytest.approx(value)
+
+
+def test_first_values_are_drawn_around_the_start() -> None:
+    assert told(start_width=0.0) == 1.0
+    assert 0.75 <= told(start_width=0.5) <= 1.25
+    assert told(start_width=0.5) != 1.0
+
+
+def test_opinions_of_rows_are_independent() -> None:
+    assert_rows_independent(Consensus, Trial(body="point", params={"start_width": 1.0}))
+
+
+@pytest.mark.parametrize(("graph", "eigenvalue"), [(RING, 2.0 - 2.0 * np.cos(0.2 * np.pi)), (FULL, 10.0)])
+def test_without_losses_the_first_pattern_decays_by_the_eigenvalue_and_the_average_stays(graph, eigenvalue) -> None:
+    result = run(CONSENSUS_PAPER, overrides=[graph, "duration_s=2"])
+    steps = 19  # told in ticks 0 to 19
+    assert result.metrics["first_pattern"].final == pytest.approx((1.0 - 0.05 * eigenvalue) ** steps, rel=1e-6)
+    assert result.metrics["consensus_bias"].final == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_gain_beyond_two_over_the_largest_eigenvalue_never_agrees() -> None:
+    error = {
+        gain: run(CONSENSUS_PAPER, overrides=[FULL, "duration_s=16", f"robots.nodes.params.gain={gain}"])
+        .metrics["consensus_error"]
+        .final
+        for gain in (0.19, 0.21)
+    }
+    assert (error[0.19] or 0.0) < 1e-6
+    assert (error[0.21] or 0.0) > 1.0
+
+
+def test_two_robots_whose_gain_is_one_over_their_neighbours_only_swap_their_numbers() -> None:
+    assert (told(2.0, gain=1.0), told(1.0, gain=1.0, start=2.0)) == (2.0, 1.0)
+
+
+def test_one_way_losses_move_the_average() -> None:
+    result = run(CONSENSUS_PAPER, overrides=[RING, "radio.loss=0.5"], seeds=range(1, 9))
+    final = [arena.metrics["consensus_bias"].final or 0.0 for arena in result.arenas]
+    assert 0.01 < np.std(final) < 0.2
+
+
+class One:
+    """A foot-bot; `step` gives it neighbours (range in m, bearing in degrees), and returns its left and right wheel."""
+
+    def __init__(self, **params: float) -> None:
+        self._tick = 0
+        self._host = agent_group(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
+
+    def step(self, *neighbours: tuple[float, float], light_ray: int | None = None) -> tuple[float, float]:
+        k = len(neighbours)
+        table = np.array(neighbours, np.float64).reshape(-1, 2)
+        zeros = np.zeros(k, np.int64)
+        given = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
+        received = ReceivedPackets(
+            zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.of([Here().encode()] * k)
+        )
+        light = np.zeros((1, 24))
+        if light_ray is not None:
+            light[0, light_ray] = 0.4
+        fields = {"light.value": light}
+        actions = self._host.act(
+            (self._tick, self._tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
+        )
+        self._tick += 1
+        forward, turn = float(actions.linear_mps[0]), float(actions.angular_radps[0])
+        return forward - 0.5 * BASE_M * turn, forward + 0.5 * BASE_M * turn
+
+
+def wheels(*neighbours: tuple[float, float], **params: float) -> tuple[float, float]:
+    return One(**params).step(*neighbours)
+
+
+def test_rows_do_not_depend_on_one_another():
+    assert_rows_independent(LennardJonesFlocking, Trial(body="footbot"))
+
+
+@pytest.mark.parametrize("distance_cm", [40.0, 60.0, 74.0, 76.0, 90.0, 130.0])
+def test_the_force_is_that_of_the_source_in_other_units(distance_cm):
+    ratio = (75.0 / distance_cm) ** 2
+    in_cm = -1000.0 / distance_cm * (ratio * ratio - ratio)
+    force = LennardJonesFlocking().force(np.array([distance_cm / 100.0]))
+    assert force == pytest.approx([in_cm / 100.0])
+    assert np.sign(force[0]) == np.sign(distance_cm - 75.0)
+
+
+def test_a_neighbour_at_the_target_distance_neither_pulls_nor_pushes():
+    assert wheels((0.75, 30.0)) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_a_far_neighbour_ahead_pulls_and_one_out_of_reach_does_not():
+    left, right = wheels((1.0, 0.0))
+    assert left == right == pytest.approx(LennardJonesFlocking().force(np.array([1.0]))[0])
+    assert wheels((1.36, 0.0)) == (0.0, 0.0)
+
+
+def test_a_near_neighbour_ahead_turns_the_robot_on_the_spot_and_one_behind_drives_it_on():
+    left, right = wheels((0.5, 0.0))
+    assert left == -right
+    assert abs(left) == pytest.approx(MAX_MPS)
+    assert wheels((0.5, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
+
+
+def test_neighbours_count_by_their_mean_and_those_out_of_reach_do_not_thin_it():
+    one = wheels((1.0, 0.0))
+    assert wheels((1.0, 0.0), (0.75, 90.0)) == pytest.approx(tuple(0.5 * speed for speed in one))
+    assert wheels((1.0, 0.0), (2.0, 90.0)) == pytest.approx(one)
+
+
+def test_beyond_10_degrees_it_turns_softly_and_within_it_does_not():
+    pull = LennardJonesFlocking().force(np.array([1.0]))[0]
+    assert wheels((1.0, 9.0)) == pytest.approx((pull, pull))
+    assert wheels((1.0, 45.0)) == pytest.approx((0.5 * pull, 1.5 * pull), rel=1e-4)
+    assert wheels((1.0, -45.0)) == pytest.approx((1.5 * pull, 0.5 * pull), rel=1e-4)
+
+
+def test_a_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
+    one, on_the_spot = One(), pytest.approx((-MAX_MPS, MAX_MPS))
+    assert one.step((1.0, 85.0)) != on_the_spot
+    assert one.step((1.0, 95.0)) == on_the_spot
+    assert one.step((1.0, 85.0)) == on_the_spot
+    assert one.step((1.0, 69.0)) != on_the_spot
+    assert one.step((1.0, 85.0)) != on_the_spot
+
+
+def test_the_light_pulls_by_a_quarter_of_the_top_speed_unless_it_is_no_goal():
+    ahead = 0  # at 7.5 degrees
+    assert One().step(light_ray=ahead) == pytest.approx((0.25 * MAX_MPS,) * 2)
+    assert One(light=0.0).step(light_ray=ahead) == (0.0, 0.0)
+
+
+def test_a_range_that_noise_made_negative_is_a_neighbour_that_is_very_near():
+    assert wheels((-0.01, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
+
+
+def spread_m(*overrides: str) -> float:
+    """The distance from a foot-bot to its nearest neighbour after 15 s, mean over robots."""
+    given = ["metrics=['nearest_neighbour']", "duration_s=15", "robots.flock.place.radius_m=0.8", *overrides]
+    final = run(SCENARIO, seeds=[1], overrides=given).metrics["nearest_neighbour"].final
+    assert final is not None
+    return final
+
+
+def test_ten_spread_to_about_the_target_distance_and_not_without_the_radio():
+    assert 0.5 < spread_m("robots.flock.params={light=0.0}") < 0.85
+    assert spread_m("robots.flock.params={light=0.0}", "radio.loss=1.0") < 0.4
+
+
+assert RAYS is not None
+
+
+def values(seen: Seen) -> np.ndarray:
+    distance_m = np.array([seen.get(angle, np.inf) for angle in ANGLES]) * DIAMETER_M
+    return np.where(np.isfinite(distance_m), RESPONSE.value(np.minimum(distance_m, 1.0)), 0.0)
+
+
+class OneMinimalist:
+    """A flockbot; `step` tells it what its rays see, in diameters, and returns speed and turn rate."""
+
+    def __init__(self, **params: float) -> None:
+        self._tick = 0
+        self._host = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
+
+    def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
+        fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
+        readings = GroupReadings(np.zeros(1, np.int64), fields)
+        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
+        self._tick += 1
+        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+
+
+def command(robots: Seen = NOTHING, walls: Seen = NOTHING, **params: float) -> tuple[float, float]:
+    return OneMinimalist(**params).step(robots, walls)
+
+
+def test_rows_do_not_depend_on_one_another_in_minimalist_flocking():
+    assert_rows_independent(MinimalistFlocking, Trial(body="flockbot"))
+    assert_rows_independent(MinimalistFlocking, Trial(body="flockbot", seed=2, params={"random_turn": 0.5}))
+
+
+def test_it_drives_straight_where_nothing_is():
+    assert command() == STRAIGHT
+
+
+@pytest.mark.parametrize(("angle", "turn"), [(30, RIGHT), (-30, LEFT)])
+def test_it_avoids_what_is_near_in_front_away_from_the_half_where_it_is_nearest(angle, turn):
+    other = -angle
+    assert command(walls={angle: 0.9}) == turn
+    assert command(walls={angle: 0.8, 0: 0.5, other: 0.9}) == turn
+    assert command(walls={angle: 1.1}) == STRAIGHT
+
+
+@pytest.mark.parametrize("angle", [60, 90, 150, 180, 240, 300])
+def test_a_wall_that_is_not_in_front_is_left_alone(angle):
+    assert command(walls={angle: 0.1}) == STRAIGHT
+
+
+def test_a_turn_away_keeps_its_side_until_nothing_is_in_front():
+    one = OneMinimalist()
+    assert one.step(walls={30: 0.9}) == RIGHT
+    assert one.step(walls={-30: 0.2, 30: 0.9}) == RIGHT
+    assert one.step() == STRAIGHT
+    assert one.step(walls={-30: 0.2, 30: 0.9}) == LEFT
+
+
+def test_between_equal_halves_a_draw_decides():
+    turns = {drawn_turn(tick) for tick in range(20)}
+    assert turns == {LEFT, RIGHT}
+
+
+def drawn_turn(tick: int) -> tuple[float, float]:
+    one = OneMinimalist()
+    for _ in range(tick):
+        one.step()
+    return one.step(walls={0: 0.5})
+
+
+@pytest.mark.parametrize(
+    ("angle", "turn"), [(60, RIGHT), (90, RIGHT), (120, RIGHT), (240, LEFT), (270, LEFT), (300, LEFT)]
+)
+def test_it_turns_away_from_a_robot_beside_it_that_is_too_near(angle, turn):
+    assert command({angle: 0.9}) == turn
+    assert command({angle: 1.5}) == STRAIGHT  # neither too near nor astray
+
+
+def test_a_robot_to_the_left_is_turned_from_before_one_to_the_right():
+    assert command({90: 0.9, 270: 0.2}) == RIGHT
+
+
+def test_from_a_robot_in_front_it_turns_to_a_side_that_it_keeps():
+    one = OneMinimalist(avoid_diameters=0.1)
+    first = one.step({0: 0.5})
+    assert first in (LEFT, RIGHT)
+    assert all(one.step({angle: 0.5}) == first for angle in (30, -30, 0, 30, -30))
+
+
+@pytest.mark.parametrize(("angle", "turn"), [(60, LEFT), (120, LEFT), (240, RIGHT), (300, RIGHT)])
+def test_it_turns_to_a_robot_beside_it_that_is_astray(angle, turn):
+    assert command({angle: 2.1}) == turn
+    assert command({angle: 4.9}) == turn
+    assert command(walls={angle: 2.1}) == STRAIGHT
+
+
+def test_it_turns_to_the_side_where_more_rays_see_robots_astray():
+    assert command({60: 2.5, 90: 2.5, 270: 2.1}) == LEFT
+    assert command({60: 2.5, 240: 2.5, 270: 2.5}) == RIGHT
+    assert command({60: 2.5, 270: 2.5, 180: 4.5}) == STRAIGHT
+
+
+@pytest.mark.parametrize(("angle", "turn"), [(150, LEFT), (210, RIGHT)])
+def test_it_turns_to_a_robot_behind_only_if_that_is_farther_than_one_beside_would_have_to_be(angle, turn):
+    assert command({angle: 4.1}) == turn
+    assert command({angle: 3.9}) == STRAIGHT
+
+
+def test_a_turn_to_the_rear_keeps_its_side():
+    one = OneMinimalist()
+    assert one.step({150: 4.1}) == LEFT
+    assert one.step({210: 4.1}) == LEFT
+
+
+def test_the_rules_come_in_their_order():
+    everything: Seen = {30: 0.9, 270: 0.9, 60: 2.5, 150: 4.5}
+    assert command(everything) == RIGHT  # avoids
+    assert command({**everything, 30: 1.5}) == LEFT  # keeps apart
+    assert command({60: 2.5, 210: 4.5}) == LEFT  # to the side, before the rear
+
+
+def test_a_random_turn_comes_before_all_rules_as_often_as_asked():
+    one = OneMinimalist(random_turn=0.3)
+    steps = [one.step() for _ in range(1000)]
+    turned = np.mean([step != STRAIGHT for step in steps])
+    assert turned == pytest.approx(0.3, abs=0.06)  # four standard deviations
+    assert {LEFT, RIGHT} <= set(steps)
+    assert all(OneMinimalist(random_turn=1.0).step(walls={30: 0.1}) in (LEFT, RIGHT) for _ in range(3))

@@ -1,0 +1,378 @@
+"""Settings of a robot's agent, and what becomes of them."""
+
+import hashlib
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent.drivers.driver import GROUP, Command, Driver, driver_names, load_driver
+from swarmwire.agent.on_robot.controller import Controller, group_of
+from swarmwire.agent.on_robot.network_check import check_certificates
+from swarmwire.agent.on_robot.plan import (
+    OF_POSES,
+    Capabilities,
+    RobotConfig,
+    SpeedLimits,
+    agent_sha256,
+    check_needs,
+    limits_for,
+    robot_config,
+    tracked,
+)
+from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.wire.network import Network
+from swarmwire.deploy.certificates.folder import begin_authority, issue
+from swarmwire.deploy.certificates.register import certificate_request
+from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
+
+WHOLE = """
+format = 1
+name = "flock-3"
+swarm = "lab"
+robots = ["flock-0", "flock-3"]
+agent = "flocking.py:Flock"
+params = { gain = 0.5 }
+body = "sheet.toml"
+rate_hz = 20
+watchdog_s = 0.25
+max_linear_mps = 0.1
+max_angular_radps = 2
+driver = { name = "epuck2", address = "192.168.1.23", connect_s = 1.5 }
+radio = { kind = "zenoh", max_payload_bytes = 64 }
+tracker = true
+network = { listen = ["tcp/127.0.0.1:7447"], connect = [], revoked = ["flock-1"], insecure = true }
+log = "log"
+pace = 2.0
+seed = 4
+"""
+LEAST = 'format = 1\nagent = "mine.py:Mine"\ndriver = { name = "epuck2", address = "192.168.1.23" }\n'
+FAULTS = {
+    "rate_hz = 0": ("rate_hz", "at least 1 Hz"),
+    "rate_hz = 2.5": ("rate_hz", "a whole number"),
+    "rate = 10": ("rate", "rate_hz (did you mean this?)"),
+    "watchdog_s = 0": ("watchdog_s", "at least 0.01 s"),
+    "watchdog_s = nan": ("watchdog_s", "a finite number"),
+    "max_linear_mps = 0": ("max_linear_mps", "more than 0 m/s"),
+    'max_linear_mps = "fast"': ("max_linear_mps", "a number"),
+    "max_angular_radps = -1": ("max_angular_radps", "more than 0 rad/s"),
+    'name = "a/b"': ("name", "letters"),
+    "name = 3": ("name", "a text"),
+    'swarm = "*"': ("swarm", "letters"),
+    'robots = ["robot-0", "a b"]': ("robots[1]", "letters"),
+    'robots = ["robot-0", "robot-0"]': ("robots", "robot-0 twice"),
+    'robots = ["robot-1"]': ("name", "robot-1 (did you mean this?)"),
+    'robots = "robot-0"': ("robots", "a list"),
+    "robots = []": ("robots", "at least one"),
+    "params = 3": ("params", "a table"),
+    "params = { day = 2026-01-01 }": ("params.day", "a number, text"),
+    'radio = { kind = "zenho" }': ("radio.kind", "zenoh (did you mean this?)"),
+    'radio = { kind = "zenoh" }': ("network", "listen, connect or multicast"),
+    "radio = { max_payload_bytes = 1 }": ("radio.max_payload_bytes", "at least 2 B"),
+    "radio = { size = 3 }": ("radio.size", "max_payload_bytes"),
+    'radio = "zenoh"': ("radio", "a table"),
+    "tracker = true": ("network", "listen, connect or multicast"),
+    "tracker = 1": ("tracker", "true or false"),
+    "network = { listn = [] }": ("network.listn", "listen (did you mean this?)"),
+    'network = { listen = ["tcp/0.0.0.0:7447"] }': ("network.listen", "insecure = true"),
+    'network = { listen = ["tls/127.0.0.1:7447"], key = "a.key" }': ("network.ca", "is missing"),
+    "pace = 0": ("pace", "at least 0.01"),
+    "seed = -1": ("seed", "at least 0"),
+    "log = false": ("log", "a text"),
+    'log = "a\\u0000b"': ("log", "a folder"),
+}
+MISSING = {
+    'agent = "a.b:C"': ("driver", 'name = "epuck2"'),
+    'agent = "a.b:C"\ndriver = { address = "10.0.0.1" }': ("driver.name", "swarmwire-agent drivers"),
+    'agent = "a.b:C"\ndriver = "epuck2"': ("driver", "a table"),
+    'agent = "a.b:C"\ndriver = { name = 3 }': ("driver.name", "a text"),
+    'driver = { name = "epuck2" }': ("agent", "is missing"),
+    "agent = ": ("", "TOML"),
+}
+SWARM = {"robots": ["flock-0", "flock-1", "flock-2"], "name": "flock-1"}
+ROOT = Path(__file__).parents[4]
+BODY = load_body("epuck2")  # it has a compass, and no positioning
+FOOTBOT = load_body("footbot")
+EPUCK2 = load_body("epuck2")
+SPEEDS = st.floats(-1e3, 1e3)
+LIMITS = SpeedLimits(0.1, 2.0, wheel_mps=0.12, wheel_base_m=0.053)
+
+
+def _file(folder: Path, text: str) -> Path:
+    file = folder / "robot.toml"
+    file.write_text(text)
+    return file
+
+
+def test_all_that_is_said_is_read_and_paths_lie_beside_the_file(tmp_path):
+    settings = read_settings(_file(tmp_path, WHOLE), {})
+    assert (settings.name, settings.index, settings.swarm) == ("flock-3", 1, "lab")
+    assert settings.robots == ("flock-0", "flock-3")
+    assert settings.agent == f"{tmp_path}/flocking.py:Flock"
+    assert settings.params == {"gain": 0.5}
+    assert (settings.body, settings.log) == (f"{tmp_path}/sheet.toml", f"{tmp_path}/log")
+    assert (settings.rate_hz, settings.watchdog_s, settings.pace, settings.seed) == (20, 0.25, 2.0, 4)
+    assert (settings.max_linear_mps, settings.max_angular_radps) == (0.1, 2.0)
+    assert (settings.driver.name, settings.driver.address) == ("epuck2", "192.168.1.23")
+    assert settings.driver.options == {"connect_s": 1.5}
+    assert (settings.radio.kind, settings.radio.max_payload_bytes) == ("zenoh", 64)
+    assert settings.tracker
+    assert settings.network is not None
+    assert settings.network.listen == ("tcp/127.0.0.1:7447",)
+    assert settings.network.revoked == ("flock-1",)
+
+
+def test_agent_and_driver_are_all_that_must_be_said(tmp_path):
+    settings = read_settings(_file(tmp_path, LEAST), {})
+    assert (settings.name, settings.robots, settings.index) == ("robot-0", ("robot-0",), 0)
+    assert (settings.radio.kind, settings.network, settings.tracker) == ("none", None, False)
+    assert (settings.max_linear_mps, settings.log, settings.body) == (None, "", "")
+
+
+def test_a_module_and_a_body_by_name_are_no_paths(tmp_path):
+    settings = read_settings(
+        _file(tmp_path, LEAST), {"agent": ("AGENT", "package.module:Mine"), "body": ("--body", "epuck")}
+    )
+    assert (settings.agent, settings.body) == ("package.module:Mine", "epuck")
+
+
+def test_flags_come_before_the_file_and_make_one_unneeded(tmp_path):
+    flags: dict[str, tuple[str, Any]] = {
+        "rate_hz": ("--rate-hz", 5),
+        "driver.address": ("--address", "10.0.0.2"),
+        "params.gain": ("--param gain", 2),
+    }
+    settings = read_settings(_file(tmp_path, WHOLE), flags)
+    assert (settings.rate_hz, settings.driver.address, settings.driver.name) == (5, "10.0.0.2", "epuck2")
+    assert settings.params == {"gain": 2}
+    alone = read_settings(None, {"agent": ("AGENT", "a.b:C"), "driver.name": ("--driver", "epuck2")})
+    assert (alone.agent, alone.driver.name, alone.driver.address) == ("a.b:C", "epuck2", "")
+
+
+@pytest.mark.parametrize("line", FAULTS)
+def test_what_is_wrong_is_refused_by_file_and_key_in_one_line(tmp_path, line):
+    key, expected = FAULTS[line]
+    file = _file(tmp_path, f"{line}\n{LEAST}")
+    with pytest.raises(BadInput) as refused:
+        read_settings(file, {})
+    assert (refused.value.where, refused.value.key) == (str(file), key)
+    assert expected in refused.value.expected
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("text", MISSING)
+def test_what_is_missing_is_named(tmp_path, text):
+    key, expected = MISSING[text]
+    with pytest.raises(BadInput, match=expected) as refused:
+        read_settings(_file(tmp_path, f"format = 1\n{text}"), {})
+    assert refused.value.key == key
+
+
+def test_a_file_that_is_not_there_is_named_and_without_one_the_command_line():
+    with pytest.raises(BadInput, match=r"nowhere\.toml: expected a readable file"):
+        read_settings(Path("nowhere.toml"), {})
+    with pytest.raises(BadInput) as refused:
+        read_settings(None, {})
+    assert refused.value.where == NO_FILE
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory) -> tuple[Path, Path]:
+    """Two authorities, each with certificates of two robots."""
+    made: list[Path] = []
+    for name in ("lab", "other"):
+        folder = tmp_path_factory.mktemp(name) / "ca"
+        begin_authority(folder, WallClock())
+        issue(folder, [certificate_request("flock-0"), certificate_request("flock-1")], 30, WallClock())
+        made.append(folder)
+    return made[0], made[1]
+
+
+def _check(ca: Path, certificate: Path, key: Path) -> None:
+    check_certificates(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
+
+
+def test_what_goes_together_is_taken(folders):
+    lab, _ = folders
+    _check(lab / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key")
+
+
+def test_a_certificate_of_another_key_authority_or_none_is_refused_in_one_line(folders):
+    lab, other = folders
+    refused = {
+        "network.key": (lab / "ca.pem", lab / "flock-0.pem", lab / "flock-1.key"),
+        "network.certificate": (other / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key"),
+        "network.ca": (lab / "flock-0.key", lab / "flock-0.pem", lab / "flock-0.key"),
+    }
+    for key, files in refused.items():
+        with pytest.raises(BadInput) as error:
+            _check(*files)
+        assert (error.value.where, error.value.key) == ("robot.toml", key)
+        assert "\n" not in str(error.value)
+
+
+def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> RobotConfig:
+    """The plan of an e-puck2; nothing is connected."""
+    flags = {"agent": f"{PLAYERS}:{agent}", "driver.name": "epuck2", "driver.address": "10.0.0.1", **more}
+    file = None
+    if beside:
+        file = beside / "robot.toml"
+        file.write_text("format = 1\n")
+    settings = read_settings(file, {key: (key, value) for key, value in flags.items()})
+    return robot_config(settings, "robot.toml", DatedFakeClock())
+
+
+def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
+    plan = _plan("Laned", params={"lane": [3, 4, 5]}, **SWARM)
+    assert plan.params == {"lane": 4}
+    settings = plan.settings
+    group = group_of(settings.name, settings.index, settings.agent, plan.params, plan.body, seed=1)
+    mind = Controller(group, 10, None, plan.limits)
+    assert mind.step(0, {}, ReceivedPackets.none(), NO_TX_STATUSES).command.linear_mps == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize(
+    ("params", "told"),
+    [
+        ({"lane": [3, 4]}, "lane: expected a whole number, or a list with one for each of the 3 robots"),
+        ({"lane": 0.5}, "lane: expected a whole number"),
+        ({"lanes": 1}, "lanes: unknown parameter of Laned; expected one of lane (did you mean this?)"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_refused(params, told):
+    with pytest.raises(BadInput) as refused:
+        _plan("Laned", params=params, **SWARM)
+    assert str(refused.value).startswith(f"robot.toml: params.{told}")
+
+
+def test_the_body_is_the_drivers_unless_the_settings_name_another(tmp_path):
+    assert _plan().body.name == "epuck2"
+    (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = 0.2\n')
+    plan = _plan(beside=tmp_path, body="mine.toml")
+    assert (plan.body.name, plan.body.mass_kg) == ("mine", 0.2)
+
+
+def test_faults_of_a_sheet_name_the_sheet(tmp_path):
+    (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = -1\n')
+    with pytest.raises(BadInput, match=r"mine\.toml: mass_kg: expected more than 0 kg"):
+        _plan(beside=tmp_path, body="mine.toml")
+
+
+def test_the_log_can_tell_which_code_ran():
+    assert agent_sha256(_plan().agent) == hashlib.sha256(PLAYERS.read_bytes()).hexdigest()
+
+
+def test_what_a_worlds_air_tells_is_not_judged_before_it_was_joined():
+    medium = {"radio.kind": "world", "network.connect": ["tcp/127.0.0.1:7447"]}
+    assert _plan("Ranging", **medium).settings.radio.kind == "world"
+    with pytest.raises(BadInput, match="a real radio does not tell: expected tracker = true"):
+        _plan("Ranging", **{**medium, "radio.kind": "zenoh"})
+
+
+def test_those_that_come_along_are_there():
+    shipped = tomllib.loads((ROOT / "agent" / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"][GROUP]
+    assert set(shipped) <= set(driver_names())
+    for name in shipped:
+        kind = load_driver(name, "robot.toml", "driver.name")
+        assert issubclass(kind, Driver)
+        assert f"{kind.__module__}:{kind.__name__}".startswith("swarmwire.agent.drivers.")
+
+
+def test_an_unknown_one_is_refused_with_those_that_are_there():
+    with pytest.raises(BadInput, match=r"robot.toml: driver.name: .*epuck2.*ros2") as refused:
+        load_driver("epuck3", "robot.toml", "driver.name")
+    assert "epuck3" in str(refused.value)
+
+
+def _offer(
+    driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY
+) -> Capabilities:
+    tells = frozenset(OF_POSES) if radio == "zenoh" and tracker else frozenset[str]()
+    return Capabilities(body, "epuck2", frozenset(driver), radio, tells, tracker)
+
+
+MET = {
+    "of the driver": (("proximity",), _offer()),
+    "nothing": ((), _offer(())),
+    "the compass from the tracker": (("compass",), _offer(tracker=True)),
+    "range and bearing from the tracker": (OF_POSES, _offer(radio="zenoh", tracker=True)),
+}
+
+
+@pytest.mark.parametrize("case", MET)
+def test_what_is_there_is_taken(case):
+    check_needs("Mine", *MET[case], "robot.toml")
+
+
+UNMET = {
+    "ground": (_offer(), "the driver epuck2 does not give (it gives proximity)"),
+    "compass": (_offer(), "does not give (it gives proximity): expected tracker = true"),
+    "camera": (_offer(), "the body epuck2 lacks: it has proximity"),
+    "positioning": (_offer(tracker=True), "the body epuck2 lacks"),
+    "radio.range": (_offer(), 'only a radio tells: expected radio.kind "zenoh" or "world"'),
+    "radio.bearing": (_offer(radio="zenoh"), "a real radio does not tell: expected tracker = true"),
+    "radio.tx_status": (_offer(radio="zenoh", tracker=True), "the radio zenoh does not tell: it tells radio.bearing"),
+    "radio.rssi": (_offer(radio="world"), "the radio world does not tell: it tells nothing"),
+}
+
+
+@pytest.mark.parametrize("need", UNMET)
+def test_what_is_not_there_is_refused_with_what_would_give_it(need):
+    offer, told = UNMET[need]
+    with pytest.raises(BadInput) as refused:
+        check_needs("Mine", ("proximity", need), offer, "robot.toml")
+    assert str(refused.value).startswith(f"robot.toml: agent: Mine needs {need!r}, which ")
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_tracker_stands_in_only_for_what_the_driver_does_not_give():
+    needs = ("compass", "positioning", "proximity")
+    assert tracked(needs, _offer(("compass",), tracker=True)) == {"positioning"}
+    assert tracked(needs, _offer(("compass",))) == frozenset()
+
+
+def test_limits_are_half_the_bodys_unless_the_settings_say_otherwise():
+    limits = limits_for(EPUCK2, None, None, "robot.toml")
+    assert limits.linear_mps == pytest.approx(0.0691)
+    assert limits.angular_radps == pytest.approx(0.1382 / 0.053)
+    raised = limits_for(EPUCK2, 0.1382, 5.0, "robot.toml")
+    assert (raised.linear_mps, raised.angular_radps) == (0.1382, 5.0)
+
+
+@pytest.mark.parametrize(("given", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
+def test_limits_above_the_bodys_are_refused(given, key):
+    with pytest.raises(BadInput, match=f"robot.toml: {key}: expected at most .* which the epuck2 can do"):
+        limits_for(EPUCK2, *given, "robot.toml")
+
+
+@given(SPEEDS, SPEEDS, SPEEDS)
+def test_no_command_is_faster_than_the_limits_and_each_keeps_its_curve(linear, angular, lateral):
+    asked = Command(linear, angular, lateral, {0: 3})
+    got = LIMITS.clipped(asked)
+    slack = 1.0 + 1e-9
+    assert math.hypot(got.linear_mps, got.lateral_mps) <= 0.1 * slack
+    assert abs(got.angular_radps) <= 2.0 * slack
+    assert abs(got.linear_mps) + 0.5 * 0.053 * abs(got.angular_radps) <= 0.12 * slack
+    assert got.linear_mps * angular == pytest.approx(got.angular_radps * linear)
+    assert got.leds == {0: 3}
+    assert got is asked or got != asked
+
+
+def test_a_command_within_the_limits_is_left_alone():
+    asked = Command(0.05, -1.0)
+    assert LIMITS.clipped(asked) is asked
+
+
+def test_infinite_speeds_keep_their_direction():
+    got = LIMITS.clipped(Command(math.inf, 1.0))
+    assert got.linear_mps == pytest.approx(0.1)
+    assert abs(got.angular_radps) < 1e-3

@@ -1,0 +1,200 @@
+"""The e-puck2's packets, streams, wheels and units, each way and back, against its fact sheet."""
+
+from itertools import accumulate
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.epuck2 import packets, readings
+from swarmwire.comms.robots.epuck2.commands import (
+    ALL_DARK,
+    MAX_STEPS_PER_S,
+    Answers,
+    Commands,
+    Lights,
+    RobotCommand,
+    body_speeds,
+    wheel_steps,
+)
+from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
+from swarmwire.comms.robots.epuck2.readings import Odometer
+from swarmwire.comms.sensors.scan import ScanSpec
+from tests.support.robots import epuck2
+
+WHEEL_BASE_M = 0.053
+STEPS = st.integers(-32768, 32767)
+COMMANDS = st.builds(
+    RobotCommand,
+    STEPS,
+    STEPS,
+    st.builds(Lights, st.integers(0, 63), st.binary(min_size=12, max_size=12)),
+    st.sampled_from([PacketRequest(bits) for bits in range(4)]),
+    st.sampled_from([RobotSettingsBits(bits) for bits in range(8)]),
+    st.integers(0, 63),
+)
+SHARES = st.floats(0.0, 1.0)
+BODY = load_body("epuck2")
+
+
+@given(command=COMMANDS)
+def test_a_command_is_read_as_it_was_written(command: RobotCommand) -> None:
+    assert RobotCommand.decoded(command.encoded()) == command
+
+
+@given(command=COMMANDS)
+def test_a_command_stands_where_the_fact_sheet_says(command: RobotCommand) -> None:
+    told = epuck2.read(epuck2.COMMAND, command.encoded())
+    assert (told["id"], told["request"], told["settings"]) == (0x80, command.request, command.settings)
+    assert (told["left"], told["right"], told["sound"]) == (command.left, command.right, command.sound)
+    assert told["leds"] == command.lights.switched
+    assert told["led2"] + told["led4"] + told["led6"] + told["led8"] == tuple(command.lights.colours)
+
+
+def test_the_layout_of_the_sensors_is_the_fact_sheets_offset_by_offset() -> None:
+    assert SENSORS.fields is not None
+    ours = [(field[1], field[0].itemsize, field[0].base.str[1:]) for field in SENSORS.fields.values()]
+    kinds = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "f": "f4"}
+    theirs = [
+        (offset, int(form[1:-1] or 1) * int(kinds[form[-1]][1]), kinds[form[-1]])
+        for offset, form in epuck2.SENSORS.values()
+    ]
+    assert ours == theirs
+    assert SENSORS.itemsize == 104
+
+
+@given(commands=st.lists(COMMANDS, max_size=5), cuts=st.lists(st.integers(0, 105)))
+def test_commands_are_read_however_they_are_cut(commands: list[RobotCommand], cuts: list[int]) -> None:
+    sent, stream = b"".join(command.encoded() for command in commands), Commands()
+    assert [command for piece in cut(sent, cuts) for command in stream.fed(piece)] == commands
+    assert not stream.begun
+
+
+@given(headers=st.lists(st.sampled_from([1, 2, 3]), max_size=4), cuts=st.lists(st.integers(0, 80_000)))
+def test_answers_are_read_however_they_are_cut(headers: list[int], cuts: list[int]) -> None:
+    sizes = {1: 38400, 2: 104, 3: 0}
+    sent = b"".join(bytes([header]) + bytes([7]) * sizes[header] for header in headers)
+    stream = Answers()
+    read = [answer for piece in cut(sent, cuts) for answer in stream.fed(piece)]
+    assert [(answer.header, len(answer.payload)) for answer in read] == [(header, sizes[header]) for header in headers]
+
+
+@pytest.mark.parametrize("first", [0, 4, 0x80, 255])
+def test_an_answer_that_can_be_none_is_named(first: int) -> None:
+    with pytest.raises(BadFrame, match="garbage"):
+        list(Answers().fed(b"\x03" + bytes([first])))
+
+
+@given(linear_mps=st.floats(-1.0, 1.0), angular_radps=st.floats(-50.0, 50.0))
+def test_wheels_are_never_told_more_than_they_can_and_the_curve_stays(linear_mps: float, angular_radps: float) -> None:
+    left, right = wheel_steps(linear_mps, angular_radps, WHEEL_BASE_M)
+    assert max(abs(left), abs(right)) <= MAX_STEPS_PER_S
+    linear, angular = body_speeds(left, right, WHEEL_BASE_M)
+    share = max(abs(linear_mps) + abs(angular_radps) * WHEEL_BASE_M / 2, 1e-9) / (MAX_STEPS_PER_S * np.pi * 0.04 / 1000)
+    slower = 1.0 / max(share, 1.0)
+    assert linear == pytest.approx(linear_mps * slower, abs=1e-4)
+    assert angular == pytest.approx(angular_radps * slower, abs=5e-3)
+
+
+@given(which=st.sampled_from([1, 3, 5, 7]), rgb=st.integers(0, 0xFFFFFF))
+def test_a_colour_comes_back_within_a_hundredth(which: int, rgb: int) -> None:
+    shown = ALL_DARK.with_changed({which: rgb}).shown({})
+    for shift in (0, 8, 16):
+        assert abs((shown[which] >> shift & 0xFF) - (rgb >> shift & 0xFF)) <= 255 / 200 + 0.5
+    assert not any(colour for place, colour in shown.items() if place != which)
+
+
+def test_a_red_led_is_lit_by_what_is_at_least_half_red() -> None:
+    shown = ALL_DARK.with_changed({0: 0x800000, 2: 0x7FFFFF, 4: 0xFFFFFF, 6: 0x00FF00}).shown({})
+    assert [shown[place] for place in (0, 2, 4, 6)] == [0xFF0000, 0, 0xFF0000, 0]
+
+
+def test_an_led_that_no_e_puck_has_is_refused() -> None:
+    with pytest.raises(ValueError, match="0 to 7"):
+        ALL_DARK.with_changed({8: 0xFF0000})
+
+
+@given(start=STEPS, gone=st.lists(st.tuples(st.integers(-32768, 32767), st.integers(-32768, 32767)), max_size=30))
+def test_an_odometer_counts_what_the_wheels_went_however_often_the_counters_wrap(
+    start: int, gone: list[tuple[int, int]]
+) -> None:
+    odometer = Odometer()
+    odometer.read(start, start)
+    for left, right in accumulate(gone, lambda before, more: (before[0] + more[0], before[1] + more[1])):
+        odometer.read(wrapped(start + left), wrapped(start + right))
+        assert (odometer.left, odometer.right) == (left, right)
+
+
+@pytest.mark.parametrize(("steps", "elapsed_s", "goes_on"), [(900, 1.0, True), (2000, 1.0, False), (100, 60.0, False)])
+def test_an_odometer_goes_on_after_a_pause_only_by_what_a_robot_can_go(
+    steps: int, elapsed_s: float, goes_on: bool
+) -> None:
+    odometer = Odometer()
+    odometer.read(0, 0)
+    odometer.read(500, 500)
+    assert odometer.resume(wrapped(500 + steps), 500, elapsed_s) is goes_on
+    assert (odometer.left, odometer.right) == (500 + steps * goes_on, 500)
+
+
+def wrapped(steps: int) -> int:
+    return (steps + 32768) % 65536 - 32768
+
+
+def cut(sent: bytes, cuts: list[int]) -> list[bytes]:
+    ends = sorted({min(at, len(sent)) for at in cuts} | {len(sent)})
+    return [sent[start:end] for start, end in zip([0, *ends], ends, strict=False)]
+
+
+def tof() -> ScanSpec:
+    assert BODY.scan is not None
+    return BODY.scan
+
+
+@given(st.lists(SHARES, min_size=1, max_size=8).map(np.array))
+def test_shares_come_back_within_half_a_step(value) -> None:
+    assert (
+        np.abs(readings.proximity(readings.to_proximity(value)) - value).max() <= 0.5 / readings.PROXIMITY_FULL + 1e-12
+    )
+    assert np.abs(readings.light(readings.to_light(value)) - value).max() <= 0.5 / readings.AMBIENT_DARK + 1e-12
+    shade = readings.shade(readings.to_shade(value), readings.GROUND_BLACK, readings.GROUND_WHITE)
+    assert np.abs(shade - value).max() <= 0.5 / (readings.GROUND_WHITE - readings.GROUND_BLACK) + 1e-12
+
+
+@given(st.floats(0.05, 1.99))
+def test_a_distance_comes_back_within_half_a_millimetre(range_m) -> None:
+    told = readings.distance_m(readings.to_distance(np.array([range_m]), tof()), tof())
+    assert abs(float(told[0]) - range_m) <= 0.0005 + 1e-12
+
+
+def test_nothing_in_sight_is_beyond_the_range() -> None:
+    told = readings.to_distance(np.array([np.inf]), tof())
+    assert told.tolist() == [readings.SEES_NOTHING_MM]
+    assert np.isinf(readings.distance_m(told, tof())).all()
+
+
+def test_dark_is_four_thousand_and_bright_less() -> None:
+    assert readings.to_light(np.array([0.0, 0.5, 1.0])).tolist() == [4000.0, 2000.0, 0.0]
+
+
+def test_one_g_is_eight_hundred_and_two_g_are_the_most() -> None:
+    assert readings.to_acceleration(np.array([9.80665, -9.80665, 100.0])).tolist() == [800.0, -800.0, 1536.0]
+    assert pytest.approx(800.0) == 9.80665 * readings.PER_MPS2
+
+
+def test_250_degrees_a_second_are_the_most_that_the_gyro_tells() -> None:
+    quarter = np.deg2rad(62.5)
+    assert readings.to_turn(np.array([quarter, -quarter, 10.0])).tolist() == [8192.0, -8192.0, 32767.0]
+
+
+def test_a_full_battery_and_an_empty_one() -> None:
+    # GCtronic's driver: V = raw / (4096 x 0.6 / 3.0)
+    assert readings.to_voltage(np.array([4.2, 3.4])).tolist() == [round(4.2 * 819.2), round(3.4 * 819.2)]
+    assert pytest.approx(819.2) == readings.PER_V
+
+
+def test_headers_say_how_much_follows() -> None:
+    assert packets.PORT == 1000
+    assert {int(header): packets.PAYLOAD_BYTES[header] for header in packets.Header} == {1: 38400, 2: 104, 3: 0}

@@ -1,0 +1,282 @@
+"""Keys and messages of ROS 2 in zenoh."""
+
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+import pytest
+import zenoh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pycdr2._support import Endianness
+from zenoh.ext import Int64, z_deserialize, z_serialize
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.robots.ros2 import keys, messages
+from swarmwire.comms.robots.ros2.keys import (
+    NAME,
+    READ,
+    WRITE,
+    RmwNode,
+    absolute,
+    attachment,
+    bridge_itself,
+    bridge_key,
+    bridge_token,
+    check_attachment,
+    check_name,
+    publisher_id,
+    rmw_key,
+    ros_name,
+)
+from swarmwire.comms.robots.ros2.laser import laser_scan
+from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.other_sensors import battery_state, illuminance
+from tests.support.comms.robots.ros2 import independent
+
+# As `ros2 topic info -v` and rmw_zenoh's design page show them.
+HASHES = {
+    keys.TWIST: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    keys.TWIST_STAMPED: "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
+    keys.LASER_SCAN: "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
+    keys.ODOMETRY: "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
+    keys.IMU: "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
+    keys.BATTERY_STATE: "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
+}
+LONGEST = 2**63 - 1
+MESSAGES = Messages("jazzy")
+SINGLES = st.floats(width=32, allow_nan=True)
+DOUBLES = st.floats(allow_nan=True)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+STAMPS = st.integers(0, 2**31 * 10**9 - 1)
+FRAMES = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20)
+
+
+@pytest.mark.parametrize("distro", ["iron", "jazzy", "kilted"])
+@pytest.mark.parametrize("kind", HASHES)
+def test_hashes_are_those_that_ros_shows(distro, kind):
+    assert Messages(distro).hash_of(kind) == HASHES[kind]
+
+
+def test_humble_has_no_hashes():
+    assert Messages("humble").hash_of(keys.TWIST) == "TypeHashNotSupported"
+
+
+def test_the_string_of_the_design_page_has_its_hash():
+    assert Messages("jazzy").hash_of("std_msgs/msg/String").startswith("RIHS01_df668c740482bbd48fb39d76a70dfd4b")
+
+
+def test_keys_of_rmw_are_domain_name_kind_and_hash():
+    key = rmw_key(0, "/cmd_vel", keys.TWIST, HASHES[keys.TWIST])
+    assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::Twist_/{HASHES[keys.TWIST]}"
+    assert zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST)).includes(zenoh.KeyExpr(key))
+    assert not zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
+
+
+def test_keys_of_the_bridge_are_names():
+    assert bridge_key(absolute("bot1", "cmd_vel")) == "bot1/cmd_vel"
+    assert bridge_key(absolute("/", "cmd_vel")) == "cmd_vel"
+
+
+def test_tokens_of_rmw_read_as_its_design_page_writes_them():
+    node = RmwNode(2, "aa11", 1, "/flock_0", "base")
+    assert node.token == "@ros2_lv/2/aa11/10000/10000/NN/%/%flock_0/base"
+    assert node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64") == (
+        "@ros2_lv/2/aa11/10000/10003/MP/%/%flock_0/base/%flock_0%scan/"
+        "sensor_msgs::msg::dds_::LaserScan_/RIHS01_64/::,10:,:,:,,"
+    )
+    assert RmwNode(0, "aa11", 0, "/", "base").token == "@ros2_lv/0/aa11/0/0/NN/%/%/base"
+    for token in (node.token, node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")):
+        assert zenoh.KeyExpr("@ros2_lv/2/**").includes(zenoh.KeyExpr(token))
+
+
+def test_tokens_of_the_bridge_read_as_its_source_writes_them():
+    token = bridge_token("aa11", WRITE, "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")
+    assert bridge_token("aa11", READ, "/flock_0/cmd_vel", keys.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
+    assert token == ("@/aa11/@ros2_lv/MP/flock_0§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64;")
+    assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(token))
+    assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(bridge_itself("aa11")))
+
+
+@given(st.integers(0, LONGEST), st.integers(0, LONGEST), st.text(max_size=30))
+def test_an_attachment_is_what_zenoh_serializes(sequence, utc_ns, token):
+    attached = attachment(sequence, utc_ns, publisher_id(token))
+    assert len(attached) == 33
+    values = (Int64(sequence), Int64(utc_ns), publisher_id(token))
+    assert bytes(z_serialize(values)) == attached
+    assert z_deserialize(tuple[Int64, Int64, bytes], zenoh.ZBytes(attached)) == values
+    check_attachment(attached)
+
+
+@pytest.mark.parametrize("attached", [None, b"", bytes(33), bytes(32), attachment(1, 2, publisher_id("")) + b"0"])
+def test_messages_without_a_proper_attachment_are_refused(attached):
+    with pytest.raises(BadFrame, match="no_attachment"):
+        check_attachment(attached)
+
+
+@given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True))
+def test_a_robot_of_any_name_has_one_that_ros_takes(robot):
+    assert NAME.fullmatch(ros_name(robot))
+
+
+@pytest.mark.parametrize("name", ["", "7up", "a b", "a//b", "a/", "a__b", "flock-0", "~/scan"])
+def test_names_that_ros_does_not_have_are_refused(name):
+    with pytest.raises(BadInput, match="driver: scan_topic: expected a ROS name"):
+        check_name(name, "driver", "scan_topic")
+
+
+def test_without_rosbags_one_line_says_what_to_install(monkeypatch):
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    with pytest.raises(BadInput, match=r'pip install "swarmwire-agent\[ros2\]"'):
+        Messages("jazzy")
+
+
+def headers():
+    return st.builds(independent.header, STAMPS, FRAMES)
+
+
+def vectors():
+    return st.builds(independent.Vector3, DOUBLES, DOUBLES, DOUBLES)
+
+
+def twists():
+    return st.builds(independent.Twist, vectors(), vectors())
+
+
+def numbers(count: int):
+    return st.lists(DOUBLES, min_size=count, max_size=count)
+
+
+def quaternions():
+    return st.builds(independent.Quaternion, DOUBLES, DOUBLES, DOUBLES, DOUBLES)
+
+
+def singles(most: int = 40):
+    return st.lists(SINGLES, max_size=most)
+
+
+POSES = st.builds(independent.PoseWithCovariance, st.builds(independent.Pose, vectors(), quaternions()), numbers(36))
+SAMPLES = {
+    keys.TWIST: twists(),
+    keys.TWIST_STAMPED: st.builds(independent.TwistStamped, headers(), twists()),
+    keys.LASER_SCAN: st.builds(independent.LaserScan, headers(), *[SINGLES] * 7, singles(), singles()),
+    keys.ODOMETRY: st.builds(
+        independent.Odometry,
+        headers(),
+        FRAMES,
+        POSES,
+        st.builds(independent.TwistWithCovariance, twists(), numbers(36)),
+    ),
+    keys.IMU: st.builds(
+        independent.Imu, headers(), quaternions(), numbers(9), vectors(), numbers(9), vectors(), numbers(9)
+    ),
+    keys.BATTERY_STATE: st.builds(
+        independent.BatteryState,
+        headers(),
+        *[SINGLES] * 7,
+        *[st.integers(0, 255)] * 3,
+        st.booleans(),
+        singles(4),
+        singles(4),
+        FRAMES,
+        FRAMES,
+    ),
+    keys.ILLUMINANCE: st.builds(independent.Illuminance, headers(), DOUBLES, DOUBLES),
+    keys.CLOCK: st.builds(independent.Clock, st.builds(independent.Time, st.integers(0, 2**31 - 1), st.just(5))),
+}
+
+
+def same(one, other) -> bool:
+    """Whether two messages say the same, of whichever library each is."""
+    if is_dataclass(one):
+        return all(same(getattr(one, of.name), getattr(other, of.name)) for of in fields(one))
+    if isinstance(one, str):
+        return one == other
+    return np.array_equal(np.asarray(one, np.float64), np.asarray(other, np.float64), equal_nan=True)
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_what_the_other_library_writes_we_read_and_write_as_it_does(kind, data):
+    theirs = data.draw(SAMPLES[kind])
+    frame = theirs.serialize()
+    ours = MESSAGES.decode(kind, frame)
+    assert same(theirs, ours)
+    assert same(independent.BY_KIND[kind].deserialize(MESSAGES.encode(kind, ours)), ours)
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+@settings(max_examples=15, deadline=None)
+@given(data=st.data())
+def test_half_a_message_is_a_bad_frame(kind, data):
+    frame = data.draw(SAMPLES[kind]).serialize()
+    half = frame[: data.draw(st.integers(0, len(frame) - 5))]
+    with pytest.raises(BadFrame, match="malformed"):
+        MESSAGES.decode(kind, half)
+
+
+@given(linear=FINITE, angular=FINITE, lateral=FINITE, stamp=STAMPS, frame=FRAMES)
+def test_commands_laid_out_by_hand_are_those_of_the_library(linear, angular, lateral, stamp, frame):
+    told, theirs = messages.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
+    assert messages.encode_twist(told) == theirs.serialize()
+    assert len(theirs.serialize()) == 52
+    stamped = independent.TwistStamped(independent.header(stamp, frame), theirs).serialize()
+    assert messages.encode_twist_stamped(told, stamp, frame) == stamped
+    assert messages.decode_twist(theirs.serialize()) == told
+    for frame_bytes in (theirs.serialize(), stamped):
+        assert messages.decode_either(frame_bytes) == told
+
+
+@settings(max_examples=25, deadline=None)
+@given(linear=FINITE, angular=FINITE, frame=FRAMES)
+def test_commands_of_the_other_endianness_mean_the_same(linear, angular, frame):
+    message = independent.TwistStamped(independent.header(5, frame), independent.twist(linear, angular))
+    assert messages.decode_either(message.serialize(endianness=Endianness.Big)) == messages.Velocities(linear, angular)
+    plain = message.twist.serialize(endianness=Endianness.Big)
+    assert messages.decode_either(plain) == messages.Velocities(linear, angular)
+
+
+@pytest.mark.parametrize("broken", [float("nan"), float("inf"), float("-inf")])
+def test_a_velocity_that_is_not_finite_is_refused(broken):
+    with pytest.raises(BadFrame):
+        messages.decode_either(independent.twist(0.1, broken).serialize())
+
+
+@given(st.binary(max_size=120))
+def test_garbage_is_refused_or_commands_something_finite(payload):
+    try:
+        told = messages.decode_either(payload)
+    except BadFrame:
+        return
+    assert np.all(np.isfinite(told))
+
+
+def made() -> dict[str, object]:
+    """A message of each kind that a gateway sends, made from readings."""
+    scan = load_body("turtlebot3-burger").scan
+    assert scan is not None
+    poses = WheelPoses(2, 0.16)
+    poses.follow(0, np.zeros(2), np.zeros(2))
+    poses.follow(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
+    return {
+        keys.LASER_SCAN: laser_scan(MESSAGES, scan, np.full(360, np.inf), 3),
+        keys.ODOMETRY: poses.message(MESSAGES, 1, 3),
+        keys.IMU: imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 3),
+        keys.BATTERY_STATE: battery_state(MESSAGES, 0.5, 11.0, 3),
+        keys.ILLUMINANCE: illuminance(MESSAGES, 0.5, 800.0, "cell", 3),
+        keys.CLOCK: MESSAGES.make(keys.CLOCK, MESSAGES.time(3)),
+    }
+
+
+@pytest.mark.parametrize("kind", made())
+def test_what_a_gateway_sends_the_other_library_reads_and_writes_to_the_byte(kind):
+    frame = MESSAGES.encode(kind, made()[kind])
+    theirs = independent.BY_KIND[kind].deserialize(frame)
+    assert same(theirs, MESSAGES.decode(kind, frame))
+    assert theirs.serialize() == frame
+
+
+def test_a_stamp_is_the_time_that_it_was_made_from():
+    assert stamp_ns(MESSAGES.header(1_700_000_000_123_456_789, "f")) == 1_700_000_000_123_456_789

@@ -1,0 +1,316 @@
+"""Sensors of ROS 2 robots: laser scans and all others."""
+
+from math import cos, hypot, inf, isnan, nan, pi, radians, sin
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, WheelTravel, imu, motion_of
+from swarmwire.comms.robots.ros2.other_sensors import (
+    battery_state,
+    brightness_of,
+    charge_of,
+    illuminance,
+    topics_of_light,
+)
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.sensors.simple import BatterySpec
+from tests.support.comms.robots.ros2 import independent
+from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
+
+MESSAGES = Messages("jazzy")
+LINEAR = {"kind": "quadratic", "a": 0.0, "b": -2.0, "c": 1.0, "reach_m": 0.5}
+ANGLES = st.floats(-10.0, 10.0)
+BASE_M, MAX_MPS = 0.16, 0.22
+TICK_NS = 100_000_000
+STEPS = st.lists(st.tuples(st.floats(-0.03, 0.03), st.floats(-0.03, 0.03)), min_size=1, max_size=60)
+SOME = st.floats(-5.0, 5.0)
+
+
+def received(message: independent.LaserScan):
+    return MESSAGES.decode(LASER_SCAN, message.serialize())
+
+
+def body(at_m: float = 0.0) -> Body:
+    angles_deg = [0, 30, -30, 90, -90, 180]
+    proximity = {"angles_deg": angles_deg, "range_m": 0.4, "response": LINEAR}
+    return body_from({"like": "turtlebot3-burger", "sensors": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
+
+
+def proximity_of(of: Body) -> ProximitySpec:
+    assert of.proximity
+    return of.proximity
+
+
+@given(st.lists(ANGLES, min_size=1, max_size=20), st.lists(ANGLES, min_size=1, max_size=20))
+def test_the_nearest_angle_is_that_of_a_brute_force_search(of, among):
+    of, among = np.array(of), np.array(among)
+    apart = np.abs(np.remainder(of[:, None] - among[None] + pi, 2 * pi) - pi)
+    place, apart_rad = nearest_angle(of, among)
+    assert apart_rad == pytest.approx(apart.min(axis=1), abs=1e-9)
+    assert apart[np.arange(len(of)), place] == pytest.approx(apart.min(axis=1), abs=1e-9)
+
+
+def scans():
+    spec = st.builds(
+        ScanSpec,
+        rays=st.integers(1, 90),
+        range_m=st.just(3.5),
+        range_min_m=st.just(0.12),
+        first_deg=st.floats(-180, 180),
+        span_deg=st.sampled_from([30.0, 180.0, 270.0, 360.0]),
+    )
+    return spec.flatmap(
+        lambda of: st.tuples(
+            st.just(of), st.lists(st.floats(0.12, 3.5) | st.just(inf), min_size=of.rays, max_size=of.rays)
+        )
+    )
+
+
+@given(scans())
+def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
+    spec, range_m = drawn
+    range_m = np.array(range_m)
+    message = MESSAGES.decode(LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, spec, range_m, 0)))
+    assert LaserAsScan(spec, 0.0).range_m(message) == pytest.approx(range_m, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("told_m", "reads_m"),
+    [(1.0, 1.0), (inf, inf), (nan, inf), (0.0, inf), (-inf, 0.12), (0.05, 0.12), (11.0, inf), (5.0, inf), (3.5, 3.5)],
+)
+def test_a_return_that_is_none_reads_inf_and_one_too_near_the_least(told_m, reads_m):
+    spec = load_body("turtlebot3-burger").scan
+    assert spec
+    message = received(independent.laser_scan([told_m] * 8, range_min=0.1))
+    assert LaserAsScan(spec, 0.0).range_m(message)[0] == pytest.approx(reads_m)
+
+
+def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
+    message = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], first_rad=-pi))  # back, right, ahead, left
+    assert LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
+    coarse = LaserAsScan(ScanSpec(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
+    assert coarse.tolist() == [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]
+
+
+def test_a_scanner_that_turns_clockwise_or_is_mounted_turned_is_read_where_it_looks():
+    clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
+    spec = ScanSpec(rays=4, range_m=9.0)
+    assert LaserAsScan(spec, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
+    assert LaserAsScan(spec, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
+
+
+def test_where_a_scanner_does_not_look_nothing_is_met():
+    ahead = received(independent.laser_scan([1.0] * 91, first_rad=-pi / 4, step_rad=pi / 180))
+    range_m = LaserAsScan(ScanSpec(rays=8, range_m=9.0), 0.0).range_m(ahead)
+    assert range_m.tolist() == [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]
+
+
+@pytest.mark.parametrize("broken", [{"first_rad": nan}, {"step_rad": inf}])
+def test_rays_that_cannot_lie_so_are_a_bad_frame(broken):
+    message = received(independent.laser_scan([1.0] * 4, **{"first_rad": 0.0, "step_rad": 0.1, **broken}))
+    for reader in (LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m, near().value):
+        with pytest.raises(BadFrame):
+            reader(message)
+
+
+def test_a_message_without_rays_is_a_bad_frame():
+    with pytest.raises(BadFrame):
+        near().value(received(independent.laser_scan([], step_rad=0.1)))
+
+
+def near(at_m: float = 0.0, scanner_rad: float = 0.0) -> LaserAsProximity:
+    of = body(at_m)
+    return LaserAsProximity(proximity_of(of), of.radius_m, at_m, scanner_rad)
+
+
+def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
+    ranges = np.full(360, inf)
+    ranges[10], ranges[14] = 0.305, 0.405  # both nearest to the sensor ahead
+    ranges[20] = 0.205  # to the one at 30 degrees
+    ranges[-100] = 0.105  # to the one at -90 degrees: at the rim
+    ranges[135 + 3] = 0.2  # between 90 and 180 degrees, nearer to 180, more than 45 degrees off neither
+    value = near().value(received(independent.laser_scan(ranges)))
+    assert value == pytest.approx([1 - 2 * 0.2, 1 - 2 * 0.1, 0.0, 0.0, 1.0, 1 - 2 * 0.095], abs=1e-6)
+
+
+def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers_nothing():
+    far = np.full(360, 0.105 + 0.41)
+    assert not near().value(received(independent.laser_scan(far))).any()
+    spec = ProximitySpec(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
+    alone = LaserAsProximity(spec, 0.105, 0.0, 0.0)
+    ranges = np.full(360, inf)
+    ranges[46:315] = 0.2
+    assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([0.0])
+    ranges[44] = 0.2
+    assert alone.value(received(independent.laser_scan(ranges))) == pytest.approx([1 - 2 * 0.095], abs=1e-6)
+
+
+@given(st.floats(-0.1, 0.1), st.floats(-pi, pi), st.floats(0.0, 0.3), st.floats(-pi, pi))
+def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m, mounted_rad):
+    """A thing `away_m` from the rim along a ray of a scanner that stands `at_m` ahead of the centre."""
+    low, high = 0.0, 1.0
+    for _ in range(60):  # where the ray leaves the disc, by halving
+        half = 0.5 * (low + high)
+        inside = hypot(at_m + half * cos(angle_rad), half * sin(angle_rad)) < 0.105
+        low, high = (half, high) if inside else (low, half)
+    spec = ProximitySpec(angles_deg=(np.rad2deg(angle_rad),), range_m=0.4, response=proximity_of(body()).response)
+    message = received(independent.laser_scan([low + away_m], angle_rad - mounted_rad, 0.1, range_min=0.0))
+    value = LaserAsProximity(spec, 0.105, at_m, mounted_rad).value(message)
+    assert value == pytest.approx([1.0 - 2.0 * away_m], abs=1e-5)
+
+
+def test_a_nan_that_signals_is_no_return_and_no_warning():
+    signalling = np.frombuffer(bytes.fromhex("0100807f"), np.float32)
+    told = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
+    assert returns_m(told).tolist() == [inf]
+
+
+# pyright: reportIndexIssue=false
+
+
+def followed(travel: WheelTravel, message: independent.Odometry) -> tuple[float, float]:
+    travel.follow(MESSAGES.decode(ODOMETRY, message.serialize()))
+    return travel.left_m, travel.right_m
+
+
+def turned(yaw_rad: float) -> Quaternion:
+    return Quaternion(z=float(np.sin(yaw_rad / 2)), w=float(np.cos(yaw_rad / 2)))
+
+
+@given(STEPS)
+def test_travel_of_wheels_goes_out_as_a_pose_and_comes_back_as_it_was(steps):
+    poses, travel = WheelPoses(1, BASE_M), WheelTravel(BASE_M, MAX_MPS)
+    rolled_m, theirs = np.zeros(2), odometry(0.0, 0.0, Quaternion(), 0)
+    for tick, step in enumerate([(0.0, 0.0), *steps]):
+        rolled_m = rolled_m + step
+        poses.follow(tick * TICK_NS, rolled_m[:1], rolled_m[1:])
+        theirs = independent.Odometry.deserialize(MESSAGES.encode(ODOMETRY, poses.message(MESSAGES, 0, tick * TICK_NS)))
+        assert followed(travel, theirs) == pytest.approx(tuple(rolled_m), abs=1e-9)
+    assert theirs.twist.twist.linear.x == pytest.approx(sum(steps[-1]) / 2 / 0.1, abs=1e-9)
+    assert theirs.twist.twist.angular.z == pytest.approx((steps[-1][1] - steps[-1][0]) / BASE_M / 0.1, abs=1e-9)
+    assert travel.jumps == 0
+
+
+def test_many_turns_on_the_spot_add_up_across_the_seam_of_the_yaw():
+    travel = WheelTravel(BASE_M, MAX_MPS)
+    for tick in range(101):
+        followed(travel, odometry(0.0, 0.0, turned(tick * 0.2 * pi), tick * TICK_NS))
+    assert (travel.left_m, travel.right_m) == pytest.approx((-20 * pi * BASE_M / 2, 20 * pi * BASE_M / 2))
+
+
+def test_backwards_is_negative_whatever_the_heading():
+    travel = WheelTravel(BASE_M, MAX_MPS)
+    followed(travel, odometry(0.0, 0.0, turned(3.0), 0))
+    back = -0.02
+    told = followed(travel, odometry(back * np.cos(3.0), back * np.sin(3.0), turned(3.0), TICK_NS))
+    assert told == pytest.approx((back, back))
+
+
+def test_a_pose_that_jumps_is_counted_and_no_travel():
+    travel = WheelTravel(BASE_M, MAX_MPS)
+    followed(travel, odometry(5.0, 5.0, turned(0.0), 0))
+    assert followed(travel, odometry(0.0, 0.0, turned(0.0), TICK_NS)) == (0.0, 0.0)  # it was switched on anew
+    assert travel.jumps == 1
+    assert followed(travel, odometry(0.02, 0.0, turned(0.0), 2 * TICK_NS)) == pytest.approx((0.02, 0.02))
+
+
+@pytest.mark.parametrize("pose", [(nan, 0.0, turned(0.0)), (0.0, nan, turned(0.0)), (0.0, 0.0, Quaternion(w=0.0))])
+def test_a_pose_that_is_none_is_a_bad_frame_and_changes_nothing(pose):
+    travel = WheelTravel(BASE_M, MAX_MPS)
+    followed(travel, odometry(0.0, 0.0, turned(0.0), 0))
+    with pytest.raises(BadFrame):
+        followed(travel, odometry(*pose, TICK_NS))
+    assert followed(travel, odometry(0.01, 0.0, turned(0.0), 2 * TICK_NS)) == pytest.approx((0.01, 0.01))
+
+
+def test_travel_that_was_not_told_for_a_while_is_added_when_it_is():
+    poses = WheelPoses(2, BASE_M)
+    for tick, left_m in enumerate(([0.0, nan], [0.1, nan], [nan, 0.2], [0.3, 0.3])):
+        poses.follow(tick * TICK_NS, np.array(left_m), np.array(left_m))
+    assert poses.pose == pytest.approx(np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.0]]))
+
+
+def sent(kind, message):
+    return independent.BY_KIND[kind].deserialize(MESSAGES.encode(kind, message))
+
+
+def received_reading(kind, message):
+    return MESSAGES.decode(kind, message.serialize())
+
+
+@given(SOME, SOME, SOME, st.floats(-3.1, 3.1), st.floats(-360.0, 360.0))
+def test_a_motion_goes_out_as_imu_and_comes_back_as_it_was(forward, left, turn, heading, north_deg):
+    theirs = sent(IMU, imu(MESSAGES, Motion(forward, left, turn, heading), north_deg, 0))
+    assert theirs.linear_acceleration.z == pytest.approx(9.80665)
+    back = motion_of(received_reading(IMU, theirs), north_deg)
+    assert back[:3] == (forward, left, turn)
+    assert back.heading_rad == pytest.approx(heading, abs=1e-9)
+
+
+def test_x_is_ahead_y_to_the_left_and_the_yaw_turns_counter_clockwise():
+    zeros = [0.0] * 9
+    quarter = Quaternion(z=2**-0.5, w=2**-0.5)
+    message = independent.Imu(
+        independent.header(), quarter, zeros, Vector3(0.1, 0.2, 0.3), zeros, Vector3(1.0, 2.0, 9.8), zeros
+    )
+    assert motion_of(received_reading(IMU, message), 0.0) == pytest.approx((1.0, 2.0, 0.3, pi / 2))
+    assert motion_of(received_reading(IMU, message), 90.0).heading_rad == pytest.approx(pi)
+    assert motion_of(received_reading(IMU, message), 100.0).heading_rad == pytest.approx(radians(-170.0))
+
+
+def test_what_is_not_measured_is_told_as_such_and_read_as_nan():
+    for known in range(3):
+        motion = Motion(*(1.0 if known == 0 else nan,) * 2, 2.0 if known == 1 else nan, 0.5 if known == 2 else nan)
+        theirs = sent(IMU, imu(MESSAGES, motion, 0.0, 0))
+        first = (
+            theirs.linear_acceleration_covariance[0],
+            theirs.angular_velocity_covariance[0],
+            theirs.orientation_covariance[0],
+        )
+        assert [value == -1.0 for value in first] == [known != 0, known != 1, known != 2]
+        assert motion_of(received_reading(IMU, theirs), 0.0) == pytest.approx(motion, nan_ok=True)
+
+
+def battery() -> BatterySpec:
+    spec = load_body("turtlebot3-burger").sensors["battery"]
+    assert isinstance(spec, BatterySpec)
+    return spec
+
+
+@pytest.mark.parametrize(
+    ("percentage", "voltage_v", "charge"),
+    [(0.4, 11.0, 0.4), (nan, 9.9, 0.0), (nan, 12.6, 1.0), (nan, 11.25, 0.5), (40.0, 11.25, 0.5), (nan, 14.0, 1.0)],
+)
+def test_the_charge_is_the_share_that_is_told_else_what_the_voltage_says(percentage, voltage_v, charge):
+    theirs = sent(BATTERY_STATE, battery_state(MESSAGES, percentage, voltage_v, 0))
+    assert (theirs.percentage, theirs.voltage) == pytest.approx((percentage, voltage_v), nan_ok=True)
+    assert theirs.present
+    assert charge_of(received_reading(BATTERY_STATE, theirs), battery()) == pytest.approx(charge, abs=1e-6)
+
+
+def test_a_battery_that_tells_nothing_has_no_charge():
+    theirs = sent(BATTERY_STATE, battery_state(MESSAGES, nan, nan, 0))
+    assert isnan(charge_of(received_reading(BATTERY_STATE, theirs), battery()))
+
+
+@pytest.mark.parametrize(
+    ("lux", "value"), [(0.0, 0.0), (400.0, 0.5), (800.0, 1.0), (9e9, 1.0), (-1.0, 0.0), (nan, 0.0)]
+)
+def test_illuminance_is_light_that_reads_1_at_full_lux(lux, value):
+    message = independent.Illuminance(independent.header(), lux, 0.0)
+    assert brightness_of(received_reading(ILLUMINANCE, message), 800.0) == value
+
+
+def test_light_goes_out_in_lux():
+    assert sent(ILLUMINANCE, illuminance(MESSAGES, 0.25, 800.0, "cell", 0)).illuminance == 200.0
+    assert topics_of_light("illuminance", 3) == ("illuminance_0", "illuminance_1", "illuminance_2")

@@ -1,0 +1,392 @@
+"""Bodies of robots: sheets, custom bodies, and drives."""
+
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.bodies.body import (
+    Body,
+    IncompatibleBody,
+    body_from,
+    body_from_mapping,
+    body_names,
+    load_body,
+    merged,
+)
+from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels, twist_of_wheels, wheels_of_twist
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.comms.sensors.simple import PositioningSpec
+
+WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
+WHEELLESS = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
+FORCES = {"max_force_n": 1.0, "max_torque_nm": 2.0}
+WHEELS = {"wheel_base_m": 0.1, "max_wheel_mps": 0.2, **FORCES}
+TWIST = {"kind": "twist", "wheel_base_m": 0.16, "max_linear_mps": 0.22, "max_angular_radps": 2.84, **FORCES}
+HOLONOMIC = {"kind": "holonomic", "max_speed_mps": 0.5, "max_angular_radps": 3.0, **FORCES}
+
+
+def proximity_of(name: str) -> ProximitySpec:
+    spec = load_body(name).proximity
+    assert spec is not None
+    return spec
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_every_body_that_comes_along_loads_under_its_name(name: str) -> None:
+    assert load_body(name).name == name
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_a_body_written_down_reads_back_the_same(name: str) -> None:
+    body = load_body(name)
+    assert body_from(body.as_mapping(), "copy.toml") == body
+
+
+def test_a_sheet_that_is_like_another_goes_by_its_own_name_or_its_file_s() -> None:
+    assert body_from({"like": "epuck"}, "bodies/worn.toml").name == "worn"
+    assert body_from({"like": "epuck", "name": "old"}, "bodies/worn.toml").name == "old"
+
+
+def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(BadInput, match=r"body: expected one of epuck, .*; got 'roomba'"):
+        load_body("roomba")
+
+
+@pytest.mark.parametrize(
+    ("name", "distance_m", "value"),
+    [
+        ("epuck", 0.005, 0.905),
+        ("epuck", 0.01, 0.743),
+        ("epuck", 0.02, 0.464),
+        ("epuck", 0.03, 0.244),
+        ("epuck", 0.04, 0.084),
+        ("footbot", 0.02, 0.4986),
+        ("footbot", 0.05, 0.2004),
+        ("footbot", 0.10, 0.1004),
+    ],
+)
+def test_proximity_answers_as_in_argos(name: str, distance_m: float, value: float) -> None:
+    digits = 3 if name == "epuck" else 4
+    assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
+
+
+@pytest.mark.parametrize("distance_m", [0.01, 0.02, 0.05])
+def test_the_epuck2_answers_as_its_driver_reads_it(distance_m: float) -> None:
+    # epuck_driver_cpp: the distance in m is 0.5 / sqrt(value), of 4095.
+    value = proximity_of("epuck2").response.value(np.float64(distance_m))
+    assert 0.5 / np.sqrt(4095.0 * value) == pytest.approx(distance_m, rel=1e-3)
+
+
+def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -> None:
+    # Sectors of minimalist flocking: front (-45, 45], left (45, 135], rear (135, 225], right (225, 315].
+    body, spec = load_body("flockbot"), proximity_of("flockbot")
+    infrared = body.infrared
+    assert infrared is not None
+    assert spec.range_m == infrared.range_m == pytest.approx(5.0 * 2.0 * body.radius_m)
+    for each in (spec, infrared):
+        sector = np.floor((np.rad2deg(each.angle_rad) + 45.0 - 1e-9) / 90.0) % 4
+        assert np.bincount(sector.astype(int)).tolist() == [3, 3, 3, 3]
+
+
+def test_the_epuck_sees_nothing_from_48_mm_on() -> None:
+    assert not proximity_of("epuck").response.value(np.linspace(0.048, 0.2, 100)).any()
+
+
+def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
+    response = proximity_of("footbot").response
+    assert response.value(np.array([0.0, 0.009])).tolist() == [1.0, 1.0]
+    assert response.value(np.array([0.1001, 1.0])).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+@given(st.floats(0.0, 0.2))
+def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float) -> None:
+    response = proximity_of(name).response
+    value = response.value(np.array([distance_m]))
+    if 1e-9 < value[0] < 1.0:
+        assert response.distance_m(value)[0] == pytest.approx(distance_m, abs=1e-9)
+    elif value[0] == 0.0:
+        assert response.distance_m(value)[0] == response.reach_m
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+def test_a_stronger_response_never_means_farther_away(name: str) -> None:
+    response = proximity_of(name).response
+    distance_m = response.distance_m(np.linspace(0.0, 1.0, 1001))
+    assert np.all(np.diff(distance_m) <= 0.0)
+    assert 0.0 <= distance_m.min() <= distance_m.max() == response.reach_m
+
+
+@pytest.mark.parametrize("name", WITH_PROXIMITY)
+def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) -> None:
+    angle = proximity_of(name).angle_rad
+    assert np.all((angle > -np.pi) & (angle <= np.pi))
+    ahead, left = np.round(np.cos(angle), 9), np.round(np.sin(angle), 9)
+    assert set(zip(ahead, left, strict=True)) == set(zip(ahead, -left, strict=True))
+
+
+def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
+    body = load_body("epuck")
+    assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.wheels.wheel_base_m)
+    assert body.max_linear_mps == body.drive.max_wheel_mps
+
+
+def test_a_body_without_a_sense_has_no_sheet_for_it() -> None:
+    body = body_from({**sheet_of("epuck"), "sensors": {}}, "blind.toml")
+    assert (body.proximity, body.compass, body.odometry) == (None, None, None)
+
+
+def sheet_of(name: str) -> dict[str, Any]:
+    return load_body(name).as_mapping()
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    """The e-puck's sheet with one value put in place, or taken away where it is None."""
+    spec = sheet_of("epuck")
+    *tables, key = path.split(".")
+    table = spec
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    if value is None:
+        del table[key]
+    return spec
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "key"),
+    [
+        *((path, None, path) for path in ("radius_m", "name", "drive", "drive.wheel_base_m")),
+        *(("like", value, "like") for value in ("roomba", 3)),
+        ("name", 3, "name"),
+        *(("radius_m", value, "radius_m") for value in ("big", True, 0.0, float("nan"), float("inf"))),
+        ("drive.wheel_base_m", 0.0701, "drive.wheel_base_m"),
+        ("colour", "red", "colour"),
+        ("drive", [], "drive"),
+        ("drive.gears", 3, "drive.gears"),
+        ("drive.noise", {"factor": 1000.0}, "drive.noise.factor"),
+        ("drive.noise", {"bias_mps": -1}, "drive.noise.bias_mps"),
+        ("drive", WHEELLESS, "sensors.odometry"),
+        ("mass_kg", 10**400, "mass_kg"),
+        ("sensors", 3, "sensors"),
+        ("sensors.lidar", {}, "sensors.lidar"),
+        ("sensors.light.noise", 2, "sensors.light.noise"),
+        ("sensors.bumper.noise", 1, "sensors.bumper.noise"),
+        ("sensors.positioning", {"noise_m": -1}, "sensors.positioning.noise_m"),
+        ("sensors.compass", True, "sensors.compass"),
+        ("sensors.compass.delay_s", 1e308, "sensors.compass.delay_s"),
+        ("sensors.compass.noise_rad", -1, "sensors.compass.noise_rad"),
+        ("sensors.odometry.slip", 2, "sensors.odometry.slip"),
+        ("sensors.proximity.response.b", 36.8961, "sensors.proximity.response"),
+        ("sensors.proximity.response.kind", "cubic", "sensors.proximity.response.kind"),
+        *(("sensors.proximity.angles_deg", value, "sensors.proximity.angles_deg") for value in (17, [], [1] * 1001)),
+        ("sensors.proximity.angles_deg", [1, "x"], "sensors.proximity.angles_deg[1]"),
+        ("sensors.ground.points_m", [[0, 0]] * 1001, "sensors.ground.points_m"),
+        ("sensors.scan", {"rays": 10_001, "range_m": 1}, "sensors.scan.rays"),
+        ("sensors.camera.max_blobs", 1001, "sensors.camera.max_blobs"),
+        ("leds.angles_deg", [1] * 1001, "leds.angles_deg"),
+        *((f"leds.{name}", value, f"leds.{name}") for name, value in (("radius_m", 0.044), ("height_m", 0.173))),
+        ("leds.beacon_height_m", 1, "leds.beacon_height_m"),
+        ("altitude_m", 0.5, "sensors.ground"),
+    ],
+)
+def test_a_bad_sheet_is_refused_in_one_line_with_file_and_key(path: str, value: object, key: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        body_from(changed(path, value), "mine.toml")
+    assert (refused.value.where, refused.value.key) == ("mine.toml", key)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        ("radius_m", None, "is missing: radius of the body"),
+        ("like", "roomba", f"expected one of {', '.join(body_names())}; got 'roomba'"),
+        ("sensors.light.noise", 2, "expected at most 1, got 2.0"),
+        ("drive.wheel_base_m", 0.0701, "expected at most the body's diameter, 0.07 m; got 0.0701"),
+    ],
+)
+def test_a_refusal_says_what_was_expected(path: str, value: object, told: str) -> None:
+    with pytest.raises(BadInput, match="^mine.toml: ") as refused:
+        body_from(changed(path, value), "mine.toml")
+    assert refused.value.expected.startswith(told)
+
+
+def test_whole_numbers_serve_as_numbers() -> None:
+    body = body_from(changed("mass_kg", 2), "mine.toml")
+    assert isinstance(body, Body)
+    assert (body.mass_kg, type(body.mass_kg)) == (2.0, float)
+
+
+def test_a_body_like_another_differs_only_in_what_it_says() -> None:
+    gps, epuck = load_body("epuck-gps"), load_body("epuck")
+    assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "sensors": None} == {
+        **epuck.as_mapping(),
+        "sensors": None,
+    }
+    assert gps.sensors == {**epuck.sensors, "positioning": PositioningSpec(0.01)}
+    mine = body_from({"like": "epuck-gps", "name": "mine", "drive": {"wheel_base_m": 0.06}}, "mine.toml")
+    assert (mine.wheels.wheel_base_m, mine.drive.max_force_n) == (0.06, epuck.drive.max_force_n)
+    assert (mine.name, mine.sensors) == ("mine", gps.sensors)
+
+
+def test_bodies_know_no_global_position_unless_they_say_so() -> None:
+    assert [name for name in body_names() if "positioning" in load_body(name).sensors] == ["epuck-gps", "point"]
+
+
+def test_photocells_are_argos_s() -> None:
+    epuck, footbot = load_body("epuck").light, load_body("footbot").light
+    assert epuck
+    assert footbot
+    assert epuck.angles_deg == tuple(22.5 + 45.0 * k for k in range(8))
+    assert footbot.angles_deg == proximity_of("footbot").angles_deg
+    assert (epuck.noise, footbot.noise) == (0.05, 0.0)
+
+
+def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> None:
+    forces = {"max_force_n": 1.0, "max_torque_nm": 1.0}
+    drive = {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, **forces}
+    spec = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
+    drone = body_from(spec, "drone.toml")
+    assert set(load_body("epuck").sensors) - set(drone.sensors) == {"odometry", "ground"}
+    with pytest.raises(BadInput, match=r"drone\.toml: sensors\.ground: expected altitude_m = 0"):
+        body_from({**spec, "sensors": {"ground": {"noise": 0.1}}}, "drone.toml")
+
+
+def test_numbers_of_own_actuators_stand_one_after_another() -> None:
+    told = load_body("epuck").as_mapping()
+    widths = {"arm": 3, "bell": 0, "hand": 2, "eye": 1}
+    told["actuators"] = {name: {"kind": "a:B", "params": {}, "width": width} for name, width in widths.items()}
+    places = body_from_mapping(told, "told").actuator_places
+    assert places == {"arm": slice(0, 3), "bell": slice(3, 3), "hand": slice(3, 5), "eye": slice(5, 6)}
+
+
+def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
+    told = load_body("epuck").as_mapping()
+    told["actuators"] = {"arm": {"kind": "a:B", "params": {}, "width": 10_001}}
+    with pytest.raises(
+        BadInput, match=r"told: actuators\.arm\.width: expected a whole number from 0 to 10000, got 10001"
+    ):
+        body_from_mapping(told, "told")
+
+
+def test_merged_tables_keep_what_only_one_says_and_take_the_rest_from_the_second():
+    base = {"name": "a", "sensors": {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}, "radius_m": 1.0}
+    over = {"sensors": {"compass": {"delay_s": 1.0}}, "radius_m": {"new": 2}}
+    sensors = {"compass": {"noise_rad": 0.1, "delay_s": 1.0}, "light": {"noise": 0.2}}
+    assert merged(base, over) == {"name": "a", "sensors": sensors, "radius_m": {"new": 2}}
+    assert base["sensors"] == {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}
+
+
+def driven(drive: object, **given: Any) -> Body:
+    spec = {"name": "mine", "source": "nowhere", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0}
+    return body_from({**spec, "drive": drive, **given}, "mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("table", "drive", "linear_mps", "angular_radps"),
+    [
+        (WHEELS, Wheels(0.1, 0.2, 1.0, 2.0), 0.2, 4.0),
+        ({**WHEELS, "kind": "wheels"}, Wheels(0.1, 0.2, 1.0, 2.0), 0.2, 4.0),
+        (TWIST, Twist(0.16, 0.22, 2.84, 1.0, 2.0), 0.22, 2.84),
+        (HOLONOMIC, Holonomic(0.5, 3.0, 1.0, 2.0), 0.5, 3.0),
+    ],
+    ids=["left out", "wheels", "twist", "holonomic"],
+)
+def test_the_table_chooses_a_drive_by_kind(
+    table: object, drive: object, linear_mps: float, angular_radps: float
+) -> None:
+    body = driven(table)
+    assert body.drive == drive
+    assert (body.max_linear_mps, body.max_angular_radps) == (linear_mps, pytest.approx(angular_radps))
+
+
+@pytest.mark.parametrize("table", [WHEELS, TWIST, HOLONOMIC, {**WHEELS, "noise": {"factor_std": 0.05}}], ids=repr)
+def test_a_body_crosses_the_wire_with_its_drive_and_leds(table: object) -> None:
+    leds = {"angles_deg": [0, 90], "height_m": 0.05}
+    for body in (driven(table), driven(table, leds=leds, altitude_m=1.5, contacts=False)):
+        assert body_from(msgpack.unpackb(msgpack.packb(body.as_mapping())), "copy") == body
+
+
+def test_the_noise_of_wheels_is_a_table_of_its_own() -> None:
+    noise = {"bias_mps": 0.001, "bias_std_mps": 0.002, "factor": 0.9, "factor_std": 0.05}
+    assert driven({**TWIST, "noise": noise}).wheels.noise == WheelNoise(0.001, 0.002, 0.9, 0.05)
+    assert driven(WHEELS).wheels.noise == WheelNoise(0.0, 0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [
+        ({"drive": {**WHEELS, "wheel_base_m": 0}}, "drive.wheel_base_m"),
+        ({"drive": {**TWIST, "wheel_base_m": -0.1}}, "drive.wheel_base_m"),
+        ({"drive": FORCES}, "drive.wheel_base_m"),
+        ({"drive": {**TWIST, "max_angular_radps": 0}}, "drive.max_angular_radps"),
+        ({"drive": {**HOLONOMIC, "max_speed_mps": float("inf")}}, "drive.max_speed_mps"),
+        ({"drive": {**HOLONOMIC, "wheel_base_m": 0.1}}, "drive.wheel_base_m"),
+        ({"drive": {**HOLONOMIC, "noise": {}}}, "drive.noise"),
+        ({"drive": {**WHEELS, "kind": "legs"}}, "drive.kind"),
+        ({"drive": {**WHEELS, "kind": ["wheels"]}}, "drive.kind"),
+        ({"drive": {**WHEELS, "noise": 0.1}}, "drive.noise"),
+        ({"drive": {**WHEELS, "noise": {"factor_std": -1}}}, "drive.noise.factor_std"),
+        ({"drive": {**WHEELS, "noise": {"bias": 1}}}, "drive.noise.bias"),
+        ({"altitude_m": -1}, "altitude_m"),
+        ({"contacts": 1}, "contacts"),
+        ({"leds": {"angles_deg": [0]}}, "leds.height_m"),
+        ({"leds": {"angles_deg": [], "height_m": 0.1}}, "leds.angles_deg"),
+        ({"leds": {"angles_deg": [0], "height_m": -0.1}}, "leds.height_m"),
+        ({"leds": 8}, "leds"),
+    ],
+)
+def test_what_a_body_cannot_be_is_refused_with_file_and_key(given: dict[str, Any], key: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        driven(**{"drive": WHEELS, **given})
+    assert (refused.value.where, refused.value.key) == ("mine.toml", key)
+
+
+def test_a_body_like_another_with_another_kind_of_drive_has_nothing_of_its_drive() -> None:
+    for like in ("epuck", "epuck-gps"):
+        mine = body_from({"like": like, "name": "mine", "drive": HOLONOMIC}, "mine.toml")
+        assert mine.drive == driven(HOLONOMIC).drive
+        assert mine.radius_m == load_body("epuck").radius_m
+        same = body_from({"like": like, "drive": {"kind": "wheels", "max_wheel_mps": 0.1}}, "mine.toml")
+        assert same.wheels.wheel_base_m == load_body("epuck").wheels.wheel_base_m
+
+
+def test_only_a_body_with_wheels_tells_of_them() -> None:
+    assert driven(TWIST).wheels.wheel_base_m == 0.16
+    with pytest.raises(IncompatibleBody, match="the body mine has no wheels: its drive is holonomic"):
+        _ = driven(HOLONOMIC).wheels
+
+
+def test_leds_sit_on_their_ring_and_the_beacon_on_the_axis() -> None:
+    body = driven(WHEELS, leds={"angles_deg": [0, 90], "height_m": 0.05, "beacon_height_m": 0.2})
+    assert body.led_count == 3
+    np.testing.assert_allclose(body.led_places_m, [[0.1, 0, 0.05], [0, 0.1, 0.05], [0, 0, 0.2]], atol=1e-12)
+    wide = driven(WHEELS, leds={"angles_deg": [180], "height_m": 0.05, "radius_m": 0.12})
+    np.testing.assert_allclose(wide.led_places_m, [[-0.12, 0, 0.05]], atol=1e-12)
+    assert driven(WHEELS).led_places_m.shape == (0, 3)
+
+
+def test_the_bodies_that_come_along_have_argos_s_leds() -> None:
+    epuck, footbot = load_body("epuck"), load_body("footbot")
+    assert (epuck.led_count, footbot.led_count) == (8, 13)
+    assert footbot.led_places_m[-1].tolist() == [0.0, 0.0, 0.174249733]
+    ring_m = np.hypot(*footbot.led_places_m[:-1, :2].T)
+    np.testing.assert_allclose(ring_m, footbot.radius_m + 0.005)
+
+
+@given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(0.01, 1.0))
+def test_a_twist_becomes_wheel_speeds_and_back(linear: float, angular: float, base_m: float) -> None:
+    left, right = wheels_of_twist(linear, angular, base_m)
+    assert twist_of_wheels(left, right, base_m) == pytest.approx((linear, angular), abs=1e-12)
+    assert (right > left) == (angular > 0.0) or abs(base_m * angular) < 1e-12
+
+
+def test_a_turn_to_the_left_has_the_right_wheel_ahead() -> None:
+    assert wheels_of_twist(0.0, 2.0, 0.1) == (-0.1, 0.1)
+    assert twist_of_wheels(0.0, 0.2, 0.1) == (0.1, 2.0)

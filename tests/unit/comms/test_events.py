@@ -1,0 +1,445 @@
+"""Events of a scenario: partitions, radio events, and events of robots."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.clock import tick_start_ns, to_ns
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events.effects import ActiveEffects
+from swarmwire.comms.events.event import as_toml
+from swarmwire.comms.events.partition import Partition, Region
+from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
+from swarmwire.comms.events.robot_events import Fail, Revive
+from swarmwire.comms.events.selection import Selection, Swarm
+from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
+from swarmwire.comms.radio.config.path_loss_models import LogDistance
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.ramps import number_of
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
+from tests.support.comms.radio import RATE_HZ, WIFI_B, Run, at, everybody, make_medium
+
+# Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.
+POSE = at((-1, 0.5), (-0.5, -0.5), (-0.2, 0.3), (0.3, -0.2), (0.6, 0.7), (1, -0.7))
+SWARM = Swarm({"a": range(4), "b": range(4, 6)}, 6, np.array([7], np.uint64), POSE)
+EVERYBODY = {0, 1, 2, 3, 4, 5}
+SCRIPTS: list[tuple[dict[str, Any], list[set[int]]]] = [
+    ({"between": (("a",), ("b",))}, [{0, 1, 2, 3}, {4, 5}]),
+    ({"between": (("a-0", "a-1"), ("a-2", "a-3"), ("b",))}, [{0, 1}, {2, 3}, {4, 5}]),
+    ({"halves": "x"}, [{0, 1, 2}, {3, 4, 5}]),
+    ({"halves": "y"}, [{1, 3, 5}, {0, 2, 4}]),
+    ({"isolate": ("a-2",)}, [{2}, EVERYBODY - {2}]),
+    ({"isolate": ("b", "a-0")}, [{4}, {5}, {0}, {1, 2, 3}]),
+    ({"isolate": ("a", "b")}, [{robot} for robot in EVERYBODY]),
+    ({"region": Region(radius_m=0.6)}, [{2, 3}, {0, 1, 4, 5}]),
+    ({"region": Region(at=(1.0, 0.0), size_m=(1.0, 2.0))}, [{4, 5}, {0, 1, 2, 3}]),
+]
+RADIO_SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))
+TWO_ARENAS = Swarm({"a": range(3)}, 3, np.array([7, 8], np.uint64), np.zeros((6, 3)))
+KEYS = np.array([7, 8], np.uint64)
+APART = Swarm({"a": range(3)}, 3, KEYS, np.arange(18.0).reshape(6, 3))
+RADIO = Radio(2.0, loss=0.1, bursts=Bursts(), measures=Measures(range=RangeMeasure(0.01)))
+PAIR = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
+ROBOTS = 2000
+ROBOT_SWARM = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
+
+
+def partition(**keys: Any) -> Partition:
+    return Partition(at_s=0.0, **keys)
+
+
+def held(event: Partition, swarm: Swarm = SWARM) -> ActiveEffects:
+    conditions = ActiveEffects(swarm.rows)
+    event.check(swarm.groups)
+    event.begin(0, swarm, conditions)
+    return conditions
+
+
+def broadcasts(conditions: ActiveEffects, pose: FloatArray = POSE) -> Run:
+    """Everybody broadcasts once under these conditions."""
+    medium = make_medium(Radio(9.0, send_offset="tick"), len(pose))
+    told = Run(medium)
+    for tick in range(3):
+        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, conditions.disruption()))
+        if tick == 1:
+            medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
+    told.last = medium.end()
+    return told
+
+
+def islands(edges: IntArray, robots: int) -> set[frozenset[int]]:
+    """The connected components of a graph of pairs."""
+    island = {robot: frozenset({robot}) for robot in range(robots)}
+    for a, b in edges.tolist():
+        both = island[a] | island[b]
+        island.update(dict.fromkeys(both, both))
+    return set(island.values())
+
+
+def received_pairs(told: Run) -> set[tuple[int, int]]:
+    return set(zip(told.received("sender").tolist(), told.received("receiver").tolist(), strict=True))
+
+
+@pytest.mark.parametrize(("keys", "sets"), SCRIPTS)
+def test_there_are_as_many_islands_as_the_script_says_and_nothing_crosses(keys: dict[str, Any], sets: list[set[int]]):
+    told = broadcasts(held(partition(**keys)))
+    assert islands(told.edges, 6) == {frozenset(own) for own in sets}
+    assert received_pairs(told) == {(a, b) for own in sets for a in own for b in own if a != b}
+    received = sum(len(own) * (len(own) - 1) for own in sets)
+    assert told.fates() == {fate: n for fate, n in (("RECEIVED", received), ("PARTITIONED", 30 - received)) if n}
+
+
+def test_nothing_is_apart_any_more_once_it_is_over():
+    for keys, _ in SCRIPTS:
+        event = partition(**keys, for_s=1.0)
+        conditions = held(event)
+        event.end(0, conditions)
+        assert broadcasts(conditions).fates() == {"RECEIVED": 30}
+
+
+def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
+    for keys, halves in (
+        ({"bridge": ("a-2", "b-1")}, ({0, 1}, {3, 4})),
+        ({"bridge": ("a-2",)}, ({0, 1, 3}, {4, 5})),
+        ({"bridge": ("a-2", "b-1"), "halves": "y"}, ({1, 3}, {0, 4})),
+    ):
+        told = broadcasts(held(partition(**keys)))
+        crossing = {(a, b) for a in halves[0] for b in halves[1]}
+        crossing |= {(b, a) for a, b in crossing}
+        assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - crossing
+        assert islands(told.edges, 6) == {frozenset(EVERYBODY)}
+
+
+@pytest.mark.parametrize(
+    ("keys", "first"),
+    [
+        ({"between": (("b",), ("a",))}, {4, 5}),
+        ({"halves": "x"}, {0, 1, 2}),
+        ({"region": Region(radius_m=0.6)}, {2, 3}),
+    ],
+)
+def test_one_way_the_second_set_does_not_hear_the_first_and_no_edge_joins_them(keys: dict[str, Any], first: set[int]):
+    told = broadcasts(held(partition(**keys, one_way=True)))
+    second = EVERYBODY - first
+    unheard = {(a, b) for a in first for b in second}
+    assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - unheard
+    assert told.fates() == {"RECEIVED": 30 - len(unheard), "PARTITIONED": len(unheard)}
+    assert islands(told.edges, 6) == {frozenset(first), frozenset(second)}
+
+
+def test_sides_by_place_are_each_arenas_own_and_stay_those_of_the_beginning():
+    two = Swarm(SWARM.groups, 6, np.array([7, 8], np.uint64), np.concatenate([POSE, -POSE]))
+    conditions = held(partition(halves="x"), two)
+    assert conditions.disruption().sides.tolist() == [[1, 1, 1, 2, 2, 2, 2, 2, 2, 1, 1, 1]]
+
+
+def test_the_edge_of_a_region_belongs_to_it():
+    pose = at((1, 0), (1.01, 0), (0, -2), (0, -2.01))
+    assert Region(radius_m=1.0).holds(pose).tolist() == [True, False, False, False]
+    assert Region(size_m=(2.0, 4.0)).holds(pose).tolist() == [True, False, True, False]
+
+
+def blackout(backlog: str, *names: str) -> Blackout:
+    return Blackout(at_s=0.0, robots=Selection(names=names), backlog=backlog)
+
+
+def test_the_strictest_backlog_counts_as_long_as_its_blackout_lasts():
+    conditions = ActiveEffects(3)
+    events = [blackout("all", "a-0", "a-1"), blackout("newest", "a-1", "a-2"), blackout("drop", "a-2")]
+    for serial, event in enumerate(events):
+        event.begin(serial, RADIO_SWARM, conditions)
+    assert conditions.disruption().backlog_now.tolist() == [ALL, NEWEST, DROP]
+    events[2].end(2, conditions)
+    assert conditions.disruption().backlog_now.tolist() == [ALL, NEWEST, NEWEST]
+    events[1].end(1, conditions)
+    assert conditions.disruption().backlog_now.tolist() == [ALL, ALL, DROP]
+    assert conditions.radio_on.tolist() == [False, False, True]
+
+
+def test_packets_are_dropped_unless_the_scenario_says_otherwise():
+    assert Blackout(at_s=0.0, robots=Selection(group="a")).backlog == "drop"
+
+
+def gain(*names: str, **keys: Any) -> Gain:
+    return Gain(at_s=0.0, robots=Selection(names=names), for_s=1.0, **keys)
+
+
+def test_gains_add_up_each_way_in_every_arena():
+    conditions, events = ActiveEffects(6), [gain("a-0", "a-1", send_db=-6.0), gain("a-1", send_db=2.0, receive_db=-3.0)]
+    changed = [event.begin(serial, TWO_ARENAS, conditions).tolist() for serial, event in enumerate(events)]
+    assert changed == [[True, True, False] * 2, [False, True, False] * 2]
+    now = conditions.disruption()
+    assert now.send_gain_db.tolist() == [-6.0, -4.0, 0.0] * 2
+    assert now.receive_gain_db.tolist() == [0.0, -3.0, 0.0] * 2
+    assert events[0].end(0, conditions).tolist() == [True, True, False] * 2
+    now = conditions.disruption()
+    assert now.send_gain_db.tolist() == [0.0, 2.0, 0.0] * 2
+    events[1].end(1, conditions)
+    assert not conditions.disruption().send_gain_db.any()
+
+
+def jammer(**keys: Any) -> Jammer:
+    return Jammer(at_s=0.0, power_dbm=10.0, for_s=1.0, **keys)
+
+
+def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
+    conditions = ActiveEffects(swarm.rows)
+    event.begin(serial, swarm, conditions)
+    return conditions.disruption().jammers
+
+
+def test_one_stands_at_its_place_in_every_arena():
+    found = put_up(jammer(at=(1.0, -2.0)))
+    assert found.arena.tolist() == [0, 1]
+    assert found.carrier.tolist() == [NO_ROBOTS, NO_ROBOTS]
+    assert found.places(APART.pose).tolist() == [[1.0, -2.0]] * 2
+
+
+def test_one_that_is_carried_is_where_its_robot_is():
+    found = put_up(jammer(robots=Selection(names=("a-1",))))
+    assert found.arena.tolist() == [0, 1]
+    assert found.carrier.tolist() == [1, 4]
+    assert found.places(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
+
+
+def test_those_of_several_events_add_up_and_go_one_by_one():
+    conditions = ActiveEffects(6)
+    standing, carried = jammer(at=(0.0, 0.0)), jammer(robots=Selection(count=2))
+    assert standing.begin(0, APART, conditions).all()
+    chosen = carried.begin(1, APART, conditions)
+    assert chosen.reshape(2, 3).sum(axis=1).tolist() == [2, 2]
+    assert len(conditions.disruption().jammers.arena) == 6
+    assert standing.end(0, conditions).all()
+    assert carried.end(1, conditions).tolist() == chosen.tolist()
+    assert len(conditions.disruption().jammers.arena) == 0
+
+
+def test_the_phase_is_the_arenas_own_and_each_jammers():
+    event = jammer(robots=Selection(group="a"), duty=0.5, period_s=1.0)
+    together = put_up(event).phase_ns
+    assert len(set(together.tolist())) == 6
+    alone = Swarm(APART.groups, 3, KEYS[1:], APART.pose[3:])
+    assert put_up(event, alone).phase_ns.tolist() == together[3:].tolist()
+    assert put_up(event, serial=1).phase_ns.tolist() != together.tolist()
+    assert ((together >= 0) & (together < 10**9)).all()
+
+
+@pytest.mark.parametrize("duty", [0.1, 0.5, 0.9])
+def test_it_is_on_for_its_duty_and_toggles_tell_when(duty: float):
+    found = put_up(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
+    assert found.duty == pytest.approx([duty] * 2, abs=1e-6)
+    at_ns = np.arange(0, 2_000_000, 400)
+    seen = np.array([found.is_on(one) for one in at_ns.tolist()])
+    assert seen.mean(axis=0) == pytest.approx([duty] * 2, abs=0.15)
+    now = found.is_on(-1)
+    toggled, which = found.toggles(0, 2_000_000)
+    assert (np.diff(toggled) >= 0).all()
+    for i, time_ns in enumerate(at_ns.tolist()):
+        flips = np.bincount(which[toggled <= time_ns], minlength=2)
+        np.testing.assert_array_equal(now ^ (flips % 2 == 1), seen[i])
+
+
+def test_toggles_in_steps_are_those_of_the_whole():
+    found = put_up(jammer(at=(0.0, 0.0), duty=0.3, period_s=0.01))
+    whole = found.toggles(0, 100_000_000)
+    steps = [found.toggles(at_ns, at_ns + 10_000_000) for at_ns in range(0, 100_000_000, 10_000_000)]
+    assert np.concatenate([times for times, _ in steps]).tolist() == whole[0].tolist()
+
+
+def test_one_that_is_always_on_never_toggles():
+    found = put_up(jammer(at=(0.0, 0.0)))
+    assert found.is_on(123).all()
+    assert len(found.toggles(0, 10**9)[0]) == 0
+
+
+def test_where_nothing_disturbs_a_jammer_is_refused():
+    with pytest.raises(BadInput, match=r'^do: expected another radio.access.method than "none"'):
+        jammer(at=(0.0, 0.0)).check_radio(Radio(model="log-distance", log_distance=LogDistance()))
+
+
+def under(*ramps: Ramp) -> ActiveEffects:
+    conditions = ActiveEffects(2)
+    for serial, ramp in enumerate(ramps):
+        ramp.check_radio(RADIO)
+        assert ramp.begin(serial, PAIR, conditions).all()
+    return conditions
+
+
+def numbers(conditions: ActiveEffects, key: str, *at_s: float) -> list[float]:
+    return [number_of(conditions.radio_at(RADIO, to_ns(one)), key) for one in at_s]
+
+
+def ramp(what: str, to: float, at_s: float = 1.0, **keys: Any) -> Ramp:
+    return Ramp(at_s=at_s, what=what, to=to, **keys)
+
+
+def test_a_number_moves_evenly_and_stays_at_its_end():
+    loss = numbers(under(ramp("radio.loss", 0.5, over_s=4.0)), "radio.loss", 1.0, 2.0, 3.0, 5.0, 9.0)
+    assert loss == pytest.approx([0.1, 0.2, 0.3, 0.5, 0.5])
+    assert loss[-1] == 0.5
+
+
+def test_without_a_time_it_steps():
+    assert numbers(under(ramp("radio.range_m", 1.5)), "radio.range_m", 1.0, 1.1) == [1.5, 1.5]
+
+
+def test_whole_numbers_are_rounded_on_the_way():
+    conditions = under(ramp("radio.queue_limit", 0.0, over_s=8.0))
+    assert numbers(conditions, "radio.queue_limit", 1.0, 2.0, 2.1, 9.0) == [20, 18, 17, 0]
+    assert isinstance(conditions.radio_at(RADIO, to_ns(2.1)).queue_limit, int)
+
+
+def test_numbers_within_tables_move_and_nothing_else_does():
+    conditions = under(ramp("radio.measures.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
+    bursts, measures = Bursts(bad_s=2.0), Measures(range=RangeMeasure(0.5))
+    assert conditions.radio_at(RADIO, to_ns(1.0)) == replace(RADIO, bursts=bursts, measures=measures)
+
+
+def test_a_ramp_sets_out_from_what_those_before_it_made_and_undone_leaves_that():
+    first, second = ramp("radio.loss", 0.3), ramp("radio.loss", 0.9, at_s=2.0, over_s=2.0)
+    conditions = under(first, second)
+    assert numbers(conditions, "radio.loss", 2.0, 3.0, 4.0) == pytest.approx([0.3, 0.6, 0.9])
+    second.end(1, conditions)
+    assert numbers(conditions, "radio.loss", 4.0) == [0.3]
+    first.end(0, conditions)
+    assert conditions.radio_at(RADIO, to_ns(4.0)) is RADIO
+
+
+def test_a_bit_rate_that_a_standard_has_may_be_stepped_to_but_not_ramped():
+    ramp("radio.bit_rate_bps", 2_000_000).check_radio(WIFI_B)
+    with pytest.raises(BadInput, match=r"^over_s: radio\..*: .*1000000, 2000000.*got 1500000 bit/s"):
+        ramp("radio.bit_rate_bps", 2_000_000, over_s=1.0).check_radio(WIFI_B)
+    with pytest.raises(BadInput, match=r"^to: radio\..*got 3000000 bit/s"):
+        ramp("radio.bit_rate_bps", 3_000_000).check_radio(WIFI_B)
+
+
+def swarm(*keys: int, robots: int = ROBOTS) -> Swarm:
+    return Swarm({"a": range(robots)}, robots, np.array(keys, np.uint64), np.zeros((len(keys) * robots, 3)))
+
+
+def fail(part: str, *, per_hour: float | None = None, for_s: float | None = None, **robots: float) -> Fail:
+    chosen = Selection(group="a", **robots)  # pyright: ignore[reportArgumentType] - share or count
+    return Fail(at_s=10.0, part=part, robots=chosen, per_hour=per_hour, for_s=for_s)
+
+
+def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
+    """Whose part does not work at these times."""
+    conditions, found = ActiveEffects(of.rows), []
+    event.begin(0, of, conditions)
+    for time_s in at_s:
+        event.go_on(0, to_ns(time_s), of, conditions)
+        found.append(conditions.failed(event.part))
+    return found
+
+
+def test_a_share_fails_at_once_and_works_again():
+    conditions, of, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
+    assert event.lasts_s == 5.0
+    changed = event.begin(0, of, conditions)
+    assert changed.sum() == 3
+    assert (conditions.failed_parts["proximity"] == changed).all()
+    assert conditions.alive.all()
+    assert (event.end(0, conditions) == changed).all()
+    assert not conditions.failed_parts
+
+
+def test_what_two_events_hold_works_only_after_both():
+    conditions, of, event = ActiveEffects(4), swarm(7, robots=4), fail("motors")
+    event.begin(0, of, conditions)
+    assert not event.begin(1, of, conditions).any(), "they had failed already"
+    assert not event.end(0, conditions).any()
+    assert event.end(1, conditions).all()
+
+
+def test_at_a_rate_lifetimes_are_exponential():
+    # An hour at 2 per hour leaves exp(-2) of the robots; three standard errors of a share of 2,000.
+    for hours in (0.25, 1.0):
+        (failed,) = failed_after(fail("motors", per_hour=2.0), swarm(7), 10.0 + 3600.0 * hours)
+        expected = 1.0 - np.exp(-2.0 * hours)
+        assert abs(failed.mean() - expected) < 3.0 * np.sqrt(expected * (1.0 - expected) / ROBOTS)
+
+
+def test_what_is_mended_fails_again_and_is_down_for_its_share_of_the_time():
+    # Up for 1/rate on average, down for for_s: of 30 min and 10 min, a quarter of the time is down.
+    times_s = 10.0 + 3600.0 * np.arange(2, 12)
+    down = failed_after(fail("motors", per_hour=2.0, for_s=600.0), swarm(7), *times_s)
+    assert abs(np.mean(down) - 0.25) < 3.0 * np.sqrt(0.25 * 0.75 / ROBOTS)
+
+
+def test_neither_ticks_nor_other_arenas_matter():
+    event = fail("motors", per_hour=60.0, for_s=20.0)
+    often = failed_after(event, swarm(7), *(10.0 + 0.1 * np.arange(1, 1201)))[-1]
+    (seldom,) = failed_after(event, swarm(7), 130.0)
+    (beside,) = failed_after(event, swarm(9, 7), 130.0)
+    assert often.any()
+    assert (often == seldom).all()
+    assert (beside[ROBOTS:] == seldom).all()
+
+
+def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
+    conditions, of, event = ActiveEffects(6), swarm(7, robots=6), fail("battery", count=4)
+    event.begin(0, of, conditions)
+    assert conditions.alive.sum() == 2
+    Revive(at_s=11.0, robots=Selection(names=("a-0", "a-1", "a-2", "a-3", "a-4", "a-5"))).begin(1, of, conditions)
+    assert conditions.alive.all()
+    event.end(0, conditions)
+    assert conditions.alive.all()
+
+
+@pytest.mark.parametrize("part", ["battery", "motors"])
+def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
+    conditions, of = ActiveEffects(ROBOTS), swarm(7)
+    event = fail(part, per_hour=1000.0)
+    assert event.lasts_s is None
+    assert not event.begin(0, of, conditions).any()
+    began, ended = event.go_on(0, to_ns(20.0), of, conditions)
+    assert began.any()
+    assert not ended.any()
+    assert (conditions.alive == ~began).all() if part == "battery" else conditions.alive.all()
+
+
+def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_revived():
+    conditions, of = ActiveEffects(ROBOTS), swarm(7)
+    event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
+    event.begin(0, of, conditions)
+    first, _ = event.go_on(0, to_ns(20.0), of, conditions)
+    everybody.begin(1, of, conditions)
+    assert conditions.alive.all()
+    again, mended = event.go_on(0, to_ns(20.0), of, conditions)
+    assert not again.any()
+    assert (mended == first).all()
+    later, _ = event.go_on(0, to_ns(60.0), of, conditions)
+    assert (later & first).any()
+
+
+def test_a_robot_that_is_revived_has_a_battery_whose_gauge_works():
+    conditions, of = ActiveEffects(4), swarm(7, robots=4)
+    fail("battery").begin(0, of, conditions)
+    Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, of, conditions)
+    assert conditions.failed("battery").tolist() == [True, False, True, True]
+
+
+def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> None:
+    revive = Revive(at_s=1.0, robots=Selection(group="a"))
+    with pytest.raises(TypeError, match="revive lasts for ever: there is nothing to undo"):
+        revive.end(0, ActiveEffects(2))
+    with pytest.raises(TypeError, match="ramp does not change by itself"):
+        Ramp(at_s=1.0, what="radio.loss", to=0.5).go_on(0, 0, ROBOT_SWARM, ActiveEffects(2))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (True, "true"),
+        (False, "false"),
+        ("a", '"a"'),
+        (0.5, "0.5"),
+        ((1, "a"), '[1, "a"]'),
+        (Selection(names=("a-0", "a-1")), '{ names = ["a-0", "a-1"] }'),
+    ],
+)
+def test_values_are_told_as_toml(value: object, words: str) -> None:
+    assert as_toml(value) == words

@@ -1,0 +1,478 @@
+"""Geometry: angles, cells and neighbours, obstacles and lines of sight."""
+
+import math
+from collections.abc import Callable
+from math import cos, inf, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.angles import wrap_angle, wrap_angles, wrap_by_atan2, wrap_by_modulo
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
+from swarmwire.comms.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
+from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
+from swarmwire.comms.geometry.robot_index import (
+    MAX_CELLS_PER_SIDE,
+    Grid,
+    build,
+    cell_of,
+    cells_around,
+    cells_over,
+    column_of,
+    is_empty,
+    row_of,
+    sort,
+)
+from swarmwire.comms.kernels import njit
+from swarmwire.comms.truth import Obstacle
+
+SIDES = st.floats(0.1, 50.0)
+SIZE_M = (4.0, 2.0)
+DISC = Patch("disc", 1.0, 0.0, 0.2, radius_m=0.5)
+TRIANGLE = Patch("polygon", 1.0, 0.0, 0.4, points_m=((-0.2, -0.2), (0.2, -0.2), (0.0, 0.3)))
+GREY = np.array([[0, 51, 102, 153], [255, 204, 153, 102]], np.uint8)  # each a square metre
+FAR_M = 20.0
+Depth = Callable[[FloatArray, FloatArray], FloatArray]
+ARENAS = (
+    (Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), Obstacle("box", 2.0, 0.0, math.pi / 4, size_m=(1.0, 1.0))),
+    (),
+    (Obstacle("box", 0.0, 1.0, size_m=(4.0, 0.2)),),
+)
+OBSTACLE_ARENA_M = (6.0, 4.0)
+compiled = njit()(wrap_angle)
+ANGLES = st.floats(-50.0, 50.0) | st.integers(-9, 9).map(lambda half_turns: half_turns * math.pi)
+
+
+@given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0), st.booleans())
+def test_all_within_reach_are_in_the_cells_around(
+    seed: int, width_m: float, height_m: float, reach_m: float, torus: bool
+) -> None:
+    random = np.random.default_rng(seed)
+    x, y = (random.uniform(-2.0, 2.0, 60) * side for side in (width_m, height_m))
+    cells = cells_over((width_m, height_m), reach_m, 1, 60)
+    apart_x, apart_y = x[:, None] - x, y[:, None] - y
+    if torus:
+        apart_x, apart_y = (d - side * np.rint(d / side) for d, side in ((apart_x, width_m), (apart_y, height_m)))
+    near = np.hypot(apart_x, apart_y) <= reach_m
+    i, j = (np.array([of(cells, at) for at in axis]) for of, axis in ((column_of, x), (row_of, y)))
+    columns, rows = (i[:, None] - i) % cells.nx, (j[:, None] - j) % cells.ny
+    around = np.isin(columns, (0, 1, cells.nx - 1)) & np.isin(rows, (0, 1, cells.ny - 1))
+    assert not np.any(near & ~around)
+    listed = np.empty(9, np.int64)
+    for robot in range(60):
+        cell = listed[: cells_around(listed, cells, 2, x[robot], y[robot])] - 2 * cells.ny * cells.nx
+        assert len(cell) == len(set(cell.tolist()))
+        assert np.array_equal(np.isin(j * cells.nx + i, cell), around[robot])
+    assert 0 <= i.min() <= i.max() < cells.nx
+    assert 0 <= j.min() <= j.max() < cells.ny
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 20))
+def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas: int, robots: int) -> None:
+    state = np.random.default_rng(seed).uniform(-3.0, 3.0, (arenas, robots, 6))
+    cells = cells_over((4.0, 3.0), 0.7, arenas, arenas * robots)
+    for _ in range(2):  # sorting again starts afresh
+        sort(cells, state, np.ones(len(state), np.bool_))
+    held = {
+        (a, j, i): cells.item[cells.start[c] : cells.start[c + 1]].tolist()
+        for c, (a, j, i) in enumerate(np.ndindex(arenas, cells.ny, cells.nx))
+    }
+    expected = {key: list[int]() for key in held}
+    for a in range(arenas):
+        for robot in range(robots):
+            expected[a, row_of(cells, state[a, robot, 1]), column_of(cells, state[a, robot, 0])].append(robot)
+    assert held == expected
+
+
+@pytest.mark.parametrize("reach_m", [1e-6, 1e6])
+def test_there_are_neither_too_many_cells_nor_none(reach_m: float) -> None:
+    cells = cells_over((100.0, 50.0), reach_m, 1, 1)
+    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MAX_CELLS_PER_SIDE
+
+
+def test_arenas_that_are_over_have_nobody_in_their_cells() -> None:
+    state = np.zeros((3, 4, 2))
+    cells = cells_over((2.0, 2.0), 0.5, 3, 12)
+    sort(cells, state, np.array([True, False, True]))
+    filled = np.diff(cells.start).reshape(3, -1).sum(axis=1)
+    assert filled.tolist() == [4, 0, 4]
+    assert cells.start[-1] == 8
+
+
+def cells_of(grid: Grid, x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray]:
+    i = np.array([cell_of(at, grid.left_m, grid.cell_m, grid.nx) for at in x], np.int64)
+    j = np.array([cell_of(at, grid.bottom_m, grid.cell_m, grid.ny) for at in y], np.int64)
+    return i, j
+
+
+@given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0))
+def test_of_a_grid_all_within_reach_are_in_the_cells_around_also_outside_the_arena(
+    seed: int, width_m: float, height_m: float, reach_m: float
+) -> None:
+    random = np.random.default_rng(seed)
+    x, y = (random.uniform(-0.75, 0.75, 60) * side for side in (width_m, height_m))  # a third is outside
+    grid = build(x, y, 1, (width_m, height_m), reach_m)
+    i, j = cells_of(grid, x, y)
+    near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m
+    around = (np.abs(i[:, None] - i) <= 1) & (np.abs(j[:, None] - j) <= 1)
+    assert not np.any(near & ~around)
+
+
+@pytest.mark.parametrize("reach_m", [0.5, 0.3, 1.0])
+def test_points_on_the_lines_between_cells_find_one_another(reach_m: float) -> None:
+    x = np.repeat(np.arange(-8, 9) * reach_m / 2, 17)
+    y = np.tile(np.arange(-8, 9) * reach_m / 2, 17)
+    grid = build(x, y, 1, (4.0, 4.0), reach_m)
+    i, j = cells_of(grid, x, y)
+    near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m * (1.0 - 1e-12)
+    assert not np.any(near & ((np.abs(i[:, None] - i) > 1) | (np.abs(j[:, None] - j) > 1)))
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20))
+def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, are: list[bool], robots: int) -> None:
+    random, arenas, running = np.random.default_rng(seed), len(are), np.array(are)
+    x, y = random.uniform(-3.0, 3.0, (2, arenas * robots))
+    grid = build(x, y, arenas, (4.0, 3.0), 0.7, None if running.all() else running)
+    i, j = cells_of(grid, x, y)
+    arena = np.arange(arenas * robots) // max(robots, 1)
+    cell = (arena * grid.ny + j) * grid.nx + i
+    here = np.repeat(running, robots)
+    assert sorted(grid.order.tolist()) == np.flatnonzero(here).tolist()
+    assert [is_empty(grid, a) for a in range(arenas)] == [not (running[a] and robots) for a in range(arenas)]
+    for c in range(arenas * grid.ny * grid.nx):
+        assert grid.order[grid.start[c] : grid.start[c + 1]].tolist() == np.flatnonzero((cell == c) & here).tolist()
+
+
+def test_a_tiny_reach_does_not_make_a_huge_table() -> None:
+    grid = build(np.zeros(1), np.zeros(1), 1, (100.0, 50.0), 1e-6)
+    assert max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
+
+
+def test_without_a_floor_all_is_white():
+    assert shade_at(ground_of(None, SIZE_M, "walls"), 0.3, 0.4) == 1.0
+
+
+def test_the_last_patch_wins_and_its_rim_belongs_to_it():
+    ground = ground_of(Floor(0.9, (DISC, TRIANGLE)), SIZE_M, "walls")
+    at = {(1.0, 0.0): 0.4, (1.0, 0.3): 0.4, (1.2, -0.2): 0.4, (1.15, 0.2): 0.2, (1.5, 0.0): 0.2, (1.6, 0.0): 0.9}
+    assert {point: shade_at(ground, *point) for point in at} == at
+    assert shade_at(ground_of(Floor(0.9, (TRIANGLE, DISC)), SIZE_M, "walls"), 1.0, 0.0) == 0.2
+
+
+def test_a_picture_is_stretched_over_the_arena_top_row_at_the_greatest_y():
+    ground = ground_of(Floor(0.5, (), packed_image(GREY)), SIZE_M, "walls")
+    x, y = np.arange(-1.5, 2.0), (0.5, -0.5)
+    assert [[shade_at(ground, at, up) for at in x] for up in y] == pytest.approx(GREY / 255.0)
+    assert shades_over(ground, x, np.array(y)) == pytest.approx(GREY / 255.0)
+    corners = [shade_at(ground, at, up) for at, up in ((-2.0, 1.0), (2.0, 1.0), (-2.0, -1.0), (2.0, -1.0))]
+    assert corners == pytest.approx([0.0, 0.6, 1.0, 0.4])
+    assert [shade_at(ground, 2.01, 0.0), shade_at(ground, 0.0, -1.01)] == [0.5, 0.5]
+    assert shade_at(ground_of(Floor(0.5, (DISC,), packed_image(GREY)), SIZE_M, "walls"), 1.1, 0.1) == 0.2
+
+
+def test_on_a_torus_patch_and_picture_go_on_at_the_other_side():
+    disc = Patch("disc", 1.9, 0.9, 0.2, radius_m=0.3)
+    wrapped, cut = (ground_of(Floor(1.0, (disc,)), SIZE_M, boundary) for boundary in ("torus", "open"))
+    for x, y in ((-1.9, 0.9), (1.9, -0.9), (-1.95, -0.95), (2.05, 1.05)):
+        assert shade_at(wrapped, x, y) == 0.2
+    assert [shade_at(cut, -1.9, 0.9), shade_at(cut, 2.05, 1.05)] == [1.0, 0.2]
+    picture = ground_of(Floor(1.0, (), packed_image(GREY)), SIZE_M, "torus")
+    for x, y in ((-1.5, 0.5), (0.5, -0.5)):
+        assert {shade_at(picture, x + 4.0 * i, y + 2.0 * j) for i in (-1, 0, 1) for j in (-1, 0, 1)} == {
+            shade_at(picture, x, y)
+        }
+
+
+def circle_depth(cx: float, cy: float, radius: float) -> Depth:
+    """How far outside the circle points are, in m; negative inside."""
+    return lambda x, y: np.hypot(x - cx, y - cy) - radius
+
+
+def box_depth(box: FloatArray) -> Depth:
+    """How far outside the box points are along its worse axis, in m; negative inside."""
+    c, s = box[4], box[5]
+
+    def depth(x: FloatArray, y: FloatArray) -> FloatArray:
+        ox, oy = x - box[0], y - box[1]
+        return np.maximum(np.abs(c * ox + s * oy) - box[2], np.abs(c * oy - s * ox) - box[3])
+
+    return depth
+
+
+def ray_to(obstacle: Obstacle, px: float, py: float, dx: float, dy: float) -> float:
+    return ray_to_polygon(px, py, dx, dy, obstacle_arrays(((obstacle,),)), 0)
+
+
+def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float) -> None:
+    """`distance` is that of the first point of the ray in the obstacle, by a fine search along the ray."""
+    if distance == 0.0:
+        assert depth(np.array(px), np.array(py)) <= 1e-12
+        return
+    dx, dy = math.cos(angle), math.sin(angle)
+    along = np.linspace(0.0, min(distance, FAR_M), 4001)[:-1]
+    assert np.all(depth(px + along * dx, py + along * dy) > -1e-9)
+    if math.isfinite(distance):
+        assert abs(depth(np.array(px + distance * dx), np.array(py + distance * dy))) < 1e-9
+
+
+def test_rays_end_where_they_first_meet_a_circle() -> None:
+    random = np.random.default_rng(1)
+    tx_status = set[str]()
+    for px, py, angle, cx, cy, radius in random.uniform([-3, -3, -4, -3, -3, 0.1], [3, 3, 4, 3, 3, 2], (300, 6)):
+        distance = ray_to_circle(px, py, math.cos(angle), math.sin(angle), cx, cy, radius)
+        check_ray(distance, circle_depth(cx, cy, radius), px, py, angle)
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
+
+
+def test_rays_end_where_they_first_meet_a_box() -> None:
+    random = np.random.default_rng(2)
+    tx_status = set[str]()
+    for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
+        cx, cy, half_length, half_width, heading = rest
+        box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
+        obstacle = Obstacle("box", cx, cy, heading, size_m=(2 * half_length, 2 * half_width))
+        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
+        check_ray(distance, box_depth(box), px, py, angle)
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dx", "dy", "expected"),
+    [
+        (-3.0, 0.0, 1.0, 0.0, 2.0),
+        (-3.0, 0.4, 1.0, 0.0, 2.0),
+        (-3.0, 0.6, 1.0, 0.0, math.inf),  # beside it, parallel to a side
+        (-3.0, 0.0, -1.0, 0.0, math.inf),  # behind
+        (0.0, 3.0, 0.0, -1.0, 2.5),
+        (0.9, 0.4, 1.0, 0.0, 0.0),  # from inside
+    ],
+)
+def test_rays_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
+    assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "expected"), [(-3.0, 0.0, 2.0), (3.0, 0.0, math.inf), (0.5, 0.0, 0.0), (-3.0, 1.1, math.inf)]
+)
+def test_rays_ahead_at_a_circle(x: float, y: float, expected: float) -> None:
+    assert ray_to_circle(x, y, 1.0, 0.0, 0.0, 0.0, 1.0) == expected
+
+
+@pytest.mark.parametrize(
+    ("arena", "line", "blocked"),
+    [
+        (0, (-1.0, 0.0, 1.0, 0.0), True),
+        (0, (-1.0, 0.0, -0.6, 0.0), False),  # ends before the cylinder
+        (0, (-1.0, 0.6, 1.0, 0.6), False),
+        (0, (2.65, -1.0, 2.65, 1.0), True),  # the corner of the turned box
+        (0, (2.75, -1.0, 2.75, 1.0), False),
+        (1, (-1.0, 0.0, 1.0, 0.0), False),
+        (2, (-1.0, 0.0, 1.0, 0.0), False),
+        (2, (0.0, 0.0, 0.0, 2.0), True),
+        (2, (1.0, 0.5, 1.0, 0.5), False),  # no line at all
+    ],
+)
+def test_an_obstacle_blocks_lines_of_its_own_arena_only(
+    arena: int, line: tuple[float, float, float, float], blocked: bool
+) -> None:
+    x0, y0, x1, y1 = line
+    obstacles = obstacle_arrays(ARENAS)
+    assert is_blocked(obstacles, arena, x0, y0, x1, y1) is blocked
+    assert is_blocked(obstacles, arena, x1, y1, x0, y0) is blocked
+
+
+def test_a_line_is_blocked_from_both_ends_alike() -> None:
+    obstacles = obstacle_arrays(ARENAS)
+    for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
+        assert is_blocked(obstacles, 0, x0, y0, x1, y1) == is_blocked(obstacles, 0, x1, y1, x0, y0)
+
+
+def test_obstacles_of_each_arena_stand_together() -> None:
+    obstacles = obstacle_arrays(ARENAS)
+    assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
+    assert obstacles.polygon_start.tolist() == [0, 1, 1, 2]
+    assert obstacles.circle.shape == (1, 3)
+    assert obstacle_arrays(((), ())).polygon.shape == (0, 3)
+    assert obstacles.side_start.tolist() == [0, 4, 8]
+
+
+def test_rays_end_where_they_first_meet_a_polygon() -> None:
+    random = np.random.default_rng(4)
+    tx_status = set[str]()
+    for px, py, angle, x, y, heading in random.uniform([-3, -3, -4, -3, -3, -4], [3, 3, 4, 3, 3, 4], (300, 6)):
+        around = np.sort(random.uniform(0.0, 2.0 * np.pi, random.integers(3, 9)))  # corners on a circle: convex
+        points = tuple((1.5 * math.cos(a), 1.5 * math.sin(a)) for a in around)
+        obstacle = Obstacle("polygon", x, y, heading, points_m=points)
+        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
+        check_ray(distance, polygon_depth(obstacle), px, py, angle)
+        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert tx_status == {"inside", "miss", "hit"}
+
+
+def polygon_depth(obstacle: Obstacle) -> Depth:
+    """How far outside the polygon points are, along the normal of their worst side, in m; negative inside."""
+    corners = obstacle.corners_m
+    along = np.roll(corners, -1, axis=0) - corners
+    along /= np.hypot(*along.T)[:, None]
+
+    def depth(x: FloatArray, y: FloatArray) -> FloatArray:
+        ox, oy = x[..., None] - corners[:, 0], y[..., None] - corners[:, 1]
+        return (ox * along[:, 1] - oy * along[:, 0]).max(-1)
+
+    return depth
+
+
+def test_a_box_is_a_polygon_with_its_corners() -> None:
+    box = Obstacle("box", 0.3, -0.2, 0.7, size_m=(1.0, 0.4))
+    polygon = Obstacle("polygon", 0.3, -0.2, 0.7, points_m=((-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)))
+    assert np.array_equal(box.corners_m, polygon.corners_m)
+    for one, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_polygon_blocks_the_line_through_it() -> None:
+    triangle = Obstacle("polygon", 0.0, 0.0, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    obstacles = obstacle_arrays(((triangle,),))
+    assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2)
+    assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1)
+    assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0)
+    assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
+
+
+def test_heights_stand_with_their_shapes_and_are_endless_if_left_out() -> None:
+    low, high = Obstacle("cylinder", 0.0, 0.0, radius_m=0.1, height_m=0.2), Obstacle("cylinder", 1.0, 0.0, radius_m=0.1)
+    box = Obstacle("box", 0.0, 1.0, size_m=(1.0, 1.0), height_m=0.5)
+    arrays = obstacle_arrays(((box, low), (high, box)))
+    assert arrays.circle_top_m.tolist() == [0.2, math.inf]
+    assert arrays.polygon_top_m.tolist() == [0.5, 0.5]
+
+
+def obstacles(seed: int, count: int) -> tuple[Obstacle, ...]:
+    """Cylinders, boxes, long walls and triangles, some reaching out of the arena."""
+    random = np.random.default_rng(seed)
+    made = list[Obstacle]()
+    for k in range(count):
+        (x, y), turn = (random.uniform(-0.5, 0.5, 2) * OBSTACLE_ARENA_M).tolist(), float(random.uniform(-pi, pi))
+        points = tuple((0.3 * cos(a), 0.3 * sin(a)) for a in (0.1, 2.0, 4.0))
+        made.append(
+            (
+                Obstacle("cylinder", x, y, radius_m=float(random.uniform(0.02, 0.4)), height_m=0.1),
+                Obstacle("box", x, y, turn, size_m=(0.3, 0.2)),
+                Obstacle("box", x, y, turn, size_m=(3.0, 0.05), height_m=0.2),
+                Obstacle("polygon", x, y, turn, points_m=points),
+            )[k % 4]
+        )
+    return tuple(made)
+
+
+def distance(of: Obstacle, x: float, y: float) -> float:
+    """From a place to an obstacle, 0 from within."""
+    if of.shape == "cylinder":
+        return max(np.hypot(x - of.x_m, y - of.y_m) - of.radius_m, 0.0)
+    corners = of.corners_m
+    ahead = np.roll(corners, -1, axis=0) - corners
+    to = np.array([x, y]) - corners
+    if np.all(ahead[:, 0] * to[:, 1] >= ahead[:, 1] * to[:, 0]):
+        return 0.0
+    share = np.clip((to * ahead).sum(axis=1) / (ahead**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(to - share[:, None] * ahead).T).min())
+
+
+def place_of(of: Obstacle) -> tuple[float, float]:
+    """Its centre as the arrays have it."""
+    x, y = (of.x_m, of.y_m) if of.shape == "cylinder" else of.corners_m.mean(axis=0).tolist()
+    return round(x, 9), round(y, 9)
+
+
+@pytest.mark.parametrize("reach_m", [0.0, 0.15, 1.0, 9.0])
+@pytest.mark.parametrize("torus", [False, True])
+def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: float, torus: bool) -> None:
+    arenas = obstacles(1, 24), (), obstacles(2, 8)
+    things = obstacles_within(obstacle_arrays(arenas), OBSTACLE_ARENA_M, reach_m, torus)
+    found, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
+    shifts = (
+        [(i * OBSTACLE_ARENA_M[0], j * OBSTACLE_ARENA_M[1]) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        if torus
+        else [(0.0, 0.0)]
+    )
+    spread = 0.5 if torus else 0.8  # in the open, robots leave the arena
+    for x, y in (random.uniform(-spread, spread, (8 if torus else 60, 2)) * OBSTACLE_ARENA_M).tolist():
+        for arena, own in enumerate(arenas):
+            count = obstacles_near(found, things, arena, x, y, reach_m, 0.0)
+            listed = {(round(a, 9), round(b, 9)) for a, b in things.shape[found[:count], :2].tolist()}
+            assert len(listed) == count
+            for of in own:
+                for dx, dy in shifts:
+                    at = place_of(of)
+                    if distance(of, x - dx, y - dy) < reach_m:
+                        assert (round(at[0] + dx, 9), round(at[1] + dy, 9)) in listed
+
+
+def test_obstacles_below_are_not_looked_at() -> None:
+    things = obstacles_within(obstacle_arrays((obstacles(4, 24),)), OBSTACLE_ARENA_M, 9.0, False)
+    found = np.empty(24, np.int64)
+    counts = [obstacles_near(found, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
+    assert counts == [24, 18, 18, 12, 12]
+
+
+def test_rays_meet_what_they_meet_in_the_arrays() -> None:
+    arrays = obstacle_arrays((obstacles(5, 12),))
+    things, random = obstacles_within(arrays, OBSTACLE_ARENA_M, 1.0, False), np.random.default_rng(6)
+    for x, y, angle in random.uniform(-3, 3, (50, 3)).tolist():
+        ray = x, y, cos(angle), sin(angle)
+        circles = [ray_to_circle(*ray, *circle) for circle in arrays.circle.tolist()]
+        expected = [*circles, *(ray_to_polygon(*ray, arrays, k) for k in range(len(arrays.polygon)))]
+        assert [ray_to_obstacle(*ray, things, k) for k in range(12)] == expected
+        assert inf in expected
+
+
+def test_a_robot_in_a_large_map_reads_a_short_list() -> None:
+    side = np.arange(-19, 20) * 0.5
+    boxes = tuple(Obstacle("box", x, y, size_m=(0.3, 0.3)) for x in side.tolist() for y in side.tolist())
+    cells = obstacles_within(obstacle_arrays((boxes,)), (20.0, 20.0), 0.2, False).cells
+    assert len(boxes) == 1521
+    assert np.diff(cells.start).max() <= 4
+
+
+@given(ANGLES)
+def test_the_forms_for_one_angle_for_arrays_and_for_kernels_agree_bit_for_bit(angle: float):
+    assert wrap_angle(angle) == wrap_angles(np.array([angle]))[0] == compiled(angle)
+
+
+@given(ANGLES)
+def test_angles_lie_in_the_interval_and_point_where_they_did(angle: float):
+    wrapped = wrap_angle(angle)
+    assert -math.pi < wrapped <= math.pi
+    assert abs(math.remainder(wrapped - angle, math.tau)) < 1e-13
+    for other in (wrap_by_atan2, wrap_by_modulo):
+        assert -math.pi <= other(np.array(angle)) <= math.pi
+        assert abs(math.remainder(float(other(np.array(angle))) - wrapped, math.tau)) < 1e-13
+
+
+@given(st.floats(-math.pi, math.pi, exclude_min=True))
+def test_an_angle_in_the_interval_keeps_its_bits(angle: float):
+    assert wrap_angle(angle) == angle
+
+
+@given(st.floats(-3.0 * math.pi, 3.0 * math.pi))
+def test_up_to_three_half_turns_it_is_the_exact_remainder(angle: float):
+    exact = math.remainder(angle, math.tau)
+    assert wrap_angle(angle) == (exact if exact > -math.pi else math.pi) or abs(exact) == math.pi
+
+
+def test_a_half_turn_is_to_the_left_or_by_modulo_to_the_right():
+    ends = np.array([math.pi, -math.pi])
+    assert wrap_angles(ends).tolist() == [math.pi, math.pi]
+    assert wrap_by_modulo(ends).tolist() == [-math.pi, -math.pi]
+
+
+def test_what_is_unknown_stays_unknown():
+    assert math.isnan(wrap_angle(math.nan))
+    assert np.isnan(wrap_angles(np.array([math.nan]))).all()
+    assert wrap_angles(np.array([4.0, 7.0])) == pytest.approx([4.0 - math.tau, 7.0 - math.tau])

@@ -1,5 +1,0 @@
-"""Fixtures of these tests."""
-
-from tests.support.deploy.campaign.fixtures import here, scenario, stumbling
-
-__all__ = ["here", "scenario", "stumbling"]

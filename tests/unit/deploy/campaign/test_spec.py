@@ -1,0 +1,214 @@
+"""What varies, the points of designs, and campaigns, which are checked at the door at each of their points."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.campaign.design import Range, points_of, vary_from, vary_of
+from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
+
+
+def values(text):
+    found = vary_of(text).values
+    return found.values() if isinstance(found, Range) else list(found)
+
+
+def test_a_range_is_even_and_in_decimals_as_people_write_them():
+    assert values("radio.loss=0:0.8:9") == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
+    assert values("a.b=1:0:3") == [1.0, 0.5, 0.0]
+    assert values("a=-1e-3:1e-3:2") == [-0.001, 0.001]
+    assert values("a=5:9:1") == [5.0]
+
+
+def test_a_range_in_equal_ratios():
+    assert values("a=1:10000:5:log") == [1.0, 10.0, 100.0, 1000.0, 10000.0]
+    assert values("a=1e-300:1e300:3:log") == [1e-300, 1.0, 1e300]
+    assert values("a=1e-999999999:2:3") == [0.0, 1.0, 2.0]
+
+
+@given(st.integers(-1000, 1000), st.integers(1, 1000), st.integers(2, 50))
+def test_a_range_begins_and_ends_as_asked_and_rises(first, width, count):
+    found = values(f"a={first}:{first + width}:{count}")
+    assert (found[0], found[-1], len(found)) == (first, first + width, count)
+    assert found == sorted(set(found))
+
+
+def test_lists_are_toml_values_and_what_is_none_is_a_text():
+    assert values("a=5,10,20") == [5, 10, 20]
+    assert values("a=0.5,2,true") == [0.5, 2, True]
+    assert values("a=[4, 4], [8, 8]") == [[4, 4], [8, 8]]
+    assert values("a=discs,pymunk") == ["discs", "pymunk"]
+    assert values('a="x,y",z') == ['"x', 'y"', "z"]
+    assert values("robots.pair.agent=a.py:A,b.py:B") == ["a.py:A", "b.py:B"]
+    assert values("a=7") == [7]
+
+
+def test_tables_and_lists_of_a_file_say_the_same():
+    table = {"from": 0.0, "to": 0.8, "count": 9}
+    assert vary_from("radio.loss", table, "x").values == vary_of("radio.loss=0:0.8:9").values
+    assert vary_from("a", {"from": 1, "to": 100, "scale": "log"}, "x").values == vary_of("a=1:100:log").values
+    assert vary_from("a", [1, 2], "x").values == (1, 2)
+    assert vary_from("a", "1:3:3", "x").values == vary_of("a=1:3:3").values
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["radio.loss", "=1", "a.=1", "a=", "a=0:1:x", "a=0:", "a=0:1:2:3", "a=0:1:2:log:3", "a=1:2:0", "a=1:1:2",
+     "a=0:1:2:log", "a=1,1", "a=1:2:1000000000", "a=0:1e400:3", "a=0:1e999999999:3", "a=1:inf:3"],
+)  # fmt: skip
+def test_what_is_none_of_it_is_refused_by_its_name(text):
+    with pytest.raises(BadInput) as refused:
+        vary_of(text)
+    assert (refused.value.where, refused.value.expected.startswith("expected ")) == (f"--vary {text}", True)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "given", [{"from": 0}, {"from": 0, "to": 1, "cuont": 3}, {"from": 0, "to": 1, "count": 1.5}, 3, []]
+)
+def test_what_a_file_says_wrongly_is_refused(given):
+    with pytest.raises(BadInput, match="^there: expected "):
+        vary_from("a", given, "there")
+
+
+def points(kind, *texts, count=None, seed=1, whole=()):
+    return points_of(kind, [vary_of(text) for text in texts], count, seed, lambda path: path in whole)
+
+
+def test_a_grid_combines_all_the_last_path_the_fastest():
+    assert points("grid", "a=1,2", "b=x,y") == [
+        {"a": 1, "b": "x"}, {"a": 1, "b": "y"}, {"a": 2, "b": "x"}, {"a": 2, "b": "y"}
+    ]  # fmt: skip
+    assert points("grid") == [{}]
+
+
+def test_a_list_takes_values_one_to_one():
+    assert points("list", "a=1,2", "b=0:1:2") == [{"a": 1, "b": 0.0}, {"a": 2, "b": 1.0}]
+
+
+def test_ranges_over_whole_numbers_are_rounded():
+    assert points("grid", "a=5:20:3", whole=["a"]) == [{"a": 5}, {"a": 13}, {"a": 20}]
+    assert points("grid", "a=1:100:3:log", whole=["a"]) == [{"a": 1}, {"a": 10}, {"a": 100}]
+
+
+@given(st.integers(1, 40), st.integers(0, 9))
+def test_a_latin_hypercube_has_one_value_in_each_slice_of_each_range(count, seed):
+    found = points("latin", "a=0:1", "b=-5:5", count=count, seed=seed)
+    for path, low, width in (("a", 0, 1), ("b", -5, 10)):
+        slices = [int((point[path] - low) / width * count) for point in found]
+        assert sorted(slices) == list(range(count))
+
+
+@given(st.sampled_from(["random", "latin"]), st.integers(0, 5))
+def test_drawn_points_lie_within_their_ranges_and_depend_on_the_seed_alone(kind, seed):
+    asked = ("a=-1:2", "b=1:1000:log", "n=3:7", "w=x,y")
+    found = points(kind, *asked, count=60, seed=seed, whole=["n"])
+    assert found == points(kind, *asked, count=60, seed=seed, whole=["n"])
+    assert found != points(kind, *asked, count=60, seed=seed + 1, whole=["n"])
+    assert all(-1 <= point["a"] <= 2 and 1 <= point["b"] <= 1000 for point in found)
+    assert {type(point["n"]) for point in found} == {int}
+    assert {point["n"] for point in found} == {3, 4, 5, 6, 7}
+    assert {point["w"] for point in found} == {"x", "y"}
+
+
+def test_random_draws_of_a_path_do_not_depend_on_what_else_varies():
+    alone = [point["a"] for point in points("random", "a=0:1", count=9)]
+    assert alone == [point["a"] for point in points("random", "b=0:1", "a=0:1", count=9)]
+
+
+def test_random_draws_are_uniform_also_in_equal_ratios():
+    drawn = points("random", "a=0:1", "b=1:100:log", count=4000)
+    assert np.mean([point["a"] for point in drawn]) == pytest.approx(0.5, abs=0.02)  # 4 sigma of a mean of 4,000
+    assert np.mean(np.log10([point["b"] for point in drawn])) == pytest.approx(1.0, abs=0.04)
+
+
+@pytest.mark.parametrize(
+    ("kind", "texts", "count", "told"),
+    [
+        ("gird", ["a=1,2"], None, "--design: .*grid"),
+        ("grid", ["a=0:1"], None, "--vary a=0:1: expected FIRST:LAST:COUNT"),
+        ("grid", ["a=1,2", "a=3"], None, "--vary a=3: .*once"),
+        ("grid", ["a=1,2"], 3, "--points: "),
+        ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: .*COUNT"),
+        ("grid", ["a=1:999:999", "b=1:999:999"], None, "--vary: .*100000"),
+        ("list", [], None, "--design: .*empty"),
+        ("list", ["a=1,2", "b=1,2,3"], None, "--vary b=1,2,3: .*2 values.* 3"),
+        ("random", [], 5, "--design: .*empty"),
+        ("random", ["a=0:1"], None, "--points: expected 1 to"),
+        ("latin", ["a=0:1"], 0, "--points: expected 1 to"),
+        ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: .*without COUNT"),
+    ],
+)
+def test_a_design_that_is_none_is_refused(kind, texts, count, told):
+    with pytest.raises(BadInput, match=f"^{told}"):
+        points(kind, *texts, count=count, whole=["n"])
+
+
+def plan(scenario, *texts, **asked):
+    return plan_of(SweepSpec(scenario, (1, 2), tuple(vary_of(text) for text in texts), **asked))
+
+
+def test_a_range_over_what_the_scenario_counts_gives_whole_numbers(scenario):
+    (scenario.parent / "counting.py").write_text(
+        "from swarmwire.agent import Agent\nclass Counting(Agent):\n    n: int = 3\n    x: float = 1.0\n"
+        "    def step(self, robot): pass\n"
+    )
+    agent = (
+        'robots.pair.agent="counting.py:Counting"',
+        'events=[{at_s=0.1, do="kill", robots={group="pair", count=1}}]',
+    )
+    found = plan(
+        scenario, "robots.pair.count=2:8:2", "robots.pair.params.n=1:3:2", "robots.pair.params.x=1:3:2",
+        "time.rate_hz=10:20:2", "duration_s=1:2:2", "events.0.robots.count=1:2:2", overrides=agent,
+    )  # fmt: skip
+    assert [type(value) for value in found.points[0].values()] == [int, int, float, int, float, int]
+    assert len(found.points) == 64
+
+
+def test_responses_are_told_with_unit_and_kind(scenario):
+    found = {of.column: of for of in plan(scenario).responses}
+    assert found["min_gap.final"].unit == "m"
+    assert {of.kind for of in found.values()} == {"number"}
+    assert list(found)[:4] == ["order.final", "order.mean", "order.min", "order.max"]
+    assert "radio.link_pdr" in found
+
+
+def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
+    stop = 'stop={metric="order", at_least=0.5, hold_s=%s}'
+    (held,) = (of for of in plan(scenario, overrides=(stop % 2.0,)).responses if of.column == "stop_time_s")
+    assert (held.help, held.hold_s) == ("when this began to hold: order at least 0.5 for 2 s", 2.0)
+    varied = plan(scenario, "stop.hold_s=1.0,3.0", overrides=(stop % 2.0,)).responses
+    (held,) = (of for of in varied if of.column == "stop_time_s")
+    assert (held.help, held.hold_s) == ("when this began to hold: what is to stop the run", 3.0)
+
+
+@pytest.mark.parametrize(
+    ("texts", "told"),
+    [
+        (["radio.losss=0,0.5"], r"--vary radio.losss=0,0.5: radio.losss: unknown key; .*loss \(did you mean this"),
+        (["robots.pair.params.sepa=1,2"], r"--vary robots.pair.params.sepa=1,2: .*sepa: "),
+        (["robots.par.count=1,2"], r"--vary robots.par.count=1,2: robots.par.body: "),
+        (["robots.pair.count.x=1,2"], r"--vary robots.pair.count.x=1,2: .*robots.pair.count"),
+        (["radio.loss=0.5,1.5"], r"--vary radio.loss=0.5,1.5: radio.loss: expected .*got 1.5"),
+        (["robots.pair.agent=no.py:No"], r"--vary robots.pair.agent=no.py:No: robots.pair.agent: "),
+        (["events.0.at_s=1,2"], r"--vary events.0.at_s=1,2: "),
+        (["time.rate_hz=1,10"], r"--vary time.rate_hz=1: physics.steps: "),
+        (["seed=1,2"], r"--vary seed=1,2: "),
+    ],
+)  # fmt: skip
+def test_a_point_that_cannot_be_run_is_refused_in_a_line_that_names_what_varies(scenario, texts, told):
+    with pytest.raises(BadInput, match=f"^{told}") as refused:
+        plan(scenario, *texts)
+    assert "\n" not in str(refused.value)
+
+
+def test_other_arguments_are_checked_too(scenario):
+    for asked, told in (
+        ({"record_seeds": (3,)}, "--record-seeds: .*3"),
+        ({"batch": 0}, "--batch: expected at least 1"),
+        ({"overrides": ("radio.los=1",)}, "--set radio.los=1: "),
+    ):
+        with pytest.raises(BadInput, match=f"^{told}"):
+            plan(scenario, **asked)

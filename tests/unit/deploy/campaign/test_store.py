@@ -1,0 +1,120 @@
+"""What a sweep writes, statistics read: a campaign's folder by its writer, seen through its reader."""
+
+from types import SimpleNamespace
+
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.campaign.columns import Columns
+from swarmwire.deploy.campaign.store import CampaignFolder as Written
+from swarmwire.deploy.campaign.store import StorageFailed
+from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.campaign.spec import Campaign, CopiedFile, Response, write_campaign
+
+CAMPAIGN = Campaign(
+    name="loss",
+    scenario="flock",
+    command="swarmwire sweep flock.toml",
+    began_utc="20240501T120000Z",
+    versions={"python": "3.11"},
+    cpu="made-up CPU",
+    modules={"swarmwire.world": "0" * 64},
+    files=(CopiedFile("scenario.toml", "0" * 64, "scenario"),),
+    design="list",
+    seeds=(4, 2),
+    vary={"radio.loss": [0, 0.5], "physics.engine": ["discs", "pymunk"]},
+    points=({"radio.loss": 0, "physics.engine": "discs"}, {"radio.loss": 0.5, "physics.engine": "pymunk"}),
+    overrides=("duration_s=20",),
+    point_overrides=((), ()),
+    duration_s=20,
+    robots=3,
+    responses=(Response("order.final", "", "number", "order"), Response("found_s", "s", "time", "first find")),
+    series=True,
+    record_seeds=(),
+    batch=None,
+)
+
+
+def row(run, **of):
+    ends = {"ended": "duration", "ticks": 200, "sim_time_s": 20.0}
+    return {"run": run, "point": run // 2, "seed": CAMPAIGN.seeds[run % 2], **ends, **of}
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Two tasks of a campaign: a run that found nothing, one that failed, one that faulted; the last is missing."""
+    write_campaign(CAMPAIGN, tmp_path)
+    folder = Written(tmp_path, CAMPAIGN)
+    found = row(1, **{"order.final": 0.9, "found_s": 7.5})
+    folder.keep(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
+    folder.keep(TaskResult((row(2, ended="failed", error="the agent failed"),)))
+    return folder
+
+
+def test_an_unfinished_campaign_is_read_back(written):
+    read = CampaignFolder(written.path)
+    assert (read.about.name, read.about.seeds, read.about.design) == ("loss", (4, 2), "list")
+    assert read.points == CAMPAIGN.points
+    assert read.parameters == ("radio.loss", "physics.engine")
+    assert (read.finished, read.missing) == (False, (3,))
+    assert read.sample("order", 0).value.tolist() == [0.5, 0.9]
+    times = read.sample("found_s", 0)
+    assert (times.value.tolist(), times.observed.tolist()) == ([20.0, 7.5], [False, True])
+    assert read.sample("found_s", 1).failed == 1
+
+
+def test_a_finished_campaign_is_read_back(written):
+    written.keep(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
+    written.finish(files=1)
+    read = CampaignFolder(written.path)
+    assert read.finished
+    assert read.runs["run"].to_list() == [0, 1, 2, 3]
+    undefined = read.sample("order.final", 1)
+    assert (len(undefined), undefined.undefined, undefined.failed) == (0, 1, 1)
+
+
+def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
+    assert CampaignFolder(written.path).sample("order", 1).failed == 1
+    written.keep(TaskResult((row(2, **{"order.final": 0.7}),)))
+    again = CampaignFolder(written.path).sample("order", 1)
+    assert (again.value.tolist(), again.failed) == ([0.7], 0)
+
+
+@pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
+def test_a_resumed_campaign_names_a_damaged_table_also_where_polars_panics(written, monkeypatch, damage):
+    read, part = pl.read_parquet, written.path / "parts" / "part-00000001.parquet"
+
+    def damaged(file, **options):
+        if file == part:
+            raise damage
+        return read(file, **options)
+
+    monkeypatch.setattr(pl, "read_parquet", damaged)
+    for call in (written.rows, written.ended, written.clear, lambda: written.finish(1)):
+        with pytest.raises(BadInput) as refused:
+            call()
+        assert refused.value.where == str(part)
+        assert "--resume runs again" in refused.value.expected
+
+
+@pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
+def test_a_series_that_is_damaged_while_it_is_joined_is_one_line(written, monkeypatch, damage):
+    frame = pl.DataFrame({"run": [3], "tick": [0], "order": [0.5]})
+    (written.path / "series").mkdir()
+    frame.write_parquet(written.path / "series" / "part-00000003.parquet")
+
+    def damaged(*_, **__):
+        raise damage
+
+    monkeypatch.setattr(pl.LazyFrame, "sink_parquet", damaged)
+    with pytest.raises(StorageFailed, match="--resume") as failed:
+        written.finish(1)
+    assert "\n" not in str(failed.value)
+
+
+def test_of_a_run_with_several_rows_the_last_counts():
+    columns = Columns(SimpleNamespace(points=[{}], vary={}, responses=()))
+    rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
+    assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]

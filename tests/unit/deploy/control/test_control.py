@@ -1,0 +1,308 @@
+"""A run is found on this machine, and controlled from elsewhere: pauses, ticks and events, which are on record."""
+
+import json
+import os
+import tomllib
+
+import pytest
+from typer.testing import CliRunner
+
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.deploy import repeat, run
+from swarmwire.deploy.cli.app import app
+from swarmwire.deploy.cli.ctl_events import selection_of
+from swarmwire.deploy.live import remote_control
+from swarmwire.deploy.live.following import Live, read_live
+from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
+from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
+from tests.support.clocks import until
+from tests.support.deploy.runs import LOSSY, at_tick, going
+from tests.support.metrics.truths import static
+
+NOBODY = 2**22 + 1  # more than Linux gives out
+
+
+@pytest.fixture(autouse=True)
+def runtime(tmp_path, monkeypatch):
+    """A private folder for this test's runs."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path / "swarmwire"
+
+
+def announced(folder, run, pid=None):
+    """A run that is announced, as far as files go."""
+    folder.mkdir()
+    Live("unixsock-stream//nowhere", run, pid or os.getpid()).write(folder)
+    found = Announced(folder)
+    found.begin(static(2))
+    return found
+
+
+def test_a_run_is_found_for_as_long_as_it_goes_on(tmp_path, runtime):
+    assert found_runs() == []
+    run = announced(tmp_path / "a", "r1")
+    [found] = found_runs()
+    assert found == FoundRun("r1", "unixsock-stream//nowhere", os.getpid(), static(2).name, str(tmp_path / "a"))
+    assert find_run(None) == find_run("r1") == find_run("r") == found
+    assert find_run(str(tmp_path / "a")).run == "r1"
+    assert run.end(None) == {}
+    assert found_runs() == []
+    assert list(runtime.iterdir()) == []
+
+
+def test_a_run_that_was_killed_is_forgotten_and_what_is_no_run_is_removed(tmp_path, runtime):
+    folder = runs_folder()
+    killed = FoundRun("r1", "e", NOBODY, "s", "f")
+    (folder / "r1.json").write_text(json.dumps(vars(killed)))
+    (folder / "r2.json").write_text("[]")
+    (folder / ".aside-r3.json").write_text("")
+    assert found_runs() == []
+    assert [path.name for path in runtime.iterdir()] == [".aside-r3.json"]
+
+
+def test_which_run_is_meant_must_be_clear(tmp_path):
+    with pytest.raises(BadInput, match="none"):
+        find_run(None)
+    for name in ("aa1", "ab2"):
+        announced(tmp_path / name, name)
+    with pytest.raises(BadInput, match=r"several.* aa1 \(.*\), ab2 \("):
+        find_run(None)
+    with pytest.raises(BadInput, match="several.* aa1 .*ab2"):
+        find_run("a")
+    assert find_run("ab").run == "ab2"
+    with pytest.raises(BadInput, match="aa1, ab2"):
+        find_run("b")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BadInput, match="empty: expected the folder of a run"):
+        find_run(str(tmp_path / "empty"))
+
+
+def test_a_folder_that_others_may_write_to_is_not_believed(tmp_path, runtime):
+    assert runs_folder().stat().st_mode & 0o777 == 0o700
+    runtime.chmod(0o755)
+    with pytest.raises(BadInput, match="closed to others"):
+        runs_folder()
+    runtime.rmdir()
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    runtime.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(BadInput, match="that is the user's"):
+        runs_folder()
+
+
+def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, monkeypatch):
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert runs_folder() == tmp_path / f"swarmwire-{os.getuid()}"
+
+
+def test_a_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
+    assert remote_control._is_own(tmp_path) is False
+    with pytest.raises(BadInput, match=f"swarmwire-{os.getuid()}"):  # which is of another user here, too
+        runs_folder()
+
+
+SHORT = "duration_s=5"
+KILL = {"do": "kill", "robots": {"names": ["flock-1", "flock-2"]}}
+
+
+def lines(folder):
+    return [json.loads(line) for line in (folder / LIVE_EVENTS).read_text().splitlines()]
+
+
+def test_paused_means_that_the_tick_stands_still_and_steps_are_so_many_ticks(tmp_path):
+    with going(tmp_path / "run", SHORT) as (simulation, control):
+        assert control.pause()["done"] == "paused"
+        assert control.status()["state"] == "paused"
+        control.step(3)
+        assert at_tick(control, 3)["state"] == "paused"
+        control.step(2)
+        control.step()
+        at_tick(control, 6)
+        paused = {control.status()["tick"] for _ in range(20)}
+        assert paused == {6}
+        control.resume()
+        until(lambda: simulation.tick > 6)
+    assert simulation.result.ended == "duration"
+
+
+def test_pause_step_and_speed_do_not_change_the_run(tmp_path):
+    with going(tmp_path / "run", SHORT) as (simulation, control):
+        control.step(4)
+        at_tick(control, 4)
+        assert "100 times" in control.speed(100)["done"]
+        assert control.status()["speed"] == 100.0
+        control.resume()
+        until(control.status, lambda status: status["tick"] >= 10)
+        control.pause()
+        control.speed(None)
+    assert simulation.result.trajectory_sha256 == run(LOSSY, overrides=[SHORT]).trajectory_sha256
+    assert not (tmp_path / "run" / LIVE_EVENTS).exists()
+    assert simulation.result.live_events is None
+
+
+def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path):
+    with going(tmp_path / "run", SHORT) as (simulation, control):
+        control.step(3)
+        at_tick(control, 3)
+        number = control.event(KILL)
+        assert number == 0
+        assert [event["tick"] for event in control.status()["events"]] == [None]
+        assert not (tmp_path / "run" / LIVE_EVENTS).exists()
+        control.step(2)
+        status = at_tick(control, 5)
+        assert lines(tmp_path / "run") == [{"tick": 3, "number": 0, "event": KILL}]
+        assert status["alive"] == 18
+        expected = 'kill robots = { names = ["flock-1", "flock-2"] }'
+        assert status["events"] == [
+            {"number": 0, "tick": 3, "do": "kill", "text": expected, "over": False, "given": True}
+        ]
+        loss = control.event({"do": "ramp", "what": "radio.loss", "to": 1.0})
+        control.step()
+        assert at_tick(control, 6)["radio"]["loss"] == 1.0
+        control.end(loss)
+        control.end(number)
+        control.step()
+        status = at_tick(control, 7)
+        assert (status["alive"], status["radio"]["loss"]) == (20, 0.3)
+        assert all(event["over"] for event in status["events"])
+    assert lines(tmp_path / "run")[2:] == [{"tick": 6, "number": 1, "end": True}, {"tick": 6, "number": 0, "end": True}]
+    told = [(event.tick, event.do, event.ended, event.at_s) for event in simulation.result.events]
+    assert told == [(3, "kill", False, 0.3), (5, "ramp", False, 0.5), (6, "kill", True, 0.3), (6, "ramp", True, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("table", "line"),
+    [
+        ({"do": "burn"}, "do: "),
+        ({"do": "kill", "robots": {"names": ["x-1"]}}, "robots.names: "),
+        ({"do": "jammer", "at": [0, 0], "power_dbm": 3.0}, "do: expected a radio"),
+    ],
+)
+def test_what_is_refused_is_told_in_the_runs_own_line_and_the_run_goes_on(tmp_path, table, line):
+    with going(tmp_path / "run", SHORT) as (simulation, control):
+        with pytest.raises(Refused, match="^[^\n]*$") as caught:
+            control.event(table)
+        assert str(caught.value).startswith(line)
+        for ask in (lambda: control.end(0), lambda: control.step(0), lambda: control.speed(-1.0)):
+            with pytest.raises(Refused, match="expected"):
+                ask()
+        control._session.put(control._keys.control, b"no request")  # nobody takes it
+    assert simulation.result.ended == "duration"
+    assert simulation.result.live_events is None
+
+
+def test_in_real_time_there_is_no_speed_without_a_limit(tmp_path):
+    with going(tmp_path / "run", "duration_s=1", realtime=5) as (simulation, control):
+        assert control.status()["real_time"]
+        with pytest.raises(Refused, match="wall clock"):
+            control.speed(None)
+        assert "50 times" in control.speed(50)["done"]
+    assert simulation.result.realtime is not None
+
+
+def test_a_run_is_stopped_with_its_summary(tmp_path):
+    with going(tmp_path / "run", "duration_s=1000") as (simulation, control):
+        control.step(2)
+        at_tick(control, 2)
+        control.stop()
+    assert (simulation.result.ended, simulation.result.ticks) == ("interrupted", 2)
+
+
+SIGNALS = ["radio={preset='ieee802154', measures={range={}, bearing={}}}", SHORT]
+
+
+def test_a_jammer_put_up_and_taken_down_is_repeated(tmp_path):
+    with going(tmp_path / "run", *SIGNALS) as (simulation, control):
+        control.step(3)
+        at_tick(control, 3)
+        jammer = control.event({"do": "jammer", "at": [0.0, 0.0], "power_dbm": 10.0})
+        control.step(10)
+        at_tick(control, 13)
+        control.end(jammer)
+    radio = simulation.result.radio
+    assert radio is not None
+    assert radio.fates["jammed"] > 0
+    assert repeat(tmp_path / "run").same
+
+
+def test_a_published_run_says_where_it_is(tmp_path):
+    with going(tmp_path / "run", SHORT) as (simulation, _):
+        live = read_live(tmp_path / "run")
+    assert isinstance(live, Live)
+    assert live.run == simulation.run_id
+
+
+def ctl(*arguments: object) -> str:
+    """What a command prints, in this process; an error of ours is raised as it is."""
+    result = CliRunner().invoke(app, ["ctl", *map(str, arguments)], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place"),
+    [
+        (["kill", "flok"], "robots.group"),
+        (["kill", "flock-99"], "robots.names"),
+        (["kill", "3", "4"], "ROBOTS"),
+        (["kill", "3x"], "ROBOTS"),
+        (["jam", "--at", "-1,0"], "do"),
+        (["jam", "--at", "here"], "--at"),
+        (["set", "loss"], "KEY=VALUE"),
+        (["set", "loss=2"], "to"),
+        (["set", "los=0.2"], "what"),
+        (["speed", "fast"], "FACTOR"),
+        (["event", "kill"], "event"),
+        (["event", "3"], "event"),
+        (["event", '{ do = "kil" }'], "do"),
+        (["end", "7"], "event"),
+        (["partition"], "between, region, halves"),
+        (["--run", "nowhere", "pause"], "nowhere"),
+        (["--ca", "ca.pem", "pause"], "--endpoint"),
+        (["--endpoint", "tcp/192.0.2.1:7447", "pause"], "beyond this machine"),
+    ],
+)
+def test_faults_are_told_in_one_line(going_run, arguments, place):
+    with pytest.raises(SwarmwireError, match="^[^\n]*$") as caught:
+        ctl(*arguments)
+    assert place in str(caught.value)
+
+
+@pytest.fixture
+def going_run(tmp_path):
+    """A run of this process that is announced as those of the command line are."""
+    with going(tmp_path / "run", "duration_s=1", observers=[Announced(tmp_path / "run")]) as found:
+        until(lambda: list((tmp_path / "swarmwire").glob("*.json")))
+        yield found
+
+
+def test_a_word_that_is_no_command_is_refused_with_the_one_that_was_meant():
+    for arguments in (["pasue"], ["pasue", "3"]):
+        result = CliRunner().invoke(app, ["ctl", *arguments])
+        assert result.exit_code == 2
+        assert "Did you mean 'pause'?" in result.output
+
+
+def test_an_event_is_any_table_of_a_scenario(going_run):
+    table = '{ do = "fail", part = "motors", robots = { count = 3 }, for_s = 10 }'
+    assert "event 0: fail" in ctl("event", table)
+    simulation, control = going_run
+    [event] = control.status()["events"]
+    assert event["text"] == 'fail part = "motors", robots = { count = 3 }, for_s = 10.0'
+    assert tomllib.loads(f"event = {table}")["event"] == dict(simulation.live_events._waiting[0][1])
+
+
+@pytest.mark.parametrize(
+    "command", ["status", "pause", "step", "speed", "kill", "impulse", "partition", "jam", "set", "event"]
+)
+def test_the_help_of_each_command_has_an_example(command):
+    assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl --run 3f2a", "swarmwire ctl")
+
+
+def test_robots_are_named_drawn_or_all():
+    assert selection_of(["flock-1,flock-2"]) == {"names": ["flock-1", "flock-2"]}
+    assert selection_of(["flock"]) == {"group": "flock"}
+    assert selection_of(["4"]) == {"count": 4}
+    assert selection_of(["flock", "12.5%"]) == {"group": "flock", "share": 0.125}

@@ -1,0 +1,262 @@
+"""The fleet file, packages of robots, and how work on robots is shown."""
+
+import io
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+from rich.console import Console
+
+from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.deploy.cli.robots import act
+from swarmwire.deploy.fleet.fleet import Fleet, FleetTable, Host, RobotTable, hosts_of, read_fleet
+from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.release import (
+    Entry,
+    name_of,
+    operator_network,
+    release_entries,
+    robot_settings,
+    write_archive,
+)
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, result_lines, shown_on
+from tests.support.deploy.runs import ROOT
+
+EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
+LEAST: dict[str, Any] = {
+    "format": 1, "swarm": "lab", "insecure": True,
+    "defaults": {"user": "pi", "agent": "still.py:Still", "driver": {"name": "epuck2", "address": "e"}},
+    "groups": {"red": {}, "blue": {}},
+    "robots": {"a": {"address": "10.0.0.1"}, "b": {"address": "10.0.0.2"}},
+}  # fmt: skip
+
+
+def read(tmp_path: Path, **changed: Any) -> Fleet:
+    """The fleet of the least file with some tables changed; None takes a key away."""
+    table = {key: value for key, value in {**LEAST, **changed}.items() if value is not None}
+    (tmp_path / "fleet.toml").write_text(tomli_w.dumps(table))
+    return read_fleet(tmp_path / "fleet.toml")
+
+
+def test_the_example_is_a_fleet():
+    fleet = read_fleet(EXAMPLE)
+    assert [robot.name for robot in fleet.robots] == ["flock-0", "flock-1", "flock-2", "flock-3"]
+    assert [len(robots) for robots in hosts_of(fleet.robots).values()] == [1, 1, 2]
+    assert fleet.robots[3].host == Host("lab", "192.168.1.20", 22, "", "")
+    assert fleet.robots[2].settings["params"] == {"near": 0.2, "speed_mps": 0.03}
+    assert fleet.robots[2].settings["driver"] == {"name": "epuck2", "address": "192.168.1.43"}
+
+
+def test_the_examples_agent_fits_its_robots(tmp_path):
+    from swarmwire.deploy.fleet.deploy import contents_of
+
+    text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
+    (tmp_path / "fleet.toml").write_text(text)
+    (tmp_path / "shy.py").write_bytes((EXAMPLE.parent / "shy.py").read_bytes())
+    fleet = read_fleet(tmp_path / "fleet.toml")
+    contents = contents_of(fleet, fleet.robots)
+    assert contents.faults == {}
+    assert {entry.name for entry in contents.entries["flock-0"]} == {"robot.toml", "shy.py"}
+
+
+def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path):
+    defaults = {**LEAST["defaults"], "rate_hz": 1, "watchdog_s": 3.0, "seed": 1, "params": {"x": 1, "y": 1, "z": 1}}
+    groups = {"red": {"rate_hz": 2, "params": {"y": 2, "z": 2}}, "blue": {"seed": 3, "params": {"z": 3}}}
+    robots = {"a": {"address": "h", "groups": ["red", "blue"], "seed": 4}}
+    (robot,) = read(tmp_path, defaults=defaults, groups=groups, robots=robots).robots
+    assert {key: robot.settings[key] for key in ("rate_hz", "watchdog_s", "seed", "params")} == {
+        "rate_hz": 2, "watchdog_s": 3.0, "seed": 4, "params": {"x": 1, "y": 2, "z": 3},
+    }  # fmt: skip
+    assert (robot.places["rate_hz"], robot.places["seed"]) == ("groups.red.rate_hz", "robots.a.seed")
+
+
+def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
+    robots = {
+        "a": {"address": "h"}, "b": {"address": "h"}, "c": {"address": "i"},
+        "d": {"address": "h", "network_port": 9000},
+    }  # fmt: skip
+    endpoints = [robot.endpoint for robot in read(tmp_path, robots=robots).robots]
+    assert endpoints == ["tcp/h:7557", "tcp/h:7558", "tcp/i:7557", "tcp/h:9000"]
+    robots["d"]["network_port"] = 7557
+    with pytest.raises(BadInput) as refused:
+        read(tmp_path, robots=robots)
+    assert refused.value.key == "robots.d.network_port"
+
+
+def test_every_two_robots_are_linked_by_one_of_them(tmp_path):
+    fleet = read(tmp_path, robots={name: {"address": name} for name in "abc"})
+    networks = [robot_settings(fleet, robot, [])["network"] for robot in fleet.robots]
+    assert [network.get("connect", []) for network in networks] == [[], ["tcp/a:7557"], ["tcp/a:7557", "tcp/b:7557"]]
+    assert all(network["listen"] == ["tcp/0.0.0.0:7557"] for network in networks)
+    assert operator_network(fleet, [], fleet.robots[1:]) == {"connect": ["tcp/b:7557", "tcp/c:7557"], "insecure": True}
+
+
+def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
+    fleet = read(tmp_path, insecure=None, certificates="certs", operator="boss")
+    assert fleet.certificates == tmp_path / "certs"
+    network = robot_settings(fleet, fleet.robots[0], ["b"])["network"]
+    assert network == {
+        "listen": ["tls/0.0.0.0:7557"], "ca": "ca.pem", "certificate": "a.pem", "key": "a.key",
+        "operator": "boss", "revoked": ["b"],
+    }  # fmt: skip
+    assert operator_network(fleet, [], [])["certificate"] == "boss.pem"
+
+
+def test_a_missing_certificate_is_told_with_what_issues_it_after_a_missing_ca_with_what_begins_it(tmp_path):
+    robots = {"a": {"address": "h", "agent": "swarmwire.agent.behaviours:Flocking"}}
+    fleet = read(tmp_path, insecure=None, certificates="certs", robots=robots)
+    certs = tmp_path / "certs"
+    issue = f"swarmwire certs issue {certs} --fleet {fleet.file}"
+    with pytest.raises(BadInput, match=rf"; swarmwire certs init {certs}, then {issue}$"):
+        release_entries(fleet, fleet.robots[0], [])
+    certs.mkdir()
+    (certs / "ca.pem").touch()
+    with pytest.raises(BadInput, match=rf"; {issue}$"):
+        release_entries(fleet, fleet.robots[0], [])
+
+
+def test_files_are_beside_the_robots_settings(tmp_path):
+    defaults = {**LEAST["defaults"], "agent": "agents/still.py:Still", "body": "sheets/mine.toml"}
+    fleet = read(tmp_path, defaults=defaults)
+    settings = robot_settings(fleet, fleet.robots[0], [])
+    assert (settings["agent"], settings["body"]) == ("still.py:Still", "mine.toml")
+    assert settings["robots"] == ["a", "b"]
+    assert tomllib.loads(tomli_w.dumps(settings)) == settings
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [
+        ({"swarm": None}, "swarm"),
+        ({"swarm": "a/*"}, "swarm"),
+        ({"robot": {}}, "robot"),
+        ({"robots": {}}, "robots"),
+        ({"robots": {"a b": {"address": "h"}}}, "robots.a b"),
+        ({"robots": {"env": {"address": "h"}}}, "robots.env"),
+        ({"robots": {"a": {}}}, "robots.a.address"),
+        ({"robots": {"a": {"adress": "h"}}}, "robots.a.adress"),
+        ({"robots": {"a": 3}}, "robots.a"),
+        ({"robots": {"a": {"address": 3}}}, "robots.a.address"),
+        ({"robots": {"a": {"address": ""}}}, "robots.a.address"),
+        ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port"),
+        ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port"),
+        ({"robots": {"a": {"address": "h", "groups": ["rad"]}}}, "robots.a.groups"),
+        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups.0"),
+        ({"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}}, "robots.b"),
+        ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address"),
+        ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups"),
+        ({"groups": {"red": {"rate_hz": 1.5}}}, "groups.red.rate_hz"),
+        ({"insecure": None}, "certificates"),
+        ({"certificates": "certs"}, "insecure"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_key(tmp_path, changed, key):
+    with pytest.raises(BadInput, match="^[^\n]*$") as refused:
+        read(tmp_path, **changed)
+    assert (refused.value.where, refused.value.key) == (str(tmp_path / "fleet.toml"), key)
+
+
+@pytest.mark.parametrize("text", ["a = ", None])
+def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
+    if text is not None:
+        (tmp_path / "fleet.toml").write_text(text)
+    with pytest.raises(BadInput) as refused:
+        read_fleet(tmp_path / "fleet.toml")
+    assert refused.value.where == str(tmp_path / "fleet.toml")
+
+
+def test_the_example_shows_every_key():
+    in_example = {line.lstrip("# ").split(" ")[0] for line in EXAMPLE.read_text().splitlines() if " = " in line}
+    assert {*RobotTable.model_fields, *FleetTable.model_fields} - in_example == {
+        "defaults",
+        "robots",
+        "groups",
+        "insecure",
+        "seed",
+    } - in_example
+
+
+PI = {
+    "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
+    "python": [3, 11, 2],
+}  # fmt: skip
+
+
+def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
+    assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "msgspec", "numpy"]
+    assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
+    assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
+    with pytest.raises(BadInput, match="^packages: not-there: "):
+        pins(["epuck2"], ["not-there"], (3, 11))
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="what older versions need is not installed here")
+def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
+    names = {python: {pin.name for pin in pins(["ros2"], [], python)} for python in ((3, 11), (3, 13), (3, 14))}
+    assert names[3, 11] - names[3, 13] == {"typing-extensions"}  # rosbags needs it below 3.12
+    assert names[3, 13] - names[3, 14] == {"backports-zstd"}  # and this below 3.14
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"machine": "armv7l", "bits": 32}, "got armv7l with 32 bits"),
+        ({"bits": 32}, "got aarch64 with 32 bits"),
+        ({"libc": ["", ""]}, "another C library"),
+        ({"implementation": "pypy"}, "got pypy"),
+    ],
+)
+def test_a_platform_without_wheels_is_refused(changed, expected):
+    with pytest.raises(HostFailed, match=expected):
+        Target.of({**PI, **changed})
+
+
+def test_an_archive_is_the_same_for_the_same_files(tmp_path):
+    entries = [Entry("b", b"2"), Entry("a", b"1", 0o600), Entry("c", link="../a")]
+    one, two = write_archive(entries, tmp_path / "1"), write_archive(entries[::-1], tmp_path / "2")
+    assert (one.name, one.sha256, one.size) == (two.name, two.sha256, two.size)
+    others = [[Entry("b", b"2")], [Entry("b", b"2", 0o755)], [Entry("b", b"3")], [Entry("c", b"2")]]
+    assert len({name_of(entries), *map(name_of, others)}) == 5
+
+
+def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatch):
+    fleet.add("flock-0")
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda name: None if name == "asyncssh" else name)
+    code, (line,) = robots("status")
+    assert (code, "swarmwire[fleet]" in line) == (2, True)
+
+
+def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
+    failed = Result.failed("b", HostFailed("two\n lines", "mend it"))
+    assert result_lines([Result("long-name", True, "done"), failed]) == [
+        "long-name  done",
+        "b          failed: two lines; mend it",
+    ]
+
+
+def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
+    screen = io.StringIO()
+    with shown_on(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
+        watcher.step("flock-0", "packages", 5_000_000, 10_000_000)
+        watcher.step("flock-1", "trial run")
+        watcher.end(Result("flock-0", True, "done"))
+        watcher.end(Result("flock-2", True, "never began"))
+    shown = screen.getvalue()
+    assert "flock-1" in shown
+    assert "trial run" in shown
+
+
+def test_elsewhere_nothing_is_drawn():
+    with shown_on(Console(file=io.StringIO())) as watcher:
+        assert watcher is SILENT
+
+
+def test_ctrl_c_ends_it_in_one_line():
+    async def interrupted(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted):
+        act(interrupted)

@@ -1,0 +1,214 @@
+"""A run folder belongs to one run; its recording and the record of live events say what the run says."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Barrier
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.packets import FATE_NAMES, Fate
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.config import Recording
+from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
+from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
+from swarmwire.world.live_events import LiveEvent
+from tests.integration.metrics.viewer.test_recording import class_names, column, series
+from tests.support.deploy.runs import LOSSY
+
+pytest.importorskip("rerun", reason="needs the extra [view]")
+
+DURATION_S, RATE_HZ = 8, 10
+
+
+class Seen(Observer):
+    """Observer that keeps every tick."""
+
+    def __init__(self):
+        self.ticks = []
+
+    def see(self, truth):
+        self.ticks.append(truth)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A run of a flock in which a fifth dies after 4 s: its recording, its result and its ticks."""
+    out, seen = tmp_path_factory.mktemp("runs") / "run", Seen()
+    event = 'events=[{at_s=4.0,do="kill",robots={group="flock",share=0.2}}]'
+    result = run(LOSSY, overrides=[f"duration_s={DURATION_S}", event], out=out, observers=[seen])
+    return out / "run.rrd", result, seen.ticks
+
+
+def test_positions_and_who_is_dead_are_the_runs(recorded):
+    rrd, _, ticks = recorded
+    positions = column(rrd, "/world/robots", "Points2D:positions")
+    assert list(positions) == list(range(DURATION_S * RATE_HZ))
+    for seen in ticks:
+        assert positions[seen.tick] == seen.pose[:, :2].astype(np.float32).tolist()
+    names, classes = class_names(rrd), column(rrd, "/world/robots", "Points2D:class_ids")
+    dead = {tick: sum(names[one][0] == "dead" for one in row) for tick, row in classes.items()}
+    assert dead == {0: 0, 40: 4}
+
+
+def test_fates_are_the_runs_own_tally(recorded):
+    rrd, result, ticks = recorded
+    drawn = series(rrd, "packets")
+    seconds = range(RATE_HZ - 1, len(ticks), RATE_HZ)  # each shows the second that ends with it
+    for name, values in drawn.items():
+        fate = FATE_NAMES.index(name.replace(" ", "_"))
+        assert sum(values.get(tick, 0.0) for tick in seconds) == sum(int(seen.tally.fates[0, fate]) for seen in ticks)
+    received = sum(drawn["received"][tick] for tick in seconds)
+    assert received == result.radio.fates["received"]
+    listed = {name for name, count in result.radio.fates.items() if count and name not in ("in_flight", "out_of_range")}
+    assert {name.replace(" ", "_") for name in drawn} == listed
+
+
+def test_lines_of_lost_packets_are_those_that_the_radio_finished(recorded):
+    rrd, _, ticks = recorded
+    lines = column(rrd, "/world/lost_packets", "LineStrips2D:strips")
+    for seen in ticks:
+        unheard = (seen.finished.fate != Fate.RECEIVED) & (seen.finished.receiver >= 0)
+        assert len(lines.get(seen.tick, [])) == unheard.sum()
+    assert any(lines.values())
+
+
+def test_metrics_end_where_the_summary_says(recorded):
+    rrd, result, ticks = recorded
+    drawn = {name: of for plot in ("shares", "distances", "numbers") for name, of in series(rrd, plot).items()}
+    for name in ("order", "components", "collisions", "min_gap", "largest_component"):
+        assert drawn[name][len(ticks) - 1] == pytest.approx(result.metrics[name].final)
+    order = list(drawn["order"].values())
+    assert np.mean(order) == pytest.approx(result.metrics["order"].mean)
+
+
+def test_events_name_the_robots_of_the_summary(recorded):
+    rrd, result, _ = recorded
+    [event] = result.events
+    told = column(rrd, "/events", "TextLog:text")
+    assert told[event.tick] == [f"kill: {', '.join(event.robots[0])}"]
+
+
+RUNS = 4
+
+
+def take(folder: Path) -> None:
+    RunFolder(folder, WallClock()).failed_to_start(RuntimeError, RuntimeError("no agents"), None)
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_of_runs_that_find_a_folder_empty_at_once_one_gets_it(tmp_path, monkeypatch, exists):
+    folder, all_have_looked, looks = tmp_path / "run", Barrier(RUNS), Path.iterdir
+    if exists:
+        folder.mkdir()
+
+    def look(path):
+        found = list(looks(path))
+        all_have_looked.wait(20)
+        return iter(found)
+
+    monkeypatch.setattr(Path, "iterdir", look)
+    with ThreadPoolExecutor(RUNS) as runs:
+        refusals = [run.exception() for run in [runs.submit(take, folder) for _ in range(RUNS)]]
+    refused = [refusal for refusal in refusals if refusal is not None]
+    assert len(refused) == RUNS - 1
+    assert {type(refusal) for refusal in refused} == {BadInput}
+    assert all(str(refusal).startswith(f"--out: {folder}: ") for refusal in refused)
+
+
+KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}
+DONE = (LiveEvent(3, 0, KILL), LiveEvent(9, 0, None))
+
+
+@pytest.fixture
+def log(tmp_path) -> LiveEventsLog:
+    log = LiveEventsLog(tmp_path)
+    for one in DONE:
+        log.keep(one)
+    return log
+
+
+def test_what_was_kept_is_read_with_the_same_hash(tmp_path, log):
+    record = log.record()
+    assert record is not None
+    assert (record.path, record.lines) == (LIVE_EVENTS, 2)
+    assert read_live_events(tmp_path) == (DONE, record.sha256)
+
+
+def test_a_run_to_which_nothing_was_done_has_no_record(tmp_path):
+    assert LiveEventsLog(tmp_path).record() is None
+    assert read_live_events(tmp_path) == ((), None)
+
+
+def test_a_line_that_was_cut_off_is_passed_over(tmp_path, log):
+    record, path = log.record(), tmp_path / LIVE_EVENTS
+    assert record is not None
+    path.write_bytes(path.read_bytes() + b'{"tick": 12, "num')
+    assert read_live_events(tmp_path) == (DONE, record.sha256)
+    path.write_bytes(b'{"tick"')
+    assert read_live_events(tmp_path) == ((), None)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "no json",
+        "[]",
+        "3",
+        "{}",
+        json.dumps({"tick": 1, "number": 2}),
+        json.dumps({"tick": "1", "number": 2, "end": True}),
+        json.dumps({"tick": 1, "number": 2, "event": "kill"}),
+        json.dumps({"tick": 1, "number": 2, "end": False}),
+    ],
+)
+def test_a_line_that_is_none_of_ours_is_named(tmp_path, log, line):
+    path = tmp_path / LIVE_EVENTS
+    path.write_text(path.read_text() + line + "\n")
+    with pytest.raises(BadInput, match="line 3: ") as caught:
+        read_live_events(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_after_a_line_that_could_not_be_written_there_is_no_other(tmp_path):
+    log = LiveEventsLog(tmp_path / "nowhere")
+    for _ in range(2):
+        with pytest.raises(OSError):
+            log.keep(DONE[0])
+    (tmp_path / "nowhere").mkdir()
+    with pytest.raises(OSError, match="before"):
+        log.keep(DONE[0])
+    assert log.record() is None
+
+
+def test_an_event_that_cannot_be_recorded_does_not_happen_and_people_are_told(tmp_path, capsys):
+    (tmp_path / "run").mkdir()
+    record = Recording(rrd=False, tables=False)
+    with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
+        (tmp_path / "run" / LIVE_EVENTS).mkdir()
+        simulation.apply_event(KILL)
+        simulation.run()
+        (tmp_path / "run" / LIVE_EVENTS).rmdir()
+    assert simulation.result.events == ()
+    assert "event 0 does not happen" in capsys.readouterr().err
+    assert repeat(tmp_path / "run").same
+
+
+def test_a_run_whose_record_is_gone_cannot_be_repeated_and_a_wrong_event_is_named(tmp_path):
+    record = Recording(rrd=False, tables=False)
+    with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
+        simulation.apply_event(KILL)
+        simulation.run()
+    path = tmp_path / "run" / LIVE_EVENTS
+    path.write_text(path.read_text().replace("flock-1", "nobody"))
+    with pytest.raises(BadInput, match="event 0 .*robots.names: "):
+        repeat(tmp_path / "run")
+    path.unlink()
+    with pytest.raises(BadInput, match=LIVE_EVENTS):
+        repeat(tmp_path / "run")

@@ -1,0 +1,180 @@
+"""The options of gateways: each form is read, and what cannot be is refused in one line by its option and key."""
+
+import socket
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.network import Network
+from swarmwire.deploy import Gateways, Simulation
+from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.gateways.gateways import as_gateways, gateways_of_options, network_of
+from tests.support.world.gateways import ScriptedGateway
+
+
+def read(*texts: str, options: tuple[str, ...] = ()) -> Gateways:
+    found = gateways_of_options(texts, options, None, None)
+    assert found is not None
+    return found
+
+
+def refused(call: Any) -> BadInput:
+    with pytest.raises(BadInput) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+def test_a_gateway_is_for_all_groups_or_for_some_and_may_have_an_address() -> None:
+    assert read("epuck2").of == {"": "epuck2"}
+    assert read("a=epuck2@127.0.0.1:1000", "ros2").of == {"a": "epuck2@127.0.0.1:1000", "": "ros2"}
+    assert read("ros2@tcp/10.0.0.1:7447?x=1").of == {"": "ros2@tcp/10.0.0.1:7447?x=1"}
+
+
+def test_options_are_read_as_toml_and_else_as_texts() -> None:
+    read_options = read("ros2", options=("rate=5", "kind=bridge", "a.lists=[1, 2]")).options
+    assert read_options == {"rate": 5, "kind": "bridge", "a.lists": [1, 2]}
+
+
+@pytest.mark.parametrize("text", ["", "=epuck2", "a=", "epuck2@", "@here"])
+def test_other_forms_are_refused(text: str) -> None:
+    assert refused(lambda: read(text)).where == "--gateway"
+
+
+def test_a_group_has_one_gateway() -> None:
+    for first, second in (("a=epuck2", "a=ros2"), ("epuck2", "ros2")):
+        error = refused(lambda pair=(first, second): read(*pair))
+        assert (error.where, error.key) == ("--gateway", second)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "flag"),
+    [(([], ["rate=5"], None, None), "--gateway-set"), (([], [], "lab", None), "--swarm")],
+)
+def test_what_needs_a_gateway_is_refused_without_one(arguments: Any, flag: str) -> None:
+    assert refused(lambda: gateways_of_options(*arguments)).where == flag
+
+
+def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not_safe() -> None:
+    assert network_of(None, None, None, None, insecure=False) is None
+    error = refused(lambda: network_of("tcp/0.0.0.0:7447", None, None, None, insecure=False))
+    assert error.where == "--network"
+    assert "--insecure" in error.expected
+    half = refused(lambda: network_of("tls/0.0.0.0:7447", None, Path("none.pem"), None, insecure=False))
+    assert half.where == "--ca"
+    open_to_all = network_of("tcp/0.0.0.0:7447", None, None, None, insecure=True)
+    assert open_to_all is not None
+    assert open_to_all.warning
+
+
+def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_the_authority(tmp_path) -> None:
+    folder, clock = tmp_path / "ca", WallClock()
+    begin_authority(folder, clock)
+    issue(folder, [certificate_request("tracker"), certificate_request("flock-1")], 1, clock)
+    proof = (folder / "ca.pem", folder / "tracker.pem", folder / "tracker.key")
+    revoke(folder, "flock-1", clock)
+    for named, expected in (((), ("flock-1",)), (("flock-0",), ("flock-0", "flock-1"))):
+        network = network_of("tls/127.0.0.1:0", *proof, named, insecure=False)
+        assert network is not None
+        whole = as_gateways(Gateways({"": "epuck2"}, network=network))
+        assert whole is not None
+        assert whole.network == replace(network, revoked=expected)
+    (folder / "certs.json").unlink()
+    given = Gateways({"": "epuck2"}, network=network)
+    assert as_gateways(given) is given
+    assert refused(lambda: network_of(None, None, None, None, ["flock-0"], insecure=False)).where == "--revoked"
+
+
+def test_python_takes_one_text_a_table_or_all_of_it() -> None:
+    whole = Gateways({"a": "ros2"})
+    assert as_gateways("epuck2") == Gateways({"": "epuck2"})
+    assert as_gateways({"a": "ros2"}) == whole
+    assert as_gateways(whole) is whole
+    assert as_gateways(None) is None
+
+
+def test_the_senses_that_a_gateway_tells_are_computed_whatever_the_agent_needs(two_groups, scripted) -> None:
+    simulation = Simulation(two_groups, gateways={"own": "scripted"})
+    assert set(simulation.world.sensors["own"]) == {"proximity", "odometry", "imu"}
+    assert set(simulation.world.sensors["other"]) == {"proximity", "compass"}
+
+
+def test_options_reach_the_gateways_that_have_them_and_a_groups_own_count_more(two_groups, scripted) -> None:
+    gateways = Gateways({"": "scripted"}, {"other.first": 7, "first": 3})
+    with Simulation(two_groups, gateways=gateways, realtime=100) as simulation:
+        assert simulation.served is not None
+        assert [robot.address for robot in simulation.served.robots] == [f"scripted:{at}" for at in (3, 4, 7, 8, 9)]
+        assert all(gateway.is_open for gateway in scripted)
+    assert not any(gateway.is_open for gateway in scripted)
+
+
+@pytest.mark.parametrize(
+    ("gateways", "words"),
+    [
+        ({"othr": "scripted"}, "other (did you mean this?)"),
+        ("scriptd", "scripted (did you mean this?)"),
+        (Gateways({"": "scripted"}, {"fist": 1}), "first (did you mean this?)"),
+        (Gateways({"": "scripted"}, {"first": 0}), "at least 1"),
+        (Gateways({"own": "scripted"}, {"other.first": 1}), "group that has a gateway"),
+        (Gateways({"": "scripted"}, swarm=""), "--swarm: "),
+        (Gateways({"": "scripted"}, swarm="lab/*"), "--swarm: "),
+    ],
+)
+def test_groups_kinds_and_options_that_are_not_there_are_refused(two_groups, scripted, gateways, words) -> None:
+    assert words in str(refused(lambda: Simulation(two_groups, gateways=gateways)))
+
+
+def test_several_arenas_and_runners_are_refused(two_groups, scripted) -> None:
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", seeds=[1, 2])).where == "--seeds"
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", runners=2)).where == "--runners"
+
+
+def test_the_agent_of_a_group_behind_a_gateway_must_be_one_that_could_run_here(two_groups, scripted) -> None:
+    broken = ["robots.own.agent='swarmwire.agent.behaviours:Nothing'"]
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", overrides=broken)).key == "robots.own.agent"
+
+
+def test_a_folder_is_left_by_none_that_is_refused(two_groups, scripted, tmp_path) -> None:
+    refused(lambda: Simulation(two_groups, gateways="scriptd", out=tmp_path / "run"))
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_is_left_by_none_whose_address_is_taken(two_groups, scripted, tmp_path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        network = Network(listen=(f"tcp/127.0.0.1:{taken.getsockname()[1]}",))
+        simulation = Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network), out=tmp_path / "run")
+        assert "free" in refused(simulation.__enter__).expected
+    assert not (tmp_path / "run").exists()
+    assert not any(gateway.is_open for gateway in scripted)
+
+
+def made(gateways: list[ScriptedGateway]) -> list[tuple[str, ...]]:
+    return [gateway.names for gateway in gateways]
+
+
+def test_a_gateway_knows_its_robots_by_the_names_of_the_run(two_groups, scripted) -> None:
+    with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100):
+        assert made(scripted) == [("other-0", "other-1", "other-2")]
+
+
+def test_a_network_without_certificates_is_warned_of_each_time(two_groups, scripted, capsys) -> None:
+    network = Network(listen=("tcp/0.0.0.0:0",))
+    assert refused(lambda: Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network)))
+    gateways = Gateways({"": "scripted"}, network=replace(network, insecure=True))
+    with Simulation(two_groups, gateways=gateways, realtime=100):
+        assert "insecure" in capsys.readouterr().err
+
+
+def test_a_sheet_within_the_scenario_is_refused_where_robots_read_theirs(two_groups: Path, scripted: Any) -> None:
+    changed = ["robots.other.body_overrides.sensors.proximity.drop_out=0.5"]
+
+    def begun() -> None:
+        with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100, overrides=changed):
+            pass
+
+    assert refused(begun).key == "robots.other.body_overrides"

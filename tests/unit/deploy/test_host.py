@@ -1,0 +1,157 @@
+"""The process and its machine: kernels and their compiler, sockets of killed runs, and what the machine refuses."""
+
+import atexit
+import errno
+import os
+import socket
+import tempfile
+from contextlib import ExitStack, closing
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba import njit
+from rich.console import Console
+
+from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.wire.sessions import PRIVATE
+from swarmwire.deploy import host
+from swarmwire.deploy.cli import app as cli
+from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, compiling_told, keep_kernels, refusal
+from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
+from tests.support.deploy.runs import called
+
+
+@pytest.fixture
+def at_exit(monkeypatch):
+    """What is to be done when the process ends; the place of kernels is as before after the test."""
+    registered = []
+    monkeypatch.setenv(KERNEL_CACHE, "x")
+    monkeypatch.delenv(KERNEL_CACHE)
+    monkeypatch.setattr(atexit, "register", lambda act, *given, **_: registered.append((act, given)))
+    yield registered
+    for act, given in registered:
+        act(*given)
+
+
+def test_where_nothing_can_be_written_they_are_kept_for_this_process(monkeypatch, tmp_path, at_exit):
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(file))  # no folder can be made in it
+    keep_kernels()
+    place = Path(os.environ[KERNEL_CACHE])
+    assert place.is_dir()
+    keep_kernels()  # as does a process that this one starts
+    assert os.environ[KERNEL_CACHE] == str(place)
+    assert len(at_exit) == 1
+    assert at_exit[0][1] == (str(place),)
+
+
+def test_a_cache_of_the_user_or_beside_the_code_will_do(monkeypatch, tmp_path, at_exit):
+    keep_kernels()
+    monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    keep_kernels()
+    assert KERNEL_CACHE not in os.environ
+    assert (tmp_path / "cache" / "numba").is_dir()
+
+
+def add(a, b):
+    return a + b
+
+
+def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
+    out = StringIO()
+    console = Console(file=out, width=200)
+    one, other = njit(add), njit(add)
+    with compiling_told(console, after_s=0.001):
+        one(1, 2)
+        one(1.0, 2.0)
+    assert out.getvalue() == f"{COMPILING}\n"
+    with compiling_told(console, after_s=0.001):
+        one(3, 4)
+    assert out.getvalue() == f"{COMPILING}\n"
+    other(1, 2)  # afterwards
+    assert out.getvalue() == f"{COMPILING}\n"
+
+
+def test_what_is_compiled_in_a_moment_is_not_told():
+    out = StringIO()
+    with compiling_told(Console(file=out), after_s=1000.0):
+        njit(add)(1, 2)
+    assert out.getvalue() == ""
+
+
+@pytest.fixture
+def base(monkeypatch):
+    """The folder of temporary files, whose path is short enough for a socket's."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+        monkeypatch.setattr(tempfile, "tempdir", folder)
+        yield Path(folder)
+
+
+def test_sockets_of_killed_runs_go_with_the_next_run_and_no_others(base):
+    long_ago_ns = WallClock().utc_ns() - to_ns(STALE_S + 1.0)
+    with ExitStack() as stack:
+        for name, listens, is_old in (("old", False, True), ("alive", True, True), ("new", False, False)):
+            folder = base / f"{PRIVATE}{name}"
+            folder.mkdir()
+            own = stack.enter_context(closing(socket.socket(socket.AF_UNIX)))
+            own.bind(str(folder / SOCKET))
+            if listens:
+                own.listen()
+            if is_old:
+                os.utime(folder / SOCKET, ns=(long_ago_ns, long_ago_ns))
+        (base / f"{PRIVATE}empty").mkdir()  # its run has not come so far
+        with local_endpoint(None) as endpoint:
+            here = {path.name.removeprefix(PRIVATE) for path in base.iterdir()}
+            assert {"alive", "new", "empty"} < here
+            assert "old" not in here
+            assert endpoint.endswith(f"/{SOCKET}")
+
+
+def test_a_world_that_is_frozen_keeps_its_socket(base):
+    folder = base / f"{PRIVATE}frozen"
+    folder.mkdir()
+    with closing(socket.socket(socket.AF_UNIX)) as own, ExitStack() as stack:
+        own.bind(str(folder / SOCKET))
+        own.listen(1)
+        os.utime(folder / SOCKET, ns=(0, 0))
+        for _ in range(5):  # as many as may wait, and more
+            caller = stack.enter_context(closing(socket.socket(socket.AF_UNIX)))
+            caller.setblocking(False)
+            caller.connect_ex(str(folder / SOCKET))
+        with local_endpoint(None):
+            assert folder.exists()
+
+
+def test_each_says_what_and_where_and_what_to_do():
+    files = str(refusal(OSError(errno.EMFILE, "Too many open files", "/x")))
+    assert files.startswith("/x: Too many open files")
+    assert "ulimit -n" in files
+    assert "temporarily unavailable" in str(refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")))
+    assert "raise the limit" in str(refusal(RuntimeError("can't start new thread")))
+    assert "fewer robots" in str(refusal(MemoryError()))
+    with pytest.raises(MemoryError) as told:
+        np.empty(2**56)
+    assert "Unable to allocate" in str(refusal(told.value))
+    assert (
+        refusal(RuntimeError("wrong")) is refusal(FileNotFoundError(errno.ENOENT, "x")) is refusal(KeyError()) is None
+    )
+
+
+def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(monkeypatch, capsys):
+    def raises(error):
+        def app(_):
+            raise error
+
+        monkeypatch.setattr(cli, "app", app)
+        return called(monkeypatch, capsys, "run")
+
+    code, out, errors = raises(OSError(errno.EMFILE, "Too many open files"))
+    assert (code, out, errors.count("\n")) == (1, "", 1)
+    assert errors.startswith("error: Too many open files")
+    with pytest.raises(RuntimeError, match="a mistake"):
+        raises(RuntimeError("a mistake"))

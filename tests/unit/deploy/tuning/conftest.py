@@ -1,5 +1,0 @@
-"""Fixtures of these tests."""
-
-from tests.support.deploy.tuning.fixtures import calculated, here, scenario
-
-__all__ = ["calculated", "here", "scenario"]

@@ -1,0 +1,130 @@
+"""What --search says, and what a goal makes of the runs of a trial: also of times that were not reached."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
+from swarmwire.metrics.campaign.spec import Response
+
+
+def search(text, whole=False):
+    return search_from(search_of(text), lambda _: whole)
+
+
+def test_a_range_holds_numbers_whole_ones_where_the_scenarios_are():
+    assert search("radio.loss=0:0.8") == Search("radio.loss", 0.0, 0.8)
+    assert search("a.b=1:100:log") == Search("a.b", 1.0, 100.0, log=True)
+    assert search("a=2:9.6", whole=True) == Search("a", 2.0, 10.0, whole=True)
+    assert search("a=2:9", whole=True).trials == (2, 9)
+    assert search("a=0.02:0.2").override(0.1) == "a=0.1"
+
+
+def test_choices_are_toml_values_known_by_their_texts():
+    found = search("a=[4.0, 4.0],[8.0, 8.0]")
+    assert found.names == ("[4.0, 4.0]", "[8.0, 8.0]")
+    assert found.value("[8.0, 8.0]") == [8.0, 8.0]
+    assert search("a=discs,pymunk").value("pymunk") == "pymunk"
+    assert search("a=0.5,2,true").choices == (0.5, 2, True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["radio.loss", "=1", "a=", "a=0:1:5", "a=0:1:5:log", "a=0:", "a=1:1", "a=2:1", "a=0:1:log", "a=1,1", "a='1',1"],
+)
+def test_what_is_none_of_it_is_refused_by_its_name(text):
+    with pytest.raises(BadInput) as refused:
+        search(text)
+    assert refused.value.where == f"--search {text}"
+    assert "\n" not in str(refused.value)
+    assert "COUNT" not in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["a=1.1:1.2", "a=0.2:3:log"])
+def test_a_range_without_whole_numbers_is_refused_where_these_are_wanted(text):
+    with pytest.raises(BadInput, match=f"^--search {text}: expected LOW"):
+        search(text, whole=True)
+
+
+def test_fresh_seeds_are_none_of_those_used():
+    assert fresh_seeds("3", (1, 2, 5)) == (6, 7, 8)
+    assert fresh_seeds("10:12", (1, 2, 5)) == (10, 11)
+    assert fresh_seeds("3,4", (1, 2, 5)) == (3, 4)
+    for text, used in (("5:9", (1, 2, 5)), ("0", (1, 2, 5)), ("x", (1, 2, 5)), ("2", (2**63 - 1,))):
+        with pytest.raises(BadInput) as refused:
+            fresh_seeds(text, used)
+        assert refused.value.where == "--check-seeds"
+
+
+ORDER = Response("order.final", "", "number", "")
+TIME = Response("aggregation_time_s", "s", "time", "")
+LIMIT_S = 60.0
+
+
+def reached(goal, values, end_s=LIMIT_S):
+    found = goal_of(goal, (ORDER, TIME), LIMIT_S)
+    rows = [{"seed": seed, "sim_time_s": end_s, found.response.column: value} for seed, value in enumerate(values)]
+    return found.reached(sample_of(rows, found.response))
+
+
+@pytest.mark.parametrize(
+    ("goal", "value"),
+    [("max order", 3.0), ("max order.final.q25", 2.0), ("min order.final.q75", 4.0), ("max order.final.mean", 4.0)],
+)
+def test_of_numbers_it_is_the_statistic(goal, value):
+    assert reached(goal, [1.0, 2.0, 3.0, 4.0, 10.0]) == (value, value, 0.0, 0)
+
+
+def test_of_times_it_is_kaplan_and_meiers_and_their_mean_is_up_to_the_limit():
+    times = [10.0, 20.0, 30.0, 40.0, None]
+    assert reached("min aggregation_time_s", times).value == 30.0
+    assert reached("min aggregation_time_s.q25", times).value == 20.0
+    assert reached("min aggregation_time_s.mean", times).value == pytest.approx((10 + 20 + 30 + 40 + 60) / 5)
+    assert reached("min aggregation_time_s.censored", times).value == pytest.approx(0.2)
+
+
+def test_a_quantile_that_was_not_reached_lies_beyond_the_limit_the_more_the_more_runs_did_not():
+    values = []
+    for missing in range(6):
+        found = reached("min aggregation_time_s.q50", [59.0] * (5 - missing) + [None] * missing)
+        assert math.isnan(found.statistic) == (missing >= 3)
+        assert found.censored == pytest.approx(missing / 5)
+        values.append(found.value)
+    assert values == pytest.approx([59.0, 59.0, 59.0, 96.0, 108.0, 120.0])
+
+
+def test_runs_that_ended_early_are_no_better_than_those_that_did_not():
+    early = reached("min aggregation_time_s", [None, None, None], end_s=5.0)
+    assert early.value == 120.0
+    assert reached("min aggregation_time_s.mean", [None, None, None], end_s=5.0).value == LIMIT_S
+
+
+def test_what_is_undefined_is_counted_and_nothing_has_no_value():
+    assert reached("max order", [1.0, None, 3.0]) == (2.0, 2.0, 0.0, 1)
+    assert np.isnan(reached("max order", [None, math.nan]).value)
+
+
+def test_which_way_is_better():
+    least, most = (goal_of(f"{way} order", (ORDER,), LIMIT_S) for way in ("min", "max"))
+    assert least.better(1.0, 2.0)
+    assert most.better(2.0, 1.0)
+    assert not least.better(1.0, 1.0)
+    assert (least.text, most.text) == ("min order.final.q50", "max order.final.q50")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("order", "RESPONSE.STAT"),
+        ("least order", "RESPONSE.STAT"),
+        ("min", "RESPONSE.STAT"),
+        ("min ordr.final", "order.final"),
+        ("min order.final.censored", "a time"),
+    ],
+)
+def test_another_goal_is_refused(text, expected):
+    with pytest.raises(BadInput, match=expected) as refused:
+        goal_of(text, (ORDER, TIME), LIMIT_S)
+    assert refused.value.where == "--goal"

@@ -1,0 +1,373 @@
+"""Campaigns are read back from their folders, and compared."""
+
+import csv
+import json
+import math
+from typing import get_args
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
+from swarmwire.metrics.campaign.folder import CampaignFolder, at, select
+from swarmwire.metrics.campaign.spec import Stat, same_value, value_from
+from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
+
+
+def rewritten(folder, **changes):
+    path = folder / "campaign.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    return folder
+
+
+def test_a_finished_campaign_has_every_run_in_order(tmp_path):
+    campaign = CampaignFolder(write_campaign(tmp_path / "a", seeds=(7, 3, 5)))
+    assert campaign.finished
+    assert campaign.missing == ()
+    assert campaign.parameters == ("radio.loss",)
+    assert [point["radio.loss"] for point in campaign.points] == [0.0, 0.2, 0.4]
+    assert campaign.runs["run"].to_list() == list(range(9))
+    assert campaign.sample("order", 1).seed.tolist() == [7, 3, 5]
+
+
+def test_the_values_of_a_parameter_may_be_tables(tmp_path):
+    params = [{"gain": 1.0, "blocked": True}, {"gain": 2.0, "blocked": False}]
+    folder = write_campaign(tmp_path / "a", {"robots.flock.params": params})
+    assert [point["robots.flock.params"] for point in CampaignFolder(folder).points] == params
+    assert select(f"{folder}@robots.flock.params={{gain = 2.0, blocked = false}}").points == (1,)
+
+
+def test_parts_give_the_same_rows_as_the_whole(tmp_path):
+    whole = CampaignFolder(write_campaign(tmp_path / "whole"))
+    parts = CampaignFolder(write_campaign(tmp_path / "parts", parts=3))
+    assert parts.runs.equals(whole.runs)
+    assert parts.finished
+
+
+def test_runs_without_a_row_are_missing_and_no_sample_has_them(tmp_path):
+    campaign = CampaignFolder(write_campaign(tmp_path / "a", missing=(0, 12), parts=2))
+    assert campaign.missing == (0, 12)
+    assert not campaign.finished
+    assert [len(campaign.sample("order.final", point)) for point in range(3)] == [9, 9, 10]
+
+
+def test_before_any_run_has_ended_every_sample_is_empty(tmp_path):
+    campaign = CampaignFolder(write_campaign(tmp_path / "a", missing=range(30), parts=0))
+    (tmp_path / "a" / "summary.parquet").unlink()
+    assert len(campaign.missing) == 30
+    assert len(campaign.sample("order", 0)) == 0
+    assert np.isnan(campaign.sample("aggregation_time_s", 0).censored)
+
+
+def test_rows_of_a_campaign_that_was_taken_up_again_replace_those_of_before(tmp_path):
+    folder = write_campaign(tmp_path / "a", failed=(4,))
+    again = pl.read_parquet(write_campaign(tmp_path / "b") / "summary.parquet").filter(pl.col("run") == 4)
+    (folder / "parts").mkdir()
+    again.write_parquet(folder / "parts" / "part-000000.parquet")
+    assert CampaignFolder(folder).sample("order", 0).failed == 0
+
+
+def test_a_file_that_is_being_written_is_not_read(tmp_path):
+    folder = write_campaign(tmp_path / "a", parts=1)
+    (folder / "parts" / ".aside-part-000001.parquet").write_text("half of a file")
+    assert CampaignFolder(folder).finished
+
+
+def test_failed_runs_are_counted_and_have_no_value(tmp_path):
+    sample = CampaignFolder(write_campaign(tmp_path / "a", failed=(1, 2))).sample("aggregation_time_s", 0)
+    assert (len(sample), sample.failed, sample.seed.tolist()) == (8, 2, [1, *range(4, 11)])
+
+
+def test_a_time_that_never_came_is_censored_where_its_run_ended(tmp_path):
+    times = {"never_s": lambda *_: None, "soon_s": lambda *_: 3.0}
+    campaign = CampaignFolder(write_campaign(tmp_path / "a", times=times, limit_s=40.0))
+    never, soon = campaign.sample("never_s", 0), campaign.sample("soon_s", 0)
+    assert never.value.tolist() == [40.0] * 10
+    assert (never.censored, soon.censored) == (1.0, 0.0)
+    assert soon.observed.all()
+
+
+def test_a_number_that_was_not_to_be_measured_is_undefined(tmp_path):
+    numbers = {"gap_m.final": lambda _, rng: None if rng.random() < 0.5 else 1.0}
+    sample = CampaignFolder(write_campaign(tmp_path / "a", numbers=numbers)).sample("gap_m", 0)
+    assert 0 < sample.undefined < 10
+    assert len(sample) + sample.undefined == 10
+    assert sample.censored == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "means"),
+    [
+        ("order", "order.final.q50"),
+        ("order.final", "order.final.q50"),
+        ("order.mean", "order.mean.q50"),  # a column of this name is meant
+        ("order.mean.mean", "order.mean.mean"),
+        ("order.q25", "order.final.q25"),
+        ("aggregation_time_s", "aggregation_time_s.q50"),
+        ("aggregation_time_s.censored", "aggregation_time_s.censored"),
+    ],
+)
+def test_statistics_go_by_column_and_stat(tmp_path, name, means):
+    assert CampaignFolder(write_campaign(tmp_path / "a")).statistic(name).name == means
+
+
+@pytest.mark.parametrize("stat", get_args(Stat))
+def test_a_time_has_every_statistic(tmp_path, stat):
+    found = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
+    assert (found.response.kind, found.stat) == ("time", stat)
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("ordre.final", "order.final (did you"), ("order.q51", ""), ("order.censored", "time"), ("", ""), (".q50", "")],
+)
+def test_a_statistic_that_there_is_not_is_refused(tmp_path, name, hint):
+    campaign = CampaignFolder(write_campaign(tmp_path / "a"))
+    with pytest.raises(BadInput, check=lambda error: error.key == name and hint in error.expected):
+        campaign.statistic(name)
+
+
+@pytest.mark.parametrize("point", [-1, 3])
+def test_a_point_that_there_is_not_is_refused(tmp_path, point):
+    with pytest.raises(BadInput, check=lambda error: error.key == "point"):
+        CampaignFolder(write_campaign(tmp_path / "a")).sample("order", point)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"seeds": [1, 1]}, "seeds"),
+        ({"seeds": [True]}, "seeds[0]"),
+        ({"seeds": []}, "seeds"),
+        ({"points": []}, "points"),
+        ({"points": [{"radio.loss": 0.1}, {}]}, "points[1]"),
+        ({"points": [3]}, "points[0]"),
+        ({"design": "gird"}, "design"),
+        ({"duration_s": "1"}, "duration_s"),
+        ({"duration_s": True}, "duration_s"),
+        ({"responses": [{"column": "x", "unit": "", "kind": "level", "help": ""}]}, "responses[0].kind"),
+        ({"responses": [{"column": "x"}]}, "responses[0].unit"),
+        ({"files": [3]}, "files[0]"),
+        ({"files": [{"what": "a"}]}, "files[0].path"),
+        ({"overrides": [3]}, "overrides[0]"),
+        ({"modules": []}, "modules"),
+        ({"name": None}, "name"),
+    ],
+)
+def test_a_damaged_or_foreign_campaign_is_refused_with_its_key(tmp_path, changes, key):
+    folder = rewritten(write_campaign(tmp_path / "a"), **changes)
+    with pytest.raises(BadInput) as refused:
+        CampaignFolder(folder)
+    assert (refused.value.where, refused.value.key) == (str(folder / "campaign.json"), key)
+
+
+def test_what_is_no_campaign_is_refused(tmp_path):
+    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nothing")):
+        CampaignFolder(tmp_path / "nothing")
+    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (str(tmp_path), "campaign.json")):
+        CampaignFolder(tmp_path)
+    for text in ("[]", "{"):
+        (tmp_path / "campaign.json").write_text(text)
+        with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "campaign.json")):
+            CampaignFolder(tmp_path)
+
+
+def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
+    folder = write_campaign(tmp_path / "a")
+    (folder / "summary.parquet").write_text("no table")
+    with pytest.raises(BadInput, check=lambda error: error.where == str(folder / "summary.parquet")):
+        _ = CampaignFolder(folder).runs
+    pl.DataFrame({"run": [0]}).write_parquet(folder / "summary.parquet")
+    with pytest.raises(BadInput, check=lambda error: error.key == "point"):
+        _ = CampaignFolder(folder).runs
+
+
+def test_a_time_that_must_hold_is_watched_for_so_much_less_than_the_run(tmp_path):
+    folder = write_campaign(tmp_path / "a")
+    responses = json.loads((folder / "campaign.json").read_text())["responses"]
+    held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in responses]
+    before = CampaignFolder(folder).sample("aggregation_time_s", 2)
+    after = CampaignFolder(rewritten(folder, responses=held)).sample("aggregation_time_s", 2)
+    assert not before.observed.all()
+    np.testing.assert_array_equal(after.value, before.value - np.where(before.observed, 0.0, 5.0))
+
+
+TWO = {"radio.loss": [0.0, 0.1], "physics.engine": ["discs", "pymunk"]}
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return write_campaign(tmp_path / "plain")
+
+
+@pytest.fixture
+def better(tmp_path):
+    """The same, with 0.1 more order, other draws, and one more loss."""
+    numbers = NUMBERS | {"order.final": lambda point, rng: order(point, rng) + 0.1}
+    return write_campaign(tmp_path / "better", {"radio.loss": [0.1 + 0.3, 0.2, 0.6]}, numbers=numbers, draws=1)
+
+
+def compared(first, second, *responses, where=()):
+    return compare(*at([select(str(first)), select(str(second))], where), responses)
+
+
+def test_points_that_both_have_meet_whatever_their_order(plain, better):
+    found = compared(plain, better, "order")
+    assert [(row.first_point["radio.loss"], row.second_point["radio.loss"]) for row in found.rows] == [
+        (0.2, 0.2),
+        (0.4, 0.4),
+    ]
+    assert found.paths == ("radio.loss",)
+    for row in found.rows:
+        assert row.difference.pairs == 10
+        assert row.difference.median == pytest.approx(0.1, abs=0.06)
+        assert row.difference.delta > 0.5
+        assert row.second.q50 > row.first.q50
+
+
+def test_times_and_last_values_are_compared_unless_others_are_named(plain, better):
+    columns = [row.response.column for row in compared(plain, better, where=["radio.loss=0.2"]).rows]
+    assert columns == ["order.final", "radio.link_pdr", "aggregation_time_s"]
+    assert [row.response.column for row in compared(plain, better, "counts.late_answers").rows] == [
+        "counts.late_answers"
+    ] * 2
+
+
+def test_what_neither_has_a_value_of_is_left_out_unless_named(tmp_path, plain):
+    folders = [
+        write_campaign(tmp_path / name, numbers=NUMBERS | {"gap_m.final": lambda *_: None}, seeds=(1, 2))
+        for name in "ab"
+    ]
+    assert "gap_m.final" not in {row.response.column for row in compared(*folders).rows}
+    (row, *_) = compared(*folders, "gap_m").rows
+    assert (row.first.n, row.first.undefined) == (0, 2)
+    none = write_campaign(tmp_path / "none", missing=range(30))
+    with pytest.raises(BadInput, check=lambda error: error.where == f"{none}, {none}"):
+        compared(none, none)
+
+
+def test_two_parts_of_one_campaign_meet_where_they_were_chosen(plain):
+    found = compared(f"{plain}@radio.loss=0", f"{plain}@radio.loss=0.4", "order.final")
+    assert found.paths == ()
+    (row,) = found.rows
+    assert (row.first_point["radio.loss"], row.second_point["radio.loss"]) == (0.0, 0.4)
+    assert row.difference.median < -0.15
+    assert cells(found, row)[1] == "A: radio.loss=0; B: radio.loss=0.4"
+
+
+def test_what_only_one_varies_is_told_beside_it(tmp_path, plain):
+    both = write_campaign(tmp_path / "both", TWO)
+    found = compared(both, f"{plain}@radio.loss=0", "order")
+    assert cells(found, found.rows[0])[1] == "A: radio.loss=0, physics.engine=discs; B: radio.loss=0"
+    found = compared(both, plain, "order")
+    assert [cells(found, row)[1] for row in found.rows] == [
+        "radio.loss=0; A: physics.engine=discs",
+        "radio.loss=0; A: physics.engine=pymunk",
+    ]
+    assert len(compared(both, plain, "order", where=["physics.engine=discs"]).rows) == 1
+
+
+def test_campaigns_that_vary_nothing_have_one_point(tmp_path):
+    folders = [write_campaign(tmp_path / name, {}, points=[{}]) for name in "ab"]
+    found = compared(*folders, "order")
+    assert [cells(found, row)[1] for row in found.rows] == ["all"]
+
+
+def test_the_table_says_how_many_failed_are_missing_and_what_it_shows(tmp_path, plain):
+    part = write_campaign(tmp_path / "part", failed=(0, 1), missing=(25,), parts=1)
+    found = compared(plain, part)
+    told = "\n".join(notes(found))
+    assert all(text in told for text in (f"A: {plain} (30 ", f"B: {part} (", "29 of 30", "2 failed", "95 %"))
+    assert [len(cells(found, row)) for row in found.rows] == [len(COLUMNS)] * 9
+    assert cells(found, found.rows[0])[-1] == "8"
+
+
+def test_samples_without_a_seed_in_common_are_said_to_be(tmp_path, plain):
+    other = write_campaign(tmp_path / "other", seeds=range(50, 60))
+    found = compared(plain, other, "aggregation_time_s", "order", where=["radio.loss=0"])
+    assert [cells(found, row)[-1] for row in found.rows] == ["none (10, 10)"] * 2
+    assert [row.difference.test for row in found.rows] == ["log-rank", "Mann-Whitney"]
+
+
+def test_the_table_for_programs_has_the_numbers_of_the_rows(tmp_path, plain, better):
+    never = write_campaign(tmp_path / "never", times={"aggregation_time_s": lambda *_: None})
+    found = compared(never, better)
+    write_comparison(found, tmp_path / "x.csv")
+    rows = list(csv.DictReader((tmp_path / "x.csv").read_text().splitlines()))
+    assert len(rows) == len(found.rows)
+    assert rows[0]["response"] == "order.final"
+    assert float(rows[0]["median_difference"]) == found.rows[0].difference.median
+    assert rows[0]["a.radio.loss"] == rows[0]["b.radio.loss"] == "0.2"
+    last = rows[-1]
+    assert (last["kind"], last["a_censored"], last["a_q50"], last["a_limit"]) == ("time", "1.0", "", "100.0")
+    assert last["median_difference_low"] == "-inf"
+    assert math.isnan(found.rows[-1].first.q50)
+
+
+@pytest.mark.parametrize("name", ["x.txt", "nowhere/x.csv"])
+def test_a_path_that_takes_no_table_is_refused(tmp_path, plain, name):
+    with pytest.raises(BadInput):
+        write_comparison(compared(plain, plain), tmp_path / name)
+
+
+def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
+    folder = write_campaign(tmp_path / "a@b=c")
+    assert len(select(str(folder)).points) == 3
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "where", "key", "hint"),
+    [
+        ("plain", "other", [], "", "vary"),
+        ("plain", "far", [], "", "points"),
+        ("plain", "strange", [], "", "responses"),
+        ("plain", "nothing", [], "", "none"),
+        ("plain@radio.los=0", "plain", [], "radio.los", "radio.loss (did you mean this?)"),
+        ("plain@radio.loss=0.3", "plain", [], "radio.loss", "0, 0.2, 0.4"),
+        ("plain@radio.loss", "plain", [], "radio.loss", "="),
+        ("plain", "plain", ["radio.los=0"], "radio.los", "--at: "),
+        ("plain", "plain", ["radio.loss=9"], "radio.loss", "0, 0.2, 0.4"),
+        ("plain", "plain", ["radio.loss="], "radio.loss=", "="),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_with_its_key(tmp_path, plain, first, second, where, key, hint):
+    write_campaign(tmp_path / "other", {"physics.engine": ["discs", "pymunk"]})
+    write_campaign(tmp_path / "far", {"radio.loss": [0.9]})
+    write_campaign(tmp_path / "strange", numbers={"gap_m.final": lambda *_: 1.0}, times={})
+    with pytest.raises(BadInput) as refused:
+        compared(tmp_path / first, tmp_path / second, where=where)
+    assert refused.value.key == key
+    assert hint in str(refused.value)
+
+
+def test_responses_of_another_kind_are_not_the_same(tmp_path, plain):
+    other = write_campaign(tmp_path / "other", numbers=NUMBERS | TIMES, times={})
+    with pytest.raises(BadInput, match="aggregation_time_s"):
+        compared(plain, other, "aggregation_time_s")
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (0.1 + 0.2, 0.3, True),
+        (1, 1.0, True),
+        (1, True, False),
+        (True, True, True),
+        ("a", "a", True),
+        ("1", 1, False),
+        (None, None, True),
+        ([1, 2], [1, 2], True),
+    ],
+)
+def test_values_are_the_same_but_for_rounding(one, other, same):
+    assert same_value(one, other) is same
+    assert same_value(other, one) is same
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("[1, 2]", [1, 2]), ('"a b"', "a b"), ("a b", "a b"), ("1\nb = 2", "1\nb = 2")]
+)
+def test_values_are_written_as_in_a_scenario_or_as_they_are(text, value):
+    assert value_from(text) == value

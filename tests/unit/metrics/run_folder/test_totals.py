@@ -1,0 +1,264 @@
+"""The tables that are totals: written as the run ends, read back, and compared with sums by hand and by brute force."""
+
+import json
+import math
+import re
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given, settings
+
+from swarmwire.comms.errors import BadInput, RecordFailed
+from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder import distances
+from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
+from swarmwire.metrics.run_folder.radio_totals import RobotCounts
+from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.run_folder.table import State, TotalsRecorder
+from swarmwire.metrics.run_folder.verify import verify
+from tests.support.metrics.radio import DISK, radio_runs, rows_of, ticks
+from tests.support.metrics.recorded import links, made_up_summary, record
+from tests.support.metrics.truths import departed, static, truth, watch
+
+TOTALS = ("radio_robots", "radio_distances", "radio_links")
+OF = static(5, arenas=2)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A run folder as far as the radio goes, with its summary."""
+    seen = list(ticks(DISK, OF, 7, count=20))
+    recorded, tally = record(tmp_path, OF, seen, links=True), RadioTally()
+    watch(OF, seen, tally)
+    summary = made_up_summary(20, arenas=2, record=recorded, **tally.end(None))
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    return RunFolder(tmp_path)
+
+
+def states(folder):
+    return {finding.part: finding.state for finding in verify(folder.path) if finding.part in TOTALS}
+
+
+def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder):
+    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
+    for arena, radio in enumerate(folder.summary["radio"]):
+        robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
+        assert robots["robot"].to_list() == list(OF.robot_names)
+        for name in ("received", "blocked", "lost"):
+            assert robots[f"as_sender_{name}"].sum() == robots[f"as_receiver_{name}"].sum() == radio["fates"][name]
+            assert reached.filter(pl.col("fate") == name)["packets"].sum() == radio["fates"][name]
+        assert robots["as_sender_out_of_range"].sum() == radio["fates"]["out_of_range"]
+        as_sender = robots.select(pl.sum_horizontal(f"as_sender_{fate.name.lower()}" for fate in Fate)).to_series()
+        assert as_sender.to_list() == robots["intended"].to_list()
+        assert folder.radio_distances(arena)["received"].sum() == radio["fates"]["received"]
+        np.testing.assert_allclose(robots["throughput_bps"], robots["received_bytes"] * 8 / 2.0)
+        np.testing.assert_allclose(robots["airtime"], robots["airtime_s"] / 2.0)
+    assert (len(folder.radio_robots()), folder.radio_robots()["packets_on_air"].min() > 0) == (10, True)
+
+
+@pytest.mark.parametrize(
+    ("table", "columns"),
+    [
+        ("radio_robots", ["as_sender_lost", "as_receiver_lost"]),
+        ("radio_links", ["packets"]),
+        ("radio_distances", ["received", "intended"]),
+    ],
+)
+def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
+    file = folder.path / f"{table}.parquet"
+    pl.read_parquet(file).with_columns(pl.col(columns) * 2).write_parquet(file)
+    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: State.DIFFERS}
+    file.unlink()
+    assert states(folder)[table] == State.MISSING
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "state", "text"),
+    [
+        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr .*received / intended"),
+        ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr .*String.*Float64"),
+        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m .*null"),
+        ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\)"),
+        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_received"), State.DIFFERS, "0 received"),
+        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets .*10 rows"),
+        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender .*4"),
+        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena .*1"),
+    ],
+)
+def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
+    file = folder.path / f"{table}.parquet"
+    pl.read_parquet(file).with_columns(change).write_parquet(file)
+    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: state}
+    (found,) = (finding for finding in verify(folder.path) if finding.part == table)
+    assert re.match(text, found.text)
+
+
+def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
+    (folder.path / "static.json").unlink()
+    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
+    file = folder.path / "radio_links.parquet"
+    pl.read_parquet(file).with_columns(pl.col("packets").cast(pl.Float64)).write_parquet(file)
+    assert states(folder)["radio_links"] == State.DAMAGED
+
+
+def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):
+    table = folder.radio_distances(1)
+    assert table["from_m"][0] == 0.0
+    np.testing.assert_allclose(table["from_m"][1:], table["to_m"][:-1])
+    some = table.filter(pl.col("intended") > 0)
+    np.testing.assert_allclose(some["pdr"], some["received"] / some["intended"])
+    assert table.filter(pl.col("intended") == 0)["pdr"].null_count() == len(table) - len(some) > 0
+
+
+def test_where_distances_were_forgotten_there_is_no_ratio(tmp_path, monkeypatch):
+    monkeypatch.setattr(distances, "POSES_KEPT_S", 0.1)
+    of = static(2)
+    nothing = links([], [], 0, 0)
+    seen = [truth(of, tick, departed=departed([0] if tick == 1 else []), finished=nothing) for tick in range(4)]
+    seen.append(truth(of, 4, departed=departed([]), finished=links([0], [1], 0, 0)))
+    told = record(tmp_path, of, seen)
+    assert told["radio_distances"] == {"rows": 1, "dropped": 0, "every": 1, "unknown": 1}
+    assert RunFolder(tmp_path).radio_distances().rows() == [(0, 0.0, 0.1, 1, 0, None)]
+
+
+def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tmp_path):
+    of = static(2)
+    quiet = truth(of, departed=departed([]), finished=links([], [], 0, 0))
+    (tmp_path / "radio").mkdir()
+    (tmp_path / "none").mkdir()
+    assert record(tmp_path / "radio", of, [quiet]).keys() == {"ticks", "events", "radio_robots", "radio_distances"}
+    assert record(tmp_path / "none", of, [truth(of)], links=True).keys() == {"ticks", "events"}
+    for table, missing in (("radio_links", "radio"), ("radio_robots", "none")):
+        with pytest.raises(BadInput, check=lambda error, table=table: error.key == table):
+            getattr(RunFolder(tmp_path / missing), table)()
+    assert len(RunFolder(tmp_path / "radio").radio_distances()) == 0
+
+
+@pytest.mark.parametrize("kind", [RobotCounts, DistanceCounts])
+def test_a_disk_that_refuses_is_told_of(tmp_path, kind):
+    of, recorder = static(2), TotalsRecorder(tmp_path / "gone", "radio_robots", kind)
+    recorder.begin(of)
+    recorder.see(truth(of, departed=departed([0]), finished=links([], [], 0, 0)))
+    with pytest.raises(RecordFailed, match="radio_"):
+        recorder.end(None)
+
+
+TICK_NS = 100_000_000
+
+
+def line(*x_m):
+    pose = np.zeros((len(x_m), 3))
+    pose[:, 0] = x_m
+    return pose
+
+
+def seen_by(of, *ticks):
+    counts = DistanceCounts(of)
+    for tick, fields in enumerate(ticks):
+        counts.see(truth(of, tick, **fields))
+    return counts
+
+
+def bins(table, arena=0):
+    return {place: int(table[arena, place]) for place in np.flatnonzero(table[arena])}
+
+
+@pytest.mark.parametrize(("range_m", "width_m"), [(2.0, 0.1), (3.9, 0.1), (4.0, 0.2), (100.0, 5.0), (0.05, 0.002)])
+def test_bins_have_a_round_width_and_at_least_twenty_lie_within_range(range_m, width_m):
+    assert bin_width_m(range_m) == pytest.approx(width_m)
+
+
+@pytest.mark.parametrize("range_m", [5e-324, 1e-300, 1e-7, 0.2, 2.0, None, 1e300])
+def test_however_short_the_range_the_bins_reach_across_the_arena_and_are_few(range_m):
+    counts = DistanceCounts(replace(static(2), range_m=range_m))
+    across_m = math.hypot(8.0, 6.0)
+    assert across_m < counts.intended.shape[1] * counts.width_m < 1.2 * across_m
+    assert 20 <= counts.intended.shape[1] <= 2002
+
+
+def test_everybody_alive_is_meant_by_a_broadcast_however_far_away_and_only_one_by_an_addressed_packet():
+    of = static(4)
+    pose = line(0.0, 0.55, 1.55, 3.95)
+    alive = np.array([True, True, True, False])
+    ended = links([0], [1], 0, TICK_NS - 1)
+    told = {"departed": departed([0], intended=2, out_of_range=1), "finished": ended}
+    counts = seen_by(of, {"pose": pose, "alive": alive}, {"pose": line(9.0, 9.0, 9.0, 9.0), **told})
+    assert counts.width_m == pytest.approx(0.1)
+    assert (bins(counts.intended), bins(counts.received)) == ({5: 1, 15: 1}, {5: 1})
+    addressed = {"departed": departed([0], intended=1, to=2), "finished": links([], [], 0, 0)}
+    assert bins(seen_by(of, {"pose": pose, **addressed}).intended) == {15: 1}
+
+
+def test_a_packet_that_never_went_on_air_tells_nothing_of_distance():
+    refused = departed([0], fate=Fate.QUEUE_FULL)
+    told = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}
+    assert not seen_by(static(4), told).intended.any()
+
+
+def test_who_received_so_late_that_the_distance_is_forgotten_is_counted_apart(monkeypatch):
+    monkeypatch.setattr(distances, "POSES_KEPT_S", 0.2)
+    nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
+    late = {**nothing, "finished": links([0], [1], 0, 0)}
+    assert [seen_by(static(2), *[nothing] * ticks, late).unknown for ticks in (2, 3)] == [0, 1]
+
+
+@pytest.mark.parametrize("pairs_per_tick", [10**6, 10, 3])
+@settings(max_examples=15)
+@given(run=radio_runs())
+def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
+    of, seen = run
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distances, "PAIRS_PER_TICK", pairs_per_tick)
+        counts = DistanceCounts(of)
+    spread = int(distances.SPREAD_SEQUENCE), int(distances.SPREAD_SENDER)
+    intended, received = Counter(), Counter()
+
+    def place(arena, a, b, on_air_at_ns):
+        tick = max(one.tick for one in seen if one.time_ns <= on_air_at_ns)
+        pose = seen[tick].pose.reshape(of.arenas, of.robots, 3)[arena]
+        return arena, int(math.dist(pose[a, :2], pose[b, :2]) / counts.width_m)
+
+    def taken(sender, sequence):
+        return (sequence * spread[0] + sender * spread[1]) % 2**64 * counts.every < 2**64
+
+    for one in seen:
+        counts.see(one)
+        for arena, sender, to, sequence, fate, on_air in rows_of(
+            one.departed, "arena", "sender", "to", "sequence", "fate", "on_air_at_ns"
+        ):
+            tick = max(one.tick for one in seen if one.time_ns <= on_air)
+            alive = seen[tick].alive.reshape(of.arenas, of.robots)[arena]
+            for robot in range(of.robots):
+                meant = alive[robot] if to == BROADCAST else robot == to
+                if meant and robot != sender and fate == Fate.RECEIVED and taken(sender, sequence):
+                    intended[place(arena, sender, robot, on_air)] += 1
+        for arena, sender, receiver, sequence, fate, on_air in rows_of(
+            one.finished, "arena", "sender", "receiver", "sequence", "fate", "on_air_at_ns"
+        ):
+            if fate == Fate.RECEIVED and taken(sender, sequence):
+                received[place(arena, sender, receiver, on_air)] += 1
+    last = counts.intended.shape[1] - 1  # beyond the arena's corners, where these robots may walk
+    for table, expected in ((counts.intended, intended), (counts.received, received)):
+        within = Counter()
+        for (arena, b), packets in expected.items():
+            within[arena, min(b, last)] += packets
+        assert {(a, b): int(table[a, b]) for a, b in zip(*np.nonzero(table), strict=True)} == dict(within)
+    assert counts.unknown == 0
+
+
+def test_of_many_robots_about_as_many_packets_are_counted_as_said_whatever_their_turn():
+    of = static(1000)
+    counts = DistanceCounts(of)
+    assert counts.every == 256
+    sender, sequence = (one.ravel() for one in np.meshgrid(np.arange(1000), np.arange(600)))
+    taken = counts._taken(sender, sequence)
+    assert taken.mean() == pytest.approx(1 / 256, rel=0.02)
+    for period in (2, 3, 4, 16):
+        turns = np.bincount(sequence[taken] % period)
+        assert turns.min() > 0.9 * turns.max()
+    in_tick = np.bincount(sequence[taken], minlength=600)
+    assert (in_tick.min() >= 1, in_tick.max() <= 9) == (True, True)

@@ -1,0 +1,306 @@
+"""Tables are written in parts and joined at the end; files are there whole or not at all; damaged ones are named."""
+
+import errno
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.errors import BadInput, RecordFailed
+from swarmwire.metrics.atomic import output_file
+from swarmwire.metrics.run_folder import writer
+from swarmwire.metrics.run_folder.layout import RunLog
+from swarmwire.metrics.run_folder.writer import (
+    PARQUET,
+    WAITING_CHUNKS,
+    Chunk,
+    ChunkLimit,
+    TableWriter,
+    join_parts,
+    parts_of,
+    write_file,
+)
+from swarmwire.metrics.table_file import read_parquet, refuse_corrupt
+from tests.support.clocks import StillClock
+from tests.support.metrics.recorded import damaged
+
+SCHEMA = {"number": pl.Int64, "name": pl.String}
+
+
+def chunk(first, rows=10):
+    frame = pl.DataFrame({"number": range(first, first + rows), "name": [f"n{first}"] * rows}, schema=SCHEMA)
+    return Chunk(rows, lambda: frame)
+
+
+def put_many(writer, parts):
+    for part in range(parts):
+        writer.put(chunk(10 * part))
+
+
+@pytest.mark.parametrize("parts", [0, 1, 2, 7])
+def test_the_parts_become_one_table_in_order_and_are_gone(tmp_path, parts):
+    writer = TableWriter(tmp_path, "rows", SCHEMA)
+    put_many(writer, parts)
+    writer.close()
+    table = pl.read_parquet(tmp_path / "rows.parquet")
+    assert table.schema == pl.Schema(SCHEMA)
+    assert table["number"].to_list() == list(range(10 * parts))
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.parquet"]
+    assert (writer.rows, writer.dropped) == (10 * parts, 0)
+
+
+def test_where_parts_ended_does_not_show_in_the_table(tmp_path):
+    pyarrow_parquet = pytest.importorskip("pyarrow.parquet", reason="comes with the extra [view]")
+    writer = TableWriter(tmp_path, "rows", SCHEMA)
+    put_many(writer, 5)
+    writer.close()
+    assert pyarrow_parquet.ParquetFile(tmp_path / "rows.parquet").metadata.num_row_groups == 1
+
+
+def test_until_the_end_there_are_numbered_parts_and_nothing_half_written(tmp_path):
+    writer = TableWriter(tmp_path, "rows", SCHEMA)
+    put_many(writer, 3)
+    written = Event()
+    writer.put(Chunk(0, lambda: written.set() or pl.DataFrame(schema=SCHEMA)))
+    assert written.wait(30)
+    assert sorted(path.name for path in (tmp_path / "rows").iterdir()) == [f"part-00000{i}.parquet" for i in range(3)]
+    assert pl.read_parquet(parts_of(tmp_path, "rows"))["number"].to_list() == list(range(30))
+    writer.close()
+
+
+def held(release):
+    """A chunk that keeps the thread busy until the test lets it go."""
+    begun = Event()
+
+    def frame():
+        begun.set()
+        assert release.wait(30)
+        return chunk(0).frame()
+
+    return begun, Chunk(10, frame)
+
+
+def test_with_a_full_queue_chunks_are_dropped_and_their_rows_counted(tmp_path):
+    release, writer = Event(), TableWriter(tmp_path, "rows", SCHEMA, may_drop=True)
+    begun, busy = held(release)
+    writer.put(busy)
+    assert begun.wait(30)
+    for part in range(1, 1 + WAITING_CHUNKS + 3):
+        writer.put(chunk(10 * part))
+    assert writer.dropped == 30
+    release.set()
+    writer.close()
+    assert writer.rows == 10 * (1 + WAITING_CHUNKS)
+    assert pl.read_parquet(tmp_path / "rows.parquet")["number"].to_list() == list(range(writer.rows))
+
+
+def test_in_lockstep_a_full_queue_holds_the_loop_back_and_nothing_is_dropped(tmp_path):
+    release, writer = Event(), TableWriter(tmp_path, "rows", SCHEMA)
+    begun, busy = held(release)
+    writer.put(busy)
+    assert begun.wait(30)
+    for part in range(1, 1 + WAITING_CHUNKS):
+        writer.put(chunk(10 * part))
+    original, was_full = writer._queue.put, []
+
+    def put(item):  # would wait for ever in a queue that is full, if nobody let the thread go on
+        was_full.append(writer._queue.full())
+        release.set()
+        original(item)
+
+    writer._queue.put = put
+    writer.put(chunk(10 * (1 + WAITING_CHUNKS)))
+    writer.close()
+    assert was_full[0]
+    assert (writer.rows, writer.dropped) == (10 * (2 + WAITING_CHUNKS), 0)
+
+
+def refuse_after(monkeypatch, files):
+    """From then on the disk is full."""
+    left = iter(range(files))
+
+    def full(frame, path):
+        if next(left, None) is None:
+            raise OSError(28, "No space left on device")
+        write_file(frame, path)
+
+    monkeypatch.setattr(writer, "write_file", full)
+
+
+def test_a_full_disk_is_told_once_more_is_put_and_what_was_written_stays(tmp_path, monkeypatch):
+    refuse_after(monkeypatch, 2)
+    writer = TableWriter(tmp_path, "rows", SCHEMA)
+    with pytest.raises(RecordFailed, match="rows: .*No space left"):
+        put_many(writer, 100)
+    with pytest.raises(RecordFailed, match="No space left"):
+        writer.close()
+    assert not writer._thread.is_alive()
+    assert pl.read_parquet(parts_of(tmp_path, "rows"))["number"].to_list() == list(range(20))
+    assert writer.rows == 20
+    assert writer.dropped >= 10
+
+
+def test_a_join_that_fails_leaves_the_parts(tmp_path):
+    (tmp_path / "rows").mkdir()
+    for part in range(3):
+        write_file(chunk(10 * part).frame(), tmp_path / "rows" / f"part-00000{part}.parquet")
+    (tmp_path / "rows" / "part-000001.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(pl.exceptions.PolarsError):
+        join_parts(tmp_path, "rows")
+    assert [path.name for path in tmp_path.iterdir()] == ["rows"]
+    assert len(parts_of(tmp_path, "rows")) == 3
+
+
+def test_a_frame_that_cannot_be_written_leaves_nothing_aside(tmp_path):
+    with pytest.raises(OSError):
+        write_file(pl.DataFrame({"a": np.arange(3)}), tmp_path / "nowhere" / "a.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def times_due(limit: ChunkLimit, clock: StillClock, seconds: int) -> list[int]:
+    """When chunks that stay small are due."""
+    due: list[int] = []
+    for second in range(1, seconds + 1):
+        clock.time_ns += NS_PER_S
+        if limit.reached(0):
+            due.append(second)
+            limit.restart()
+    return due
+
+
+def test_a_large_chunk_is_due_at_once() -> None:
+    limit = ChunkLimit(10, StillClock())
+    assert not limit.reached(9)
+    assert limit.reached(10)
+
+
+def test_a_small_one_is_due_every_two_seconds() -> None:
+    clock = StillClock()
+    assert times_due(ChunkLimit(10, clock), clock, 1000) == list(range(2, 1001, 2))
+
+
+def test_with_a_share_chunks_of_a_long_run_become_few() -> None:
+    clock = StillClock()
+    due = times_due(ChunkLimit(10, clock, 0.01), clock, 24 * 3600)
+    assert due[:100] == list(range(2, 201, 2))
+    assert len(due) < 800
+    assert all(after - before <= max(2, 1 + 0.01 * before) for before, after in pairwise(due))
+
+
+class Noon:
+    def utc_stamp(self):
+        return "20261121T120000Z"
+
+
+def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
+    log = RunLog(tmp_path, Noon())
+    log.say("begins")
+    log.say("observer X failed:\nTraceback\nOSError\n")
+    assert (tmp_path / "log.txt").read_text().splitlines() == [
+        "20261121T120000Z begins",
+        "20261121T120000Z observer X failed:",
+        "    Traceback",
+        "    OSError",
+    ]
+    log.close()
+    log.close()
+
+
+def test_a_log_that_cannot_be_written_counts_its_lines_and_disturbs_nobody(tmp_path):
+    (tmp_path / "log.txt").symlink_to("/dev/full")
+    log = RunLog(tmp_path, Noon())
+    log.say("one")
+    log.say("two")
+    assert log.lost == 2
+    log.close()
+
+
+def full(to):
+    with output_file(to) as aside:
+        aside.write_text("half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_disk_that_is_full_half_way_is_one_line_and_leaves_what_was_there(tmp_path):
+    to = tmp_path / "page.html"
+    to.write_text("before")
+    with pytest.raises(BadInput, match="page.html: .*No space left on device"):
+        full(to)
+    assert to.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [to]
+
+
+def test_what_else_the_block_raises_is_passed_on(tmp_path):
+    with pytest.raises(FileNotFoundError), output_file(tmp_path / "page.html"):
+        (tmp_path / "missing").read_text()
+    assert list(tmp_path.iterdir()) == []
+
+
+FRAME = pl.DataFrame({"run": [0, 0, 1, 1], "order": [0.5, None, 0.25, 1.0], "ended": ["stopped", "failed", "", "é"]})
+
+
+def parquet(frame: pl.DataFrame) -> bytes:
+    file = BytesIO()
+    frame.write_parquet(file, **PARQUET)
+    return file.getvalue()
+
+
+def refusal(file: Path) -> str | None:
+    """What is said of the file; None: it can be read."""
+    try:
+        read_parquet(file, cure="take it away")
+    except BadInput as told:
+        return str(told)
+    return None
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("RUST_BACKTRACE", "0")  # to name the functions of a panic takes seconds
+        yield tmp_path_factory.mktemp("damaged") / "part.parquet"
+
+
+@settings(max_examples=60)
+@given(data=damaged(parquet(FRAME)))
+def test_a_file_that_is_cut_off_or_changed_is_read_or_refused_in_one_line_that_names_it(file, data):
+    file.write_bytes(data)
+    said = refusal(file)
+    if said is not None:
+        assert said.startswith(f"{file}: ")
+        assert said.endswith("take it away")
+        assert "\n" not in said
+
+
+def test_a_panic_of_polars_is_such_a_line_too(file, monkeypatch):
+    def panics(*_, **__):
+        raise pl.exceptions.PanicException("called `Result::unwrap()` on an `Err` value")
+
+    monkeypatch.setattr(pl, "read_parquet", panics)
+    with pytest.raises(BadInput, check=lambda error: error.where == str(file)):
+        read_parquet(file)
+
+
+def test_a_file_that_is_not_there_is_such_a_line_too(tmp_path):
+    with pytest.raises(BadInput, match="none.parquet: .*No such file"):
+        read_parquet(tmp_path / "none.parquet")
+
+
+@given(place=st.integers(0, 2), how=st.sampled_from([parquet(FRAME)[:-1], parquet(FRAME.cast({"order": pl.String}))]))
+def test_of_several_files_the_damaged_one_is_named_or_that_of_other_types(file, place, how):
+    files = [file.with_name(f"{number}.parquet") for number in range(3)]
+    for each in files:
+        each.write_bytes(parquet(FRAME))
+    refuse_corrupt(files)
+    files[place].write_bytes(how)
+    with pytest.raises(BadInput) as told:
+        refuse_corrupt(files)
+    # Where the first is of other types than the rest, it is the second that differs from what came before.
+    assert told.value.where == str(files[place] if place or how.endswith(b"PAR") else files[1])

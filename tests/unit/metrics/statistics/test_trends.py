@@ -1,0 +1,232 @@
+"""How a response changes along a parameter or with the number of robots: change points, degradation and scaling."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.statistics.sample import UNKNOWN, by_seed
+from swarmwire.metrics.statistics.trends import (
+    Fit,
+    change_point,
+    degradation,
+    point_sums,
+    relative_to_unharmed,
+    resampled_sums,
+    scaling,
+)
+from tests.support.metrics.samples import numbers, times
+
+SHARE = np.linspace(0.0, 0.9, 10)
+
+
+def noisy(curve, seed):
+    return curve[:, None] + np.random.default_rng(seed).normal(0.0, 0.05, (10, 20))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_lower_aic_is_that_of_the_true_form(seed):
+    """The two curves are 4 standard errors apart at their farthest, so AIC errs less than once in 1e4."""
+    line = degradation(SHARE, noisy(1.0 - SHARE, seed))
+    exponential = degradation(SHARE, noisy(np.exp(-2.0 * SHARE), seed))
+    assert line is not None
+    assert exponential is not None
+    assert (line.better.form, exponential.better.form) == ("linear", "exponential")
+    assert line.is_clear
+    assert exponential.is_clear
+    assert line.better.r_squared > 0.9
+
+
+def test_a_fit_says_what_is_left_at_a_stress():
+    of = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
+    assert Fit("linear", 1.0, -0.5, **of).at(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
+    assert Fit("exponential", 2.0, -1.0, **of).at(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
+
+
+def test_the_line_is_that_of_least_squares():
+    table = noisy(1.0 - 0.5 * SHARE, 1)
+    fitted = degradation(SHARE, table)
+    assert fitted is not None
+    slope, start = np.polyfit(np.repeat(SHARE, 20), table.ravel(), 1)
+    assert (fitted.linear.a, fitted.linear.b) == (pytest.approx(start), pytest.approx(slope))
+
+
+def test_slopes_lie_in_their_intervals_as_often_as_they_say():
+    """Of 300 samples 95 % (1.3 % around) should, for either form; this fails by chance once in 1000 lists of seeds."""
+    covered = {"linear": 0, "exponential": 0}
+    for seed in range(300):
+        for form, curve, slope in (("linear", 1.0 - SHARE, -1.0), ("exponential", np.exp(-SHARE), -1.0)):
+            fitted = degradation(SHARE, noisy(curve, seed))
+            assert fitted is not None
+            low, high = getattr(fitted, form).b_interval
+            covered[form] += low <= slope <= high
+    assert all(0.91 <= count / 300 <= 0.99 for count in covered.values())
+
+
+def test_runs_on_a_curve_are_fitted_exactly():
+    fitted = degradation(SHARE, np.exp(-1.5 * SHARE)[:, None])
+    assert fitted is not None
+    assert (fitted.better.form, fitted.better.b) == ("exponential", pytest.approx(-1.5))
+    assert fitted.better.at(np.array([0.2])) == pytest.approx(np.exp(-0.3))
+    assert fitted.better.r_squared == pytest.approx(1.0)
+
+
+def test_what_does_not_fall_has_no_slope_and_the_forms_are_not_told_apart():
+    flat = degradation(SHARE, np.full((10, 3), 0.8))
+    assert flat is not None
+    assert flat.linear.b == pytest.approx(0.0, abs=1e-12)
+    assert not flat.is_clear
+    assert flat.better.form == "linear"
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_performance_that_is_none_ends_no_fit(value):
+    fitted = degradation(SHARE, np.full((10, 3), value))
+    assert fitted is not None
+    assert fitted.linear.a == pytest.approx(value)
+    assert math.isnan(fitted.linear.r_squared)
+
+
+def test_two_stresses_are_too_few():
+    table = noisy(1.0 - SHARE, 1)
+    table[2:] = np.nan
+    assert degradation(SHARE, table) is None
+
+
+def test_performance_is_relative_to_the_mean_of_the_unharmed():
+    table = np.array([[1.0, 3.0], [4.0, np.nan]])
+    np.testing.assert_array_equal(relative_to_unharmed(np.array([0.5, 0.0]), table), table / 4.0)
+    assert np.isnan(relative_to_unharmed(np.array([0.0, 0.5]), np.zeros((2, 2)))).all()
+
+
+ROBOTS = np.array([1.0, 2.0, 5.0, 10.0])
+
+
+def test_robots_that_do_not_hinder_one_another_are_wholly_efficient():
+    work, times = scaling(ROBOTS, 3.0 * ROBOTS, is_time=False), scaling(ROBOTS, 60.0 / ROBOTS, is_time=True)
+    for found in (work, times):
+        np.testing.assert_allclose(found.speed_up, ROBOTS)
+        np.testing.assert_allclose(found.efficiency, 1.0)
+        np.testing.assert_allclose(found.serial_fraction, [np.nan, 0.0, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("serial", [0.05, 0.3, 1.0])
+def test_amdahls_law_has_its_serial_fraction(serial):
+    found = scaling(ROBOTS, serial + (1.0 - serial) / ROBOTS, is_time=True)
+    np.testing.assert_allclose(found.serial_fraction[1:], serial)
+
+
+def test_without_a_single_robot_the_smallest_swarm_is_the_reference():
+    found = scaling(np.array([20.0, 5.0, 10.0]), np.array([40.0, 20.0, 30.0]), is_time=False)
+    assert found.reference == 5.0
+    np.testing.assert_allclose(found.speed_up, [2.0, 1.0, 1.5])
+    np.testing.assert_allclose(found.efficiency, [0.5, 1.0, 0.75])
+    np.testing.assert_allclose(found.serial_fraction, [1.0 / 3.0, np.nan, 1.0 / 3.0])
+
+
+def test_times_that_are_not_known_have_no_efficiency_and_resamples_go_row_by_row():
+    response = np.array([[60.0, 30.0, np.nan, 0.0], [60.0, 60.0, 60.0, 60.0]])
+    found = scaling(ROBOTS, response, is_time=True)
+    np.testing.assert_allclose(found.efficiency, [[1.0, 1.0, np.nan, np.nan], 1.0 / ROBOTS])
+
+
+@pytest.mark.parametrize("robots", [[1.0], [1.0, 1.0], [0.0, 1.0], []])
+def test_sizes_that_do_not_tell_are_refused(robots):
+    with pytest.raises(BadInput):
+        scaling(np.array(robots), np.ones(len(robots)), is_time=False)
+
+
+LOSS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
+
+
+def noise(seed, points=8, seeds=20):
+    return np.random.default_rng(seed).normal(0.0, 0.1, (points, seeds))
+
+
+def brute_force(table):
+    """Place of the split with the least squares, by numpy's variances."""
+    squares = [sum(part.var() * part.size for part in (table[:split], table[split:])) for split in range(1, len(table))]
+    return int(np.argmin(squares))
+
+
+def test_a_step_is_found_with_its_size():
+    found = change_point(LOSS, noise(1) + np.where(LOSS >= 0.4, 0.3, 0.9)[:, None])
+    assert found is not None
+    assert (found.after, found.before, found.place) == (0.3, 0.4, pytest.approx(0.35))
+    assert found.place_interval.low == found.place_interval.high == found.place
+    assert found.below == pytest.approx(0.9, abs=0.03)
+    assert found.effect == pytest.approx(-0.6, abs=0.04)
+    assert found.effect_interval.low < -0.6 < found.effect_interval.high
+    assert found.standardised == pytest.approx(-6.0, rel=0.2)
+    assert found.gain > 0.0
+
+
+def test_where_nothing_changes_a_step_is_found_in_one_case_of_a_hundred_at_most():
+    """0.4 % expected; more than 5 of 200 would be found by chance once in a million lists of seeds."""
+    assert sum(change_point(LOSS, noise(seed)) is not None for seed in range(200)) <= 5
+
+
+def test_a_small_step_among_much_noise_has_a_wide_interval_that_holds_it():
+    found = change_point(LOSS, noise(3) + np.where(LOSS >= 0.4, 0.08, 0.0)[:, None])
+    assert found is not None
+    assert found.place_interval.low < found.place_interval.high
+    assert found.place_interval.low <= 0.35 <= found.place_interval.high
+
+
+@given(st.integers(0, 10_000), st.integers(1, 7))
+def test_the_step_is_where_brute_force_finds_it(seed, split):
+    table = noise(seed) + np.where(np.arange(8) >= split, 1.0, 0.0)[:, None]
+    found = change_point(LOSS, table)
+    assert found is not None
+    assert found.after == LOSS[brute_force(table)]
+
+
+@given(st.integers(0, 10_000), st.floats(0.1, 10.0), st.sampled_from((0.0, -3.0, 1e7)))
+def test_other_units_move_no_step(seed, unit, origin):
+    table = noise(seed) + np.where(LOSS >= 0.3, 1.0, 0.0)[:, None]
+    one, other = change_point(LOSS, table), change_point(LOSS, table * unit + origin)
+    assert one is not None
+    assert other is not None
+    assert (one.place, one.place_interval) == (other.place, other.place_interval)
+    assert other.effect == pytest.approx(one.effect * unit, rel=1e-4)
+
+
+def test_points_and_runs_without_values_are_left_out():
+    table = noise(1) + np.where(LOSS >= 0.4, 1.0, 0.0)[:, None]
+    table[2] = np.nan
+    table[5, :7] = np.nan
+    found = change_point(LOSS, table)
+    assert found is not None
+    assert (found.after, found.before) == (0.3, 0.4)
+
+
+@pytest.mark.parametrize(
+    "table", [np.full((8, 5), 0.7), np.zeros((8, 5)), np.full((8, 5), np.nan), np.eye(8, 5) * np.nan]
+)
+def test_a_constant_has_no_step(table):
+    assert change_point(LOSS, table) is None
+
+
+def test_a_step_without_noise_is_found():
+    found = change_point(LOSS, np.where(LOSS >= 0.4, 1.0, 0.0)[:, None] * np.ones(5))
+    assert found is not None
+    assert (found.place, found.effect, found.standardised) == (pytest.approx(0.35), 1.0, math.inf)
+
+
+def test_sums_of_resamples_are_those_of_the_seeds_drawn():
+    table = noise(2, 3, 4)
+    table[1, 2] = np.nan
+    once, often = point_sums(table), resampled_sums(table)
+    mean = np.nanmean(table, axis=1)
+    np.testing.assert_allclose(once.total / once.count, mean)
+    assert once.count.tolist() == [4.0, 3.0, 4.0]
+    assert (often.count[:, 0] == 4.0).all()
+    np.testing.assert_allclose(often.total.sum(axis=0) / often.count.sum(axis=0), mean, atol=0.01)
+
+
+def test_values_stand_side_by_side_seed_by_seed():
+    table = by_seed([numbers([1.0, 2.0], [5, 3]), times([9.0], [False]), numbers([])])
+    np.testing.assert_array_equal(table, [[np.nan, 2.0, 1.0], [9.0, np.nan, np.nan], [np.nan] * 3])

@@ -1,0 +1,246 @@
+"""Which metrics a run measures: those of its scenario, of packages, and the user's own."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.registry import (
+    GROUP,
+    METRICS,
+    MetricEntry,
+    PlugIn,
+    custom_metric_class,
+    plug_ins,
+    select_metrics,
+    standard,
+)
+from tests.support.custom_code import CODE, install
+from tests.support.metrics.truths import static, truth
+
+
+@pytest.fixture
+def east(tmp_path: Path) -> str:
+    (tmp_path / "own.py").write_text(CODE)
+    return f"{tmp_path / 'own.py'}:East"
+
+
+def item(spec, place=0, **params):
+    return MetricEntry(f"metrics.{place}.metric" if params else f"metrics.{place}", spec, params)
+
+
+def stop(spec):
+    return MetricEntry("stop.metric", spec, None)
+
+
+def names(*items, **options):
+    return [metric.name for metric in select_metrics(items, "s.toml", **options).metrics]
+
+
+def refused(*items):
+    with pytest.raises(BadInput) as caught:
+        select_metrics(items, "s.toml")
+    return caught.value
+
+
+def test_without_a_list_the_standard_ones_are_measured():
+    assert names() == standard()
+
+
+def test_listed_ones_stand_behind_the_standard_ones_in_their_order(monkeypatch, east):
+    monkeypatch.setattr(METRICS["order"], "standard", False)
+    monkeypatch.setattr(METRICS["airtime"], "standard", False)
+    assert names(item("order"), item(east, 1), item("airtime", 2)) == [*standard(), "order", "east", "airtime"]
+
+
+def test_without_the_standard_ones_there_is_what_is_listed(east):
+    assert names(item(east), item("order", 1), with_standard=False) == ["east", "order"]
+    assert names(with_standard=False) == []
+
+
+def test_a_standard_one_that_is_listed_keeps_its_place_and_takes_the_parameters():
+    found = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
+    assert [metric.name for metric in found] == standard()
+    assert METRICS["fragmentations"](hold_s=3.0) in found
+    assert select_metrics([item("order")], "s.toml") == select_metrics([], "s.toml")
+
+
+def test_a_class_takes_parameters_and_is_told_as_code(east):
+    found = select_metrics([item(east, from_m=2)], "s.toml", with_standard=False)
+    assert [(metric.name, metric.from_m) for metric in found.metrics] == [("east", 2.0)]
+    assert found.code == (east,)
+
+
+def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed(east):
+    assert names(stop("order"), with_standard=False) == ["order"]
+    assert names(item(east), stop("east"), with_standard=False) == ["east"]
+    [only] = select_metrics([item("fragmentations", hold_s=3), stop("fragmentations")], "", with_standard=False).metrics
+    assert only == METRICS["fragmentations"](hold_s=3.0)
+    assert names(stop("order"), stop("order")) == standard()
+
+
+@pytest.mark.parametrize(
+    ("asked", "key", "hint"),
+    [
+        (item("ordre"), "metrics.0", "did you mean order?"),
+        (item("ordre", x=1), "metrics.0.metric", "did you mean order?"),
+        (stop("ordr"), "stop.metric", "did you mean order?"),
+        (item("mine.py"), "metrics.0", "mine.py"),
+        (item("fragmentations", hold=1), "metrics.0.hold", "hold_s (did you mean this?)"),
+        (item("fragmentations", hold_s=-1), "metrics.0.hold_s", "-1.0"),
+        (item("fragmentations", hold_s="x"), "metrics.0.hold_s", "'x'"),
+        (item("order", gap_m=1), "metrics.0.gap_m", "none"),
+    ],
+)
+def test_what_is_no_metric_or_does_not_fit_is_refused_with_its_key(asked, key, hint):
+    error = refused(asked)
+    assert (error.where, error.key) == ("s.toml", key)
+    assert hint in error.expected
+
+
+def test_one_name_is_measured_once(east):
+    for spec, params, key in (("order", {}, "metrics.1"), (east, {"from_m": 1}, "metrics.1.metric")):
+        error = refused(item(spec), item(spec, 1, **params))
+        assert (error.where, error.key) == ("s.toml", key)
+        assert "metrics.0" in error.expected
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    return tmp_path / "site"
+
+
+def test_a_package_brings_metrics_by_name(site):
+    install(site, "compass_metrics", {"east": "East"})
+    found = select_metrics([item("east", from_m=1)], "s.toml", with_standard=False)
+    assert [metric.from_m for metric in found.metrics] == [1.0]
+    assert found.code == ("compass_metrics:East",)
+    assert names(stop("east"), with_standard=False) == ["east"]
+    assert "east?" in refused(item("eest")).expected
+
+
+def test_a_plug_in_is_imported_only_if_it_is_asked_for(site):
+    install(site, "broken_metrics", {"east": "East"}, code="raise ValueError('no such day')")
+    assert names() == standard()
+    error = refused(item("east"))
+    assert (error.where, error.key) == ("s.toml", "metrics.0")
+    assert "broken_metrics" in error.expected
+    assert "no such day" in error.expected
+
+
+@pytest.mark.parametrize(
+    ("packages", "hint"), [(["named_metrics"], "named_metrics:East"), (["one_metrics", "more_metrics"], "package")]
+)
+def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site, packages, hint):
+    for package in packages:
+        install(site, package, {"west": "East"})
+    error = refused(item("west"))
+    assert error.key == "metrics.0"
+    assert "'west'" in error.expected
+    assert hint in error.expected
+
+
+def test_a_name_of_swarmwires_own_stays_its_own(site):
+    install(site, "taken_metrics", {"order": "East"})
+    assert type(select_metrics([item("order")], "s.toml", with_standard=False).metrics[0]) is METRICS["order"]
+
+
+def test_what_packages_bring_is_known_by_name_before_anything_is_imported(tmp_path, monkeypatch):
+    install(tmp_path, "compass_metrics", {"east": "East"}, code="raise RuntimeError")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert plug_ins()["east"] == PlugIn("east", "compass_metrics:East", "compass_metrics", twice=False)
+    assert f"[{GROUP}]" in (tmp_path / "compass_metrics-1.0.dist-info" / "entry_points.txt").read_text()
+
+
+def test_a_name_that_two_packages_bring_is_told_twice(tmp_path, monkeypatch):
+    install(tmp_path, "one_metrics", {"east": "East"})
+    install(tmp_path, "other_metrics", {"east": "East"})
+    monkeypatch.syspath_prepend(tmp_path)
+    assert plug_ins()["east"].twice
+
+
+@dataclass(frozen=True)
+class Good(Metric):
+    """The tick."""
+
+    name = "mine"
+    help = "the tick"
+    bounds = (0, None)
+
+    def begin(self, static: Any) -> Any:
+        return lambda moment: float(moment.truth.tick)
+
+
+class Plain(Metric):
+    """No dataclass."""
+
+
+@dataclass(frozen=True)
+class Endless(Metric):
+    """Begins nothing."""
+
+
+@dataclass(frozen=True)
+class BeginsBadly(Good):
+    """Raises before the first tick."""
+
+    def begin(self, static: Any) -> Any:
+        raise ValueError("no start")
+
+
+@dataclass(frozen=True)
+class Wide(Good):
+    """Has a value per robot."""
+
+    def begin(self, static: Any) -> Any:
+        return lambda moment: moment.heading_rad[0]
+
+
+def spec_of(kind: type) -> str:
+    return f"{__name__}:{kind.__name__}"
+
+
+def test_a_good_one_is_measured():
+    assert _measure(custom_metric_class(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "hint"), [(Plain, "dataclass.*:Plain"), (Endless, "Endless.*begin"), (str, "no such name.*'str'")]
+)
+def test_a_class_that_is_no_metric_is_refused(kind, hint):
+    with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: .*{hint}"):
+        custom_metric_class(spec_of(kind), "s.toml", "metrics.0")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("name", value) for value in ("two words", "order", "x_m", "link_pdr")),
+        *(("unit", 3), ("kind", "sum"), ("needs", ("range",)), ("bounds", (None, 1.0))),
+    ],
+)
+def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
+    monkeypatch.setattr(Good, name, value)
+    with pytest.raises(BadInput) as refused:
+        custom_metric_class(spec_of(Good), "s.toml", "metrics.0")
+    assert (refused.value.where, refused.value.key) == ("s.toml", "metrics.0")
+    assert all(told in refused.value.expected for told in ("Good: ", name, repr(value)))
+
+
+@pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
+def test_one_that_fails_is_named(kind, said):
+    with pytest.raises(CustomCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
+        _measure(kind())
+
+
+def _measure(metric):
+    metrics, of = Metrics([metric]), static(3)
+    metrics.begin(of)
+    metrics.see(truth(of, 7, pose=np.zeros((3, 3))))
+    return metrics

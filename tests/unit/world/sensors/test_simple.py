@@ -1,0 +1,317 @@
+"""Sensors of a robot by itself: battery, bumper, ground, positioning, IMU."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.draws import normal, purpose, uniform
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec, PositioningSpec
+from swarmwire.comms.truth import Group
+from swarmwire.world.actuation.batteries import Batteries
+from swarmwire.world.event_scheduler import EventScheduler
+from swarmwire.world.sensors.sensor import Scene
+from swarmwire.world.world import World
+from tests.support.world.scenes import commanded, posed, read, scene, staged
+
+EPUCK = load_body("epuck")
+SHEET = BatterySpec(capacity_wh=0.01, idle_w=1.0, drive_w_per_mps=20.0, led_w=0.5)
+HOLONOMIC = body_from(
+    {
+        "like": "epuck",
+        "drive": {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, "max_force_n": 1.0}
+        | {"max_torque_nm": 1.0},
+        "sensors": {"battery": {"capacity_wh": 0.01, "drive_w_per_mps": 20.0}},
+    },
+    "holonomic.toml",
+)
+BOX = {"shape": "box", "size_m": [0.2, 0.2], "at": [0.0, 0.0]}
+ROOM = {"size_m": [4.0, 4.0], "obstacles": [BOX]}
+THREE = GroundSpec(points_m=((0.03, -0.009), (0.03, 0.0), (0.03, 0.009)))  # ARGoS's e-puck
+SPOT = Floor(0.8, (Patch("disc", 0.5, 0.2, 0.1, radius_m=0.1), Patch("disc", 0.5, 0.2, 0.4, radius_m=0.02)))
+GPS = load_body("epuck-gps")
+FIELDS = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps")
+
+
+def with_battery(spec: BatterySpec) -> Body:
+    return replace(EPUCK, sensors={**EPUCK.sensors, "battery": spec})
+
+
+def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
+    groups = [Group(str(i), body, i, i + 1) for i, body in enumerate(bodies)]
+    return Batteries(groups, arenas, 0.1)
+
+
+def drained(of: Batteries, target, leds=None, alive=None):
+    """A tick of one arena under these targets (robots, 3)."""
+    robots, given = of.charge.shape[1], np.array([target], np.float64)
+    lights = np.zeros((1, robots, 2), np.int64) if leds is None else np.array([leds])
+    of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given)
+
+
+def test_what_is_used_is_power_times_time() -> None:
+    of = batteries(with_battery(SHEET), with_battery(SHEET), EPUCK, with_battery(SHEET))
+    base_m = EPUCK.wheels.wheel_base_m
+    targets = [[0.1, 0.0, 0.0], [0.0, 2.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    drained(of, targets, [[0, 0], [0, 0], [5, 5], [0xFF0000, 1]])
+    watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * base_m, 0.0, 1.0 + 2 * 0.5])
+    assert of.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
+    curving = batteries(with_battery(SHEET), with_battery(SHEET))
+    drained(curving, [[0.1, 0.2 / base_m, 0.0], [-0.1, 6.0 / base_m, 0.0]])  # the mean of how fast the wheels turn
+    watts = np.array([1.0 + 20.0 * 0.1, 1.0 + 20.0 * 3.0])
+    assert curving.charge[0] == pytest.approx(1.0 - watts * 0.1 / 3600.0 / 0.01)
+    moving = batteries(HOLONOMIC)
+    drained(moving, [[0.3, 1.0, -0.4]])
+    assert moving.charge[0, 0] == pytest.approx(1.0 - 20.0 * 0.5 * 0.1 / 3600.0 / 0.01)
+
+
+def test_a_charge_ends_at_nothing_and_only_empty_batteries_are_renewed() -> None:
+    of = batteries(with_battery(replace(SHEET, start=0.01)), with_battery(SHEET), EPUCK)
+    for _ in range(2):
+        drained(of, [[0.1, 1.0, 0.0]] * 3)
+    assert of.charge[0, 0] == 0.0
+    assert of.empty.tolist() == [True, False, False]
+    before = of.charge[0, 1]
+    of.renew(np.array([True, True, True]))
+    assert of.charge[0].tolist() == [1.0, before, 1.0]
+
+
+def test_a_robot_whose_battery_is_empty_is_dead_and_its_run_says_so() -> None:
+    events = [{"at_s": 1.0, "do": "revive", "robots": {"names": ["a-0"]}}]
+    scenario = posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], events=events, duration_s=2.5)
+    world = World(scenario, [1], {})
+    short = with_battery(BatterySpec(capacity_wh=1.0, idle_w=3700.0, start=0.5))
+    world.batteries = Batteries([Group("a", short, 0, 2)], 1, 0.1)
+    scheduler = EventScheduler(scenario.events, world.static, world.keys)
+    deaths: list[tuple[int, str, list[bool]]] = []
+    for tick in range(25):
+        happened = scheduler.apply(tick * 10**8, world).records
+        deaths += [(tick, each.do, each.changed.tolist()) for each in happened]
+        world.move(commanded(world, 0.05, 0.0))
+    # Half a watt-hour lasts not quite half a second at 3,700 W, a full one not quite a second.
+    assert deaths == [
+        (5, "run_down", [True, True]),
+        (10, "revive", [True, False]),
+        (20, "run_down", [True, False]),
+    ]
+    assert world.command[1].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_dead_robot_draws_nothing() -> None:
+    of = batteries(with_battery(SHEET), with_battery(SHEET))
+    drained(of, np.zeros((2, 3)), alive=[False, True])
+    assert of.charge[0, 0] == 1.0 > of.charge[0, 1]
+
+
+def test_only_bodies_with_a_battery_have_any() -> None:
+    assert not batteries(EPUCK).any
+    assert batteries(EPUCK, with_battery(SHEET)).any
+    assert batteries(EPUCK, with_battery(replace(SHEET, start=0.25)), arenas=2).charge.tolist() == [[1.0, 0.25]] * 2
+
+
+def test_the_gauge_tells_charge_and_a_voltage_that_falls_with_it() -> None:
+    looked_at = scene(np.zeros((3, 3)), EPUCK)
+    looked_at.charge[0] = [1.0, 0.5, 0.0]
+    told = read(looked_at, EPUCK, "battery", replace(SHEET, full_v=4.0, empty_v=3.0))
+    assert told["battery.charge"].tolist() == [1.0, 0.5, 0.0]
+    assert told["battery.voltage_v"].tolist() == [4.0, 3.5, 3.0]
+    noisy = read(looked_at, EPUCK, "battery", replace(SHEET, noise=0.2, noise_v=0.1), 3)
+    assert noisy["battery.charge"][0] <= 1.0
+    assert noisy["battery.charge"][2] >= 0.0
+    assert not np.array_equal(noisy["battery.voltage_v"], told["battery.voltage_v"])
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("capacity_wh", -1.0, "expected more than 0 Wh, got -1.0"),
+        ("capacity_wh", 0, "expected more than 0 Wh, got 0.0"),
+        ("idle_w", -0.1, "expected at least 0 W"),
+        ("empty_v", 4.5, "expected at most full_v, 4.2 V; got 4.5"),
+        ("start", 1.5, "expected at most 1"),
+    ],
+)
+def test_a_negative_battery_is_refused(key: str, value: float, expected: str) -> None:
+    spec = {"like": "epuck", "sensors": {"battery": {"capacity_wh": 1.0, key: value}}}
+    with pytest.raises(BadInput, match=rf"mine.toml: sensors.battery.{key}: {expected}"):
+        body_from(spec, "mine.toml")
+
+
+def pressed(world: World, tick: int = 0) -> list[float]:
+    return world.sense(tick)["a"].fields["bumper.pressed"].tolist()
+
+
+def built(poses: list[list[float]], **tables: Any) -> World:
+    return World(posed(poses, **tables), [1], {"a": ("bumper",)})
+
+
+@pytest.mark.parametrize("poses", [[[-0.15, 0.0, 0.0]], [[1.95, 0.0, 0.0]]], ids=["obstacle", "wall"])
+def test_a_robot_that_runs_into_something_fixed_feels_it(poses: list[list[float]]) -> None:
+    world = built([*poses, [-1.0, -1.0, 0.0]], arena=ROOM)
+    assert pressed(world) == [0.0, 0.0]
+    for _ in range(4):
+        world.move(commanded(world, [0.1, 0.0], 0.0))
+    assert pressed(world) == [1.0, 0.0]
+    for _ in range(3):
+        world.move(commanded(world, [-0.1, 0.0], 0.0))
+    assert pressed(world) == [0.0, 0.0]
+
+
+def test_both_robots_feel_that_they_touch() -> None:
+    world = built([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.09, 0.0, 0.0]])
+    for _ in range(5):
+        world.move(commanded(world, [0.1, 0.0, 0.0], 0.0))
+    assert pressed(world) == [1.0, 0.0, 1.0]
+
+
+def test_what_was_told_is_not_written_to_later() -> None:
+    world = built([[-0.15, 0.0, 0.0]], arena=ROOM)
+    told = world.sense(0)["a"].fields["bumper.pressed"]
+    for _ in range(4):
+        world.move(commanded(world, 0.1, 0.0))
+    assert np.array_equal(told, [0.0])
+
+
+def shade(poses: Any, floor: Floor | None, spec: GroundSpec = THREE, tick: int = 0) -> FloatArray:
+    return read(scene(poses, EPUCK, floor=floor), EPUCK, "ground", spec, tick)["ground.shade"]
+
+
+def test_the_floor_is_white_where_there_is_none() -> None:
+    assert shade([[0.0, 0.0, 0.0], [7.0, 0.0, 0.0]], None).tolist() == [[1.0] * 3] * 2
+
+
+def test_each_point_tells_what_is_under_it() -> None:
+    at_edge = [0.5 - 0.03, 0.2 + 0.1 - 0.009 / 2, 0.0]  # the left point is over the edge of the dark disc
+    assert shade([[0.0, 0.0, 0.0], at_edge, [0.5 - 0.03, 0.2, 0.0]], SPOT).tolist() == [
+        [0.8, 0.8, 0.8],
+        [0.1, 0.1, 0.8],
+        [0.4, 0.4, 0.4],
+    ]
+
+
+@given(turn=st.floats(-7, 7))
+def test_points_turn_with_the_body(turn: float) -> None:
+    ahead = [0.5 - 0.03 * np.cos(turn), 0.2 - 0.03 * np.sin(turn), turn]
+    behind = [0.5 + 0.03 * np.cos(turn), 0.2 + 0.03 * np.sin(turn), turn]
+    middle = shade([ahead, behind], SPOT)[:, 1]
+    assert middle.tolist() == [0.4, 0.1]
+
+
+def test_noise_is_uniform_keyed_and_clipped() -> None:
+    noisy = shade([[0.0, 0.0, 0.0], [0.5, 0.2, 0.0]], SPOT, replace(THREE, noise=0.3), tick=4)
+    draw = uniform(7, np.arange(2)[:, None], 4, np.arange(3), purpose("ground.shade noise"))
+    exact = shade([[0.0, 0.0, 0.0], [0.5, 0.2, 0.0]], SPOT)
+    assert noisy == pytest.approx(np.clip(exact + 0.3 * (2.0 * draw - 1.0), 0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("points", "text"),
+    [
+        ([[0.0, 0.0], [0.03, 0.03]], r"points_m\[1\]: expected a point under the body"),
+        ([[0.0, 0.0, 0.0]], r"points_m\[0\]: expected 2 values"),
+        ([], "points_m: expected at least one item"),
+    ],
+)
+def test_points_that_are_not_under_the_body_are_refused(points: Any, text: str) -> None:
+    with pytest.raises(BadInput, match=f"^mine.toml: sensors.ground.{text}"):
+        body_from({"like": "epuck", "sensors": {"ground": {"points_m": points}}}, "mine.toml")
+
+
+def test_the_error_is_normal_and_keyed_by_robot_tick_and_axis() -> None:
+    poses = np.random.default_rng(1).uniform(-2, 2, (20, 3))
+    looked_at = scene(poses, GPS)
+    exact = read(looked_at, GPS, "positioning", PositioningSpec(0.0), 4)
+    noisy = read(looked_at, GPS, "positioning", PositioningSpec(0.1), 4)
+    for axis, field in enumerate(("positioning.x_m", "positioning.y_m")):
+        assert np.array_equal(exact[field], poses[:, axis])
+        error = 0.1 * normal(7, np.arange(20), 4, 0, purpose(f"{field} noise"))
+        assert np.allclose(noisy[field], poses[:, axis] + error)
+        assert noisy[field].flags.c_contiguous
+    assert np.array_equal(looked_at.state[0, :, :3], poses)
+
+
+def test_a_body_without_it_is_refused_to_an_agent_that_needs_it() -> None:
+    needs = {"a": ("positioning",)}
+    with pytest.raises(BadInput, match="the agent needs the sense 'positioning'; the body epuck has proximity"):
+        World(posed([[0, 0, 0]]), [1], needs)
+    readings = World(posed([[0.5, 0.25, 0]], body="epuck-gps"), [1], needs).sense(0)["a"].fields
+    assert readings["positioning.x_m"][0] == pytest.approx(0.5, abs=0.06)
+    assert readings["positioning.y_m"][0] == pytest.approx(0.25, abs=0.06)
+
+
+def put(looked_at: Scene, heading, velocity) -> None:
+    """All robots have this heading and velocity from now on."""
+    looked_at.state[0, :, 2], looked_at.state[0, :, 3:5] = heading, velocity
+
+
+def felt(headings, velocities, spec: ImuSpec | None = None, robots: int = 1):
+    """What was felt last when these headings and velocities came one after another, (robots, fields)."""
+    looked_at = scene(np.zeros((robots, 3)), EPUCK)
+    put(looked_at, headings[0], velocities[0])
+    imu = staged(looked_at, EPUCK, "imu", spec or ImuSpec())
+    told = {}
+    for tick, (heading, velocity) in enumerate(zip(headings, velocities, strict=True)):
+        put(looked_at, heading, velocity)
+        told = imu.read(tick)
+    return np.stack([told[name] for name in FIELDS], axis=1)
+
+
+def test_speeding_up_is_felt_ahead_and_braking_behind() -> None:
+    assert felt([0.5, 0.5], [(0, 0), (0.1 * np.cos(0.5), 0.1 * np.sin(0.5))])[0] == pytest.approx([1.0, 0.0, 0.0])
+    assert felt([0.5, 0.5], [(0.1 * np.cos(0.5), 0.1 * np.sin(0.5)), (0, 0)])[0] == pytest.approx([-1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("turn_radps", [0.5, -2.0])
+def test_a_robot_on_a_circle_feels_v_w_to_the_inside(turn_radps: float) -> None:
+    headings = 0.7 + turn_radps * 0.1 * np.arange(3)
+    told = felt(headings, 0.2 * np.stack([np.cos(headings), np.sin(headings)], axis=1))[0]
+    chord = np.sinc(turn_radps * 0.1 / (2.0 * np.pi))  # the mean over the tick's arc
+    assert told == pytest.approx([0.0, 0.2 * turn_radps * chord, turn_radps])
+
+
+@given(turn=st.floats(-9, 9), seed=st.integers(0, 99))
+def test_the_frame_of_the_arena_is_not_felt(turn: float, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    headings, velocities = random.uniform(-3, 3, 4), random.uniform(-1, 1, (4, 2))
+    c, s = np.cos(turn), np.sin(turn)
+    turned = velocities @ np.array([[c, s], [-s, c]])
+    assert felt(headings + turn, turned)[0] == pytest.approx(felt(headings, velocities)[0], abs=1e-9)
+
+
+def test_nothing_is_felt_in_the_first_tick() -> None:
+    assert not felt([0.5], [(0.1, 0.2)]).any()
+
+
+def test_biases_are_drawn_once_and_drift_from_tick_to_tick() -> None:
+    still, robots = [(0.0, 0.0)] * 6, np.arange(500)[:, None]
+    drawn = normal(7, robots, 0, np.arange(3), purpose("imu bias"))
+    biased = ImuSpec(bias_std_mps2=0.1, bias_std_radps=0.02)
+    constant = felt([0.0] * 6, still, biased, 500)
+    assert constant == pytest.approx(drawn * [0.1, 0.1, 0.02])
+    assert np.array_equal(constant, felt([0.0], still[:1], biased, 500))
+    walk = sum(normal(7, robots, tick, np.arange(3), purpose("imu drift")) for tick in range(1, 6))
+    drifted = felt([0.0] * 6, still, ImuSpec(drift_mps2=0.1, drift_radps=0.02), 500)
+    assert drifted == pytest.approx(walk * np.array([0.1, 0.1, 0.02]) * np.sqrt(0.1))
+    # 500 draws: the standard deviation is known to 3.2 %; four of them, 1 in 16,000 for each of three.
+    assert drifted.std(axis=0) == pytest.approx(np.array([0.1, 0.1, 0.02]) * np.sqrt(0.5), rel=0.127)
+
+
+def test_drift_goes_on_while_nobody_looks() -> None:
+    looked_at = scene(np.zeros((3, 3)), EPUCK)
+    spec = ImuSpec(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
+    always, seldom = (staged(looked_at, EPUCK, "imu", spec) for _ in range(2))
+    for tick in range(9):
+        looked_at.state[0, :, 2:5] += 0.01 * tick
+        told = always.read(tick)
+        if tick % 4:
+            seldom.follow(tick)
+        else:
+            assert all(np.array_equal(told[name], values) for name, values in seldom.read(tick).items())
