@@ -1,7 +1,6 @@
 """A process per robot: how fast the swarm runs, starts, and what each process costs."""
 
 import statistics
-from unittest.mock import patch
 
 import psutil
 
@@ -10,10 +9,9 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.runners import RunnerProcesses
+from swarmwire.deploy.runners import AGENT_HOST
 from swarmwire.world.scenario_file import scenario_from
 
-PLAIN = "benchmarks.plain_agent_host"
 FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
 
 
@@ -37,8 +35,8 @@ class Consumption(Observer):
         if truth.tick not in (self.first, self.last):
             return
         world = psutil.Process()
-        agent_host = [child for child in world.children() if RunnerProcesses.program in child.cmdline()]
-        runners = [runner for process in agent_host for runner in process.children()]
+        agent_host = [child for child in world.children() if AGENT_HOST in child.cmdline()]
+        runners = [runner for process in agent_host for server in process.children() for runner in server.children()]
         if truth.tick == self.first:
             memory = [runner.memory_full_info() for runner in runners]
             self.uss_mb = [of.uss / 1e6 for of in memory]
@@ -58,15 +56,9 @@ def _processor_s(process: psutil.Process) -> float:
     return times.user + times.system
 
 
-def plain_processes(name: str, repeats: int, *, robots: int, ticks: int) -> None:
-    """The same by processes that know swarmwire by its protocol alone, as the example does."""
-    with patch.object(RunnerProcesses, "program", PLAIN):
-        processes(name, repeats, robots=robots, ticks=ticks, agent="examples/protocol/runner.py")
-
-
 def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -> None:
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
-    scenario = scenario_from(scenes.flocking(robots, ticks / 10, BOID if agent.endswith(".py") else agent), name)
+    scenario = scenario_from(scenes.flocking(robots, ticks / 10, agent), name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
     taken = Consumption(ticks // 3, ticks - 1)
     results = [run(scenario, runners="per-robot", observers=[taken]) for _ in range(repeats)]

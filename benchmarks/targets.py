@@ -62,7 +62,6 @@ TARGETS = {
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(15, "memory that a runner does not share with others"),
     "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets received"),
-    "processes-200-plain": Target(2, "the same flock by 200 of `examples/protocol/runner.py`: zenoh and msgpack alone"),
     "processes-1000": Target(0.4, "1,000 of them"),
     "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
     "processes-1000-memory": most(16, "of world, agent host and runners together, as sum of their PSS"),

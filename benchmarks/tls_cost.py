@@ -17,6 +17,7 @@ import numpy as np
 from benchmarks import scenes
 from benchmarks.lines import print_line
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.assignment import split
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
@@ -104,7 +105,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
     """Of each tick, in ms: what world and radio took, and what each set of runners did."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10), "tls-cost")
     simulation = Simulation(scenario)
-    parts = allocation.split(allocation.whole(scenario, simulation.static, dict(simulation.agents)), robots)
+    parts = split(allocation.whole(scenario, simulation.static, dict(simulation.agents)), robots)
     agent, clock = next(iter(simulation.agents.values())), WallClock()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from swarmwire.agent import runner
 from swarmwire.agent.agent import load_agent
+from swarmwire.agent.agent_process import ForkServer
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_runner
@@ -18,16 +19,17 @@ def main(endpoint: str, run_id: str, agent: str, certs: str, *names: str) -> Non
     for name in names:
         child = os.fork()
         if not child:
-            _play(endpoint, run_id, name, _network(Path(certs), name) if certs else None)
+            server = ForkServer()
+            _play(server, endpoint, run_id, name, _network(Path(certs), name) if certs else None)
             os._exit(0)
         children.append(child)
     for child in children:
         os.waitpid(child, 0)
 
 
-def _play(endpoint: str, run_id: str, name: str, network: Network | None) -> None:
+def _play(server: ForkServer, endpoint: str, run_id: str, name: str, network: Network | None) -> None:
     with closed_after(open_runner(endpoint, 30.0, network)) as session:
-        runner.play(session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE)
+        runner.play(session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE, server)
 
 
 def _network(certs: Path, name: str) -> Network:

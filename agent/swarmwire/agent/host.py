@@ -19,7 +19,7 @@ from swarmwire.agent.agent import Agent, AgentClass, load_agent
 from swarmwire.agent.parameters import make, parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.step_context import StepContext
+from swarmwire.agent.step_context import GroupContext, StepContext
 from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment, GroupAssignment, robots_text
@@ -149,7 +149,7 @@ class AgentGroup(ABC):
             self._first_own[np.arange(len(self.group.rows))[place][new_rows]] = sent_before[new_rows]
             self.keep(readings.rows)
             self.rows = readings.rows
-        context = StepContext(
+        context = GroupContext(
             self.group,
             self.needs,
             time,
@@ -174,7 +174,7 @@ class AgentGroup(ABC):
         place = np.searchsorted(self.group.rows, self.rows)
         sent_before = self._sent_before[place]
         self._receive_calls += 1
-        context = StepContext(
+        context = GroupContext(
             self.group,
             self.needs,
             time,
@@ -190,7 +190,7 @@ class AgentGroup(ABC):
         try:
             return context.end_receive()
         except RuntimeError as error:
-            raise _failed([self.group.robot_names[at] for at in place], error) from error
+            raise failed([self.group.robot_names[at] for at in place], error) from error
 
     @property
     def has_stepped(self) -> bool:
@@ -237,11 +237,11 @@ class AgentGroup(ABC):
         return TxStatuses(at, mine.id, mine.result).select(np.flatnonzero(sent_here))
 
     @abstractmethod
-    def step(self, context: StepContext) -> None:
+    def step(self, context: GroupContext) -> None:
         """Call `step` of the agents."""
 
     @abstractmethod
-    def receive(self, context: StepContext) -> None:
+    def receive(self, context: GroupContext) -> None:
         """Call `on_receive` of the agents."""
 
     @abstractmethod
@@ -260,13 +260,13 @@ class _Vector(AgentGroup):
         freeze(self._agent, self._per_robot)
         self._state: State = state_of(kind).fresh(len(group.rows))
 
-    def step(self, context: StepContext) -> None:
+    def step(self, context: GroupContext) -> None:
         self._call(self._agent.step, context)
 
-    def receive(self, context: StepContext) -> None:
+    def receive(self, context: GroupContext) -> None:
         self._call(self._agent.on_receive, context)
 
-    def _call(self, method: Callable[[Robots, State], None], context: StepContext) -> None:
+    def _call(self, method: Callable[[Robots, State], None], context: GroupContext) -> None:
         if self._per_robot:
             place = np.searchsorted(self.group.rows, context.readings.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
@@ -274,7 +274,7 @@ class _Vector(AgentGroup):
             method(Robots(context), self._state)
         except (Exception, SystemExit) as error:
             place = np.searchsorted(self.group.rows, context.readings.rows)
-            raise _failed([self.group.robot_names[at] for at in place], error, context) from error
+            raise failed([self.group.robot_names[at] for at in place], error, context) from error
 
     def keep(self, rows: IntArray) -> None:
         self._state = self._state.moved(self.rows, rows)
@@ -298,22 +298,22 @@ class _Single(AgentGroup):
         self._kind = kind
         self._agents = {int(row): make(kind, group.params) for row in group.rows}
 
-    def step(self, context: StepContext) -> None:
+    def step(self, context: GroupContext) -> None:
         for at, row in enumerate(cast("list[int]", context.readings.rows.tolist())):
             self._call(self._agents[row].step, context, at, row)
 
-    def receive(self, context: StepContext) -> None:
+    def receive(self, context: GroupContext) -> None:
         addressed = np.union1d(context.received.receiver, context.tx_status_rows)
         for at in cast("list[int]", addressed.tolist()):
             row = int(context.readings.rows[at])
             self._call(self._agents[row].on_receive, context, at, row)
 
-    def _call(self, method: Callable[[Robot], None], context: StepContext, at: int, row: int) -> None:
+    def _call(self, method: Callable[[Robot], None], context: GroupContext, at: int, row: int) -> None:
         try:
             method(Robot(context, at))
         except (Exception, SystemExit) as error:
             name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
-            raise _failed([name], error, context) from error
+            raise failed([name], error, context) from error
 
     def keep(self, rows: IntArray) -> None:
         known = self._agents
@@ -349,10 +349,10 @@ def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
     try:
         return _Vector(group, kind) if issubclass(kind, VectorAgent) else _Single(group, kind)
     except (Exception, SystemExit) as error:
-        raise _failed(list(group.robot_names), error) from error
+        raise failed(list(group.robot_names), error) from error
 
 
-def _failed(robots: list[str], error: BaseException, context: StepContext | None = None) -> AgentFailed:
+def failed(robots: list[str], error: BaseException, context: StepContext | None = None) -> AgentFailed:
     """The failure of an agent: its time, and the traceback of the agent's own lines."""
     told = traceback.TracebackException.from_exception(error)
     modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]

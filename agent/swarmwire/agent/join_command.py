@@ -30,6 +30,7 @@ def add_join(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; else as the scenario names it"
     )
+    command.add_argument("--processes", type=int, metavar="N", help="divide the robots between so many; else one each")
     command.add_argument("--scenario", type=Path, metavar="FILE", help="join only a run of exactly this scenario")
     command.add_argument("--name", help="the runner's; else its certificate's, or one made up")
     command.add_argument("--run", metavar="ID", help="which run, if there are several")
@@ -61,7 +62,8 @@ def join_parsed(parsed: argparse.Namespace) -> int:
             name=parsed.name,
             run=parsed.run,
             network=network,
-        )
+        ),
+        parsed.processes,
     )
 
 
@@ -70,8 +72,11 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def join_and_report(settings: "JoinSettings") -> int:
+def join_and_report(settings: "JoinSettings", processes: int | None = None) -> int:
     """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`."""
+    from swarmwire.agent.agent_process import ForkServer
+
+    server = ForkServer()  # before any thread of zenoh
     from swarmwire.agent.joining import join
     from swarmwire.agent.runner import Arrivals
 
@@ -79,7 +84,8 @@ def join_and_report(settings: "JoinSettings") -> int:
         _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
     arrivals = Arrivals()
     with _leaving_by_signals(arrivals):
-        ended = join(settings, arrivals, _say)
+        ended = join(settings, arrivals, _say, server, processes)
+    server.close()
     _say(_END_TEXTS[ended.how] + (f": {ended.why}" if ended.why else ""))
     return _EXIT_CODES[ended.how]
 

@@ -22,9 +22,9 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
+from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.runner import NO_ROBOTS, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, JoinOptions
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.frames import VERSION
@@ -89,8 +89,16 @@ class JoinSettings:
         return f"{host or 'runner'}-{os.getpid()}-{token_hex(2)}"
 
 
-def join(settings: JoinSettings, arrivals: Arrivals, say: Callable[[str], None]) -> Ended:
+def join(
+    settings: JoinSettings,
+    arrivals: Arrivals,
+    say: Callable[[str], None],
+    server: ForkServer,
+    processes: int | None = None,
+) -> Ended:
     """Run robots of a run to its end, or until `arrivals.leave()`; `say` gets messages for the user.
+
+    The robots are divided between so many processes of the server; None: each has one of its own.
 
     BadInput for wrong settings, RunnerLost if the world is not there or refuses the runner.
     """
@@ -113,10 +121,7 @@ def join(settings: JoinSettings, arrivals: Arrivals, say: Callable[[str], None])
             agents, hashes = _local_agents(info, settings, say)
             return JoinOptions(JoinRequest(settings.robots, settings.names, hashes, _sha256(settings.scenario)), agents)
 
-        def joined(assignment: Assignment) -> None:
-            say(f"{runner}: joined run {run_id} with {assignment.robots_text}")
-
-        return play(session, keys, runner, arrivals, options, joined)
+        return play(session, keys, runner, arrivals, options, server, processes, say)
 
 
 def _certificate_hint(settings: JoinSettings) -> str:

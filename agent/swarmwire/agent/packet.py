@@ -3,6 +3,7 @@
 The measurements of the radio medium (range, bearing, RSSI) are read only if the agent's `needs` name them.
 """
 
+from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -114,24 +115,57 @@ class Packets(Generic[M]):
         return measured_column(self._table, self._needs, need, column)
 
 
-class ReceivedLists:
+class ReceivedLists(ABC):
     """The packets of a tick as Python lists, for agents that read them number by number."""
 
-    __slots__ = ("_columns", "_data", "_needs", "_offset", "_payload", "_receiver", "_table")
+    __slots__ = ("_columns", "_needs")
+
+    def __init__(self, needs: tuple[str, ...]) -> None:
+        self._needs = needs
+        self._columns: dict[str, list[Any]] = {}
+
+    @abstractmethod
+    def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
+        """The payloads of one robot row with a tag and, unless it is None, of this size.
+
+        Yields the place in the table, some bytes, and the start and end of the payload in them.
+        """
+
+    @abstractmethod
+    def _list(self, name: str) -> list[Any]:
+        """A column of `ReceivedPackets`, or a measurement in its `given`."""
+
+    def column(self, name: str) -> list[Any]:
+        """A column of the table."""
+        column = self._columns.get(name)
+        if column is None:
+            column = self._columns[name] = self._list(name)
+        return column
+
+    def measured(self, need: str, name: str) -> list[float]:
+        """A measurement of the medium; NotDeclared if the agent's needs do not name it."""
+        column = self._columns.get(name)
+        if column is None:
+            require_measure(self._needs, need)
+            column = self._columns[name] = self._list(name)
+        return column
+
+
+class ListsOfTable(ReceivedLists):
+    """The packets of several robots, from a table."""
+
+    __slots__ = ("_data", "_offset", "_payload", "_receiver", "_table")
 
     def __init__(self, table: ReceivedPackets, needs: tuple[str, ...]) -> None:
-        self._table, self._needs = table, needs
+        super().__init__(needs)
+        self._table = table
         self._receiver: list[int] = table.receiver.tolist()  # they rise
         self._payload: list[int] = table.payload.tolist()
         self._offset: list[int] = table.payloads.offset.tolist()
         self._data = table.payloads.data.tobytes()
-        self._columns: dict[str, list[Any]] = {}
 
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """The payloads of one robot row with a tag and, unless it is None, of this size.
-
-        Yields the place in the table, all bytes, and the start and end of the payload in them.
-        """
+        """The payloads of one robot row with a tag and, unless it is None, of this size."""
         data, offset = self._data, self._offset
         low, high = tag & 0xFF, tag >> 8
         for at in range(bisect_left(self._receiver, row), bisect_right(self._receiver, row)):
@@ -142,19 +176,9 @@ class ReceivedLists:
             if fits and data[start] == low and data[start + 1] == high:
                 yield at, data, start, end
 
-    def column(self, name: str) -> list[Any]:
-        """A column of the table."""
-        column = self._columns.get(name)
-        if column is None:
-            column = self._columns[name] = getattr(self._table, name).tolist()
-        return column
-
-    def measured(self, need: str, name: str) -> list[float]:
-        """A measurement of the medium; NotDeclared if the agent's needs do not name it."""
-        column = self._columns.get(name)
-        if column is None:
-            column = self._columns[name] = measured_column(self._table, self._needs, need, name).tolist()
-        return column
+    def _list(self, name: str) -> list[Any]:
+        column = self._table.given[name] if name in self._table.given else getattr(self._table, name)
+        return column.tolist()
 
 
 class Packet(Generic[M]):
@@ -200,6 +224,11 @@ class Packet(Generic[M]):
 
 def measured_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
     """A measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
+    require_measure(needs, need)
+    return table.given[column]
+
+
+def require_measure(needs: tuple[str, ...], need: str) -> None:
+    """NotDeclared if the agent's needs do not name a measurement of the medium."""
     if need not in needs:
         raise undeclared(need, needs, " of a packet")
-    return table.given[column]

@@ -49,10 +49,7 @@ class Robot(RobotHandle[float]):
         clipped. A command with nan is ignored and the last one holds (`clipped_commands` and `nan_commands` in the
         summary).
         """
-        self._context.drive[self._row] = True
-        self._context.linear_mps[self._row] = linear_mps
-        self._context.angular_radps[self._row] = angular_radps
-        self._context.lateral_mps[self._row] = lateral_mps
+        self._context.command(self._row, linear_mps, angular_radps, lateral_mps)
 
     def wheels(self, left_mps: float, right_mps: float) -> None:
         """Command the speeds of two wheels; they hold until the next command. IncompatibleBody if the body has none."""
@@ -81,8 +78,7 @@ class Robot(RobotHandle[float]):
         self._context.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
-        row = self._row
-        values = [of.item(row) if of.ndim == 1 else of[row] for of in self._context.columns(sensor)]
+        values = self._context.reading(sensor, self._row)
         return sensor.one(*values, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.one(*values)
 
 

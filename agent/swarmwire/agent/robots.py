@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packets
-from swarmwire.agent.step_context import StepContext
+from swarmwire.agent.step_context import GroupContext, StepContext
 from swarmwire.comms import draws
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import Body
@@ -93,7 +93,9 @@ class Robots(RobotHandle[FloatArray]):
 
     __slots__ = ("draw", "radio")
 
-    def __init__(self, context: StepContext) -> None:
+    _context: GroupContext
+
+    def __init__(self, context: GroupContext) -> None:
         super().__init__(context)
         self.radio = RadioRows(context)
         self.draw = Draws(context.keys, context.tick, context.first_draw)
@@ -178,7 +180,7 @@ class Robots(RobotHandle[FloatArray]):
 class RadioRows:
     """The radios of n robots: an unreliable medium."""
 
-    def __init__(self, context: StepContext) -> None:
+    def __init__(self, context: GroupContext) -> None:
         self._context = context
 
     def received(self, kind: type[M]) -> Packets[M]:

@@ -1,30 +1,47 @@
-"""A runner: a process that runs the agents of some robots of a world, over zenoh, in lockstep or in real time.
+"""An agent host: it runs agents of some robots of a world in processes of their own, in lockstep or in real time.
 
-`RunnerProtocol` decides, `RunnerAgents` acts; this adapter carries the bytes. `play` declares the runner's liveliness
-token, finds the world, joins, and answers frames until the end. zenoh's thread puts all that arrives into one queue
-(`Arrivals`): there is no Python thread per subscription, so a runner stays small.
+To the world it is one runner: `RunnerProtocol` decides, and this adapter carries the bytes over one zenoh session.
+`play` declares the runner's liveliness token, finds the world, joins, has its `AgentProcesses` act, and answers.
+zenoh's thread puts all that arrives into one queue (`Arrivals`), and wakes the loop that also waits for the processes.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
+import os
 import queue
-from collections.abc import Callable
-from contextlib import suppress
+import select
+from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
+from typing import Any, cast
 
+import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.runner_agents import RunnerAgents
-from swarmwire.agent.runner_protocol import Assigned, Ended, Event, JoinOptions, RunnerProtocol
-from swarmwire.comms.assignment import Assignment
+from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Answer, Failed, Lost
+from swarmwire.agent.process_frames import in_order, read_actions
+from swarmwire.agent.runner_protocol import (
+    Assigned,
+    Ended,
+    JoinOptions,
+    PacketsBetween,
+    PacketsReceived,
+    RunnerProtocol,
+    Tick,
+)
+from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, RunnerLost
+from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, memory_in
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 
 JOIN_TIMEOUT_S = 60.0  # of each step: as long as a world waits for the next runner to join
 POLL_S = 5.0  # for the world's token
-FAREWELL_TIMEOUT_S = 3.0
+CHECK_S = 0.5  # between two checks of the processes' time
+FAREWELL_TIMEOUT_S = 3.0  # for the world to confirm that the runner leaves
 NO_ROBOTS = ""
 TIMED_OUT = "Timeout"  # zenoh's error for a world that does not answer
 NO_ANSWER = (
@@ -38,19 +55,27 @@ class Arrivals:
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[zenoh.Sample | bool | None] = queue.SimpleQueue()
-        self.put_frame = self._queue.put
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK)
+
+    def fileno(self) -> int:
+        """The file that is readable once something has arrived."""
+        return self._wake
+
+    def put_frame(self, frame: zenoh.Sample) -> None:
+        """Add a frame of the world."""
+        self._put(frame)
 
     def put_token(self, token: zenoh.Sample) -> None:
         """Add that the world's liveliness token appeared or vanished."""
-        self._queue.put(token.kind == zenoh.SampleKind.PUT)
+        self._put(token.kind == zenoh.SampleKind.PUT)
 
     def leave(self) -> None:
         """Leave the run; may be called from a signal handler, and before the start."""
-        self._queue.put(None)
+        self._put(None)
 
-    def empty(self) -> bool:
-        """Whether nothing waits for the protocol."""
-        return self._queue.empty()
+    def _put(self, arrival: zenoh.Sample | bool | None) -> None:
+        self._queue.put(arrival)
+        os.eventfd_write(self._wake, 1)
 
     def pass_on(self, protocol: RunnerProtocol, timeout_s: float | None = None) -> bytes | None:
         """Pass the next arrival to the protocol: a frame to put, or None. queue.Empty after the time-out."""
@@ -63,17 +88,30 @@ class Arrivals:
             protocol.receive_frame(arrived.payload.to_bytes())
         return None
 
+    def pass_on_all(self, protocol: RunnerProtocol) -> list[bytes]:
+        """Pass all arrivals to the protocol: the frames to put."""
+        with suppress(BlockingIOError):
+            os.eventfd_read(self._wake)
+        out = [self.pass_on(protocol) for _ in range(self._queue.qsize())]
+        return [data for data in out if data is not None]
+
     def pass_on_frames(self, protocol: RunnerProtocol) -> None:
         """Pass all frames that have arrived to the protocol; the rest stays."""
         for _ in range(self._queue.qsize()):
             arrived = self._queue.get()
             if arrived is None or isinstance(arrived, bool):
-                self._queue.put(arrived)
+                self._put(arrived)
             else:
                 protocol.receive_frame(arrived.payload.to_bytes())
 
 
-def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], None] = lambda _: None) -> Ended:
+def run(
+    endpoint: str,
+    run_id: str,
+    runner: str,
+    server: ForkServer,
+    processes: int | None = None,
+) -> Ended:
     """Run robots of the run at `endpoint` to its end; RunnerLost without a world, or if it assigns no robots."""
     try:
         session = open_runner(endpoint, JOIN_TIMEOUT_S)
@@ -83,7 +121,7 @@ def run(endpoint: str, run_id: str, runner: str, joined: Callable[[Assignment], 
             runner, NO_ROBOTS, f"no connection to its world within {JOIN_TIMEOUT_S:g} s: {reason}"
         ) from error
     with closed_after(session):
-        return play(session, Keys(run_id), runner, Arrivals(), lambda: NEXT_FREE, joined)
+        return play(session, Keys(run_id), runner, Arrivals(), lambda: NEXT_FREE, server, processes)
 
 
 def play(
@@ -92,9 +130,13 @@ def play(
     runner: str,
     arrivals: Arrivals,
     options: Callable[[], JoinOptions],
-    joined: Callable[[Assignment], None] = lambda _: None,
+    server: ForkServer,
+    processes: int | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Ended:
-    """Run robots of a run. `options` is called once its world is there, `joined` when it has assigned robots.
+    """Run robots of a run in so many processes; None: one per robot.
+
+    `options` is called once its world is there. `say` gets messages for the user: its robots, and those that it loses.
 
     RunnerLost without a world, or if it assigns no robots.
     """
@@ -112,32 +154,156 @@ def play(
         assigned = protocol.receive_assignment(reply)
     except BadFrame as fault:
         raise RunnerLost(runner, NO_ROBOTS, f"the world's answer to join is none: {fault}") from fault
-    joined(assigned.assignment)
+    say(f"{runner}: joined run {run_of(keys.world)} with {assigned.assignment.robots_text}")
     publisher = session.declare_publisher(
         keys.answer(runner), congestion_control=zenoh.CongestionControl.BLOCK, express=True
     )
-    ended = _play_to_end(protocol, assigned, arrivals, publisher)
+    server.load(sorted({group.agent for group in assigned.assignment.groups}))
+    host = AgentHost(protocol, assigned, server, processes, say)
+    try:
+        ended = host.play(arrivals, cast(Callable[[bytes], None], publisher.put))
+    finally:
+        host.close()
     del declared, watched
     return ended
 
 
-def _play_to_end(protocol: RunnerProtocol, assigned: Assigned, arrivals: Arrivals, publisher: zenoh.Publisher) -> Ended:
-    agents = RunnerAgents(protocol, assigned)
-    event: Assigned | Event | None = assigned
-    while not isinstance(event, Ended):
-        data = _next_arrival(protocol, arrivals) if event is None else agents.handle(event)
-        if data is not None:
-            publisher.put(data)
-        event = protocol.next_event() if arrivals.empty() else None
-    return event
+class AgentHost:
+    """The processes of a host, and the frames that it owes to the world."""
+
+    def __init__(
+        self,
+        protocol: RunnerProtocol,
+        assigned: Assigned,
+        server: ForkServer,
+        processes: int | None,
+        say: Callable[[str], None],
+    ) -> None:
+        self._protocol, self._clock, self._say = protocol, WallClock(), say
+        robots = sum(len(group.rows) for group in assigned.assignment.groups)
+        self._processes = AgentProcesses(server, assigned.assignment, processes or robots, assigned.memory)
+        self._timeout_ns = to_ns(assigned.timeout_s)
+        self._within_ns = None if assigned.answer_within_s is None else to_ns(assigned.answer_within_s)
+        self._tick: Tick | None = None  # that is open
+        self._opened_ns = 0
+        self._asked: set[AgentProcess] = set()  # processes whose answer to it is missing
+        self._answers: list[Answer] = []  # to it
+
+    def close(self) -> None:
+        """End the processes."""
+        self._processes.close()
+
+    def play(self, arrivals: Arrivals, put: Callable[[bytes], object]) -> Ended:
+        """Answer the world until the end."""
+        stays_until_ns = 0  # once it leaves
+        with closing(select.epoll()) as files:
+            for file in (arrivals.fileno(), self._processes.fileno()):
+                files.register(file, select.EPOLLIN)
+            while True:
+                if self._protocol.state != "leaving":
+                    stays_until_ns = self._clock.now_ns() + to_ns(FAREWELL_TIMEOUT_S)
+                elif self._clock.now_ns() > stays_until_ns:
+                    self._protocol.leave()  # the world does not confirm it
+                readable = {file for file, _ in files.poll(self._wait_s())}
+                if arrivals.fileno() in readable:
+                    for data in arrivals.pass_on_all(self._protocol):
+                        put(data)
+                if self._processes.fileno() in readable:
+                    for data in self._read():
+                        put(data)
+                for data in self._check_time():
+                    put(data)
+                while (event := self._protocol.next_event()) is not None:
+                    if isinstance(event, Ended):
+                        return event
+                    self._act(event)
+                    if (data := self._complete()) is not None:
+                        put(data)
+
+    def _wait_s(self) -> float:
+        """The time until something has to be checked."""
+        if self._tick is None or self._within_ns is None:
+            return CHECK_S
+        return max(0.0, min(CHECK_S, to_s(self._opened_ns + self._within_ns - self._clock.now_ns())))
+
+    def _act(self, event: Tick | PacketsReceived | PacketsBetween) -> None:
+        now_ns = self._clock.now_ns()
+        match event:
+            case Tick(tick, readings, received, tx_status):
+                self._tick, self._answers, self._opened_ns = event, [], now_ns
+                self._asked = set(self._processes.tick(tick, now_ns, readings, received, tx_status))
+            case PacketsReceived(received, tx_status, tick, at_ns):
+                self._processes.packets(tick, at_ns, now_ns, received, tx_status)
+            case PacketsBetween():  # the processes have the packets already
+                pass
+
+    def _read(self) -> list[bytes]:
+        """Take in what the processes sent: frames for the world."""
+        out: list[bytes] = []
+        for event in self._processes.events(self._clock.now_ns()):
+            match event:
+                case Answer():
+                    out += self._answered(event)
+                case Lost(process, reason):
+                    out.append(self._lost(process, reason))
+                case Failed(process, robots, traceback):
+                    out.append(self._lost(process, "its agent failed", robots, traceback))
+        if self._protocol.state == "joined" and self._processes.are_ready:
+            out.append(self._protocol.ready(len(self._processes)))
+        if (data := self._complete()) is not None:
+            out.append(data)
+        return out
+
+    def _answered(self, answer: Answer) -> list[bytes]:
+        if (
+            answer.process in self._asked
+            and self._tick is not None
+            and answer.tick == self._tick.tick
+            and answer.is_step
+        ):
+            self._asked.discard(answer.process)
+            self._answers.append(answer)
+            return []
+        actions, rests = read_actions([answer.frame])
+        if answer.is_step:  # of an earlier tick, in real time
+            return [self._protocol.answer_late(answer.tick, actions, _memory(rests))]
+        return [self._protocol.send(answer.tick, actions.sent)] if len(actions.sent) else []
+
+    def _lost(self, process: AgentProcess, reason: str, failed: str = "", traceback: str = "") -> bytes:
+        self._asked.discard(process)
+        self._answers = [answer for answer in self._answers if answer.process is not process]
+        self._say(f"lost {process.assignment.robots_text}: {reason}" + (f"\n{traceback.rstrip()}" if traceback else ""))
+        return self._protocol.lose(process.rows, str(process.number), reason, failed, traceback)
+
+    def _check_time(self) -> list[bytes]:
+        """Lose processes that are silent; in real time, leave out those that are late."""
+        now_ns, out = self._clock.now_ns(), list[bytes]()
+        for process in self._processes.silent(now_ns, self._timeout_ns):
+            out.append(self._lost(*self._processes.lose(process, f"no answer for {to_s(self._timeout_ns):g} s")))
+        if self._within_ns is not None and now_ns - self._opened_ns >= self._within_ns:
+            self._asked.clear()
+        if (data := self._complete()) is not None:
+            out.append(data)
+        return out
+
+    def _complete(self) -> bytes | None:
+        """The answer to the open tick, once no process is missing."""
+        if self._tick is None or self._asked or not self._processes or self._protocol.state != "acting":
+            return None
+        actions, rests = read_actions([answer.frame for answer in self._answers])
+        wanted = np.concatenate([np.empty(0, np.int64), *(group.rows for group in self._tick.readings.values())])
+        self._tick = None
+        return self._protocol.answer(in_order(actions, wanted), _memory(rests))
 
 
-def _next_arrival(protocol: RunnerProtocol, arrivals: Arrivals) -> bytes | None:
-    """Pass on the next arrival: a frame to put, or None."""
-    try:
-        return arrivals.pass_on(protocol, FAREWELL_TIMEOUT_S if protocol.state == "leaving" else None)
-    except queue.Empty:
-        return protocol.leave()  # again: the world does not confirm
+def _memory(rests: Sequence[dict[str, Any]]) -> Memory | None:
+    """The memory in the answers of processes, by group; None if they keep none."""
+    parts: dict[str, list[GroupMemory]] = {}
+    for rest in rests:
+        if "memory" in rest:
+            for name, memory in memory_in(frames.decode(rest["memory"])).items():
+                parts.setdefault(name, []).append(memory)
+    return {name: GroupMemory.joined(of) for name, of in parts.items()} or None
 
 
 def _watched_world(

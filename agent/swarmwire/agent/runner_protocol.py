@@ -6,9 +6,9 @@
     joined     is ready  ready    `ready`, once the agents are made
     ready      is asked  acting   the event `Tick`
     acting     answers   ready    `answer`
-    ready      sends     ready    `send`, at the event `PacketsBetween`
-    these 3    fails     failed   `fail`; the runner stays until the world ends the run
-    and failed leaves    leaving  `leave`; the runner stays until the world confirms it
+    ready      sends     ready    `send`, at the event `PacketsBetween`, and `answer_late`
+    ready      loses     ready    `lose`, as the robots of a process are lost; so do joined and acting
+    these 3    leaves    leaving  `leave`; the runner stays until the world confirms it
     all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
 
 The caller passes on all that has arrived, then takes events from `next_event` until there are none. So of the frames
@@ -26,6 +26,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from msgspec import Struct
+
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
@@ -37,16 +39,15 @@ from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
-State = Literal["searching", "joining", "joined", "ready", "acting", "failed", "leaving", "ended"]
-Move = Literal["finds", "joins", "is ready", "is asked", "answers", "sends", "fails", "leaves", "ends"]
+State = Literal["searching", "joining", "joined", "ready", "acting", "leaving", "ended"]
+Move = Literal["finds", "joins", "is ready", "is asked", "answers", "sends", "leaves", "ends"]
 
 MOVES: dict[State, dict[Move, State]] = {
     "searching": {"finds": "joining", "ends": "ended"},
     "joining": {"joins": "joined", "ends": "ended"},
-    "joined": {"is ready": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
-    "ready": {"is asked": "acting", "sends": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
-    "acting": {"answers": "ready", "fails": "failed", "leaves": "leaving", "ends": "ended"},
-    "failed": {"leaves": "leaving", "ends": "ended"},
+    "joined": {"is ready": "ready", "leaves": "leaving", "ends": "ended"},
+    "ready": {"is asked": "acting", "sends": "ready", "leaves": "leaving", "ends": "ended"},
+    "acting": {"answers": "ready", "leaves": "leaving", "ends": "ended"},
     "leaving": {"ends": "ended"},
     "ended": {},
 }
@@ -64,7 +65,9 @@ class Assigned(NamedTuple):
     """The robots of the runner, and the memory of earlier agents of them; None: the world keeps no memory."""
 
     assignment: Assignment
-    memory: Frame | None
+    memory: bytes | None  # a frame
+    timeout_s: float = 10.0  # a process that does not answer for so long is lost
+    answer_within_s: float | None = None  # in real time, the time after which late processes are left out
 
 
 class Tick(NamedTuple):
@@ -81,6 +84,8 @@ class PacketsReceived(NamedTuple):
 
     received: ReceivedPackets
     tx_status: TxStatuses
+    tick: int
+    at_ns: int  # of simulated time
 
 
 class PacketsBetween(NamedTuple):
@@ -95,6 +100,13 @@ class Ended(NamedTuple):
 
     how: Literal["over", "left", "removed", "gone"]
     why: str = ""  # the world's reason, if it removed the runner
+
+
+class _Times(Struct):
+    """The times in a reply to a request."""
+
+    timeout_s: float = 10.0
+    answer_within_s: float | None = None
 
 
 Event = Tick | PacketsReceived | PacketsBetween | Ended
@@ -145,7 +157,12 @@ class RunnerProtocol:
             raise BadFrame("malformed", "groups: expected at least one")
         if memory is not None and not isinstance(memory, bytes):
             raise BadFrame("malformed", "memory: expected a frame")
-        assigned = Assigned(assignment, None if memory is None else frames.decode(memory))
+        if memory is not None:
+            frames.decode(memory)
+        times = frames.typed(
+            _Times, {name: reply[name] for name in ("timeout_s", "answer_within_s") if name in reply}, ""
+        )
+        assigned = Assigned(assignment, memory, times.timeout_s, times.answer_within_s)
         self._rows = {group.name: group.rows for group in assignment.groups}
         self._measures = assignment.measures or ()
         self._period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
@@ -160,7 +177,7 @@ class RunnerProtocol:
                 raise BadFrame("unexpected_kind", frame.kind)
             if frame.kind == "end":
                 self._end(self._ended_by(frame))
-            elif self.state in ("failed", "leaving"):
+            elif self.state == "leaving":
                 raise BadFrame("unexpected_kind", frame.kind)
             elif frame.kind == "packets":
                 self._receive_packets(frame)
@@ -183,10 +200,10 @@ class RunnerProtocol:
         self._move("is asked")
         return tick
 
-    def ready(self) -> bytes:
-        """The agents are made: a frame "ready"."""
+    def ready(self, processes: int = 1) -> bytes:
+        """The agents are made, in so many processes: a frame "ready"."""
         self._move("is ready")
-        return frames.encode("ready", -1, {})
+        return frames.encode("ready", -1, {}, {"processes": processes})
 
     def answer(self, actions: Actions, memory: Memory | None = None) -> bytes:
         """The answer to the last `Tick`: a frame "actions", with the agents' memory if the world keeps any."""
@@ -196,18 +213,26 @@ class RunnerProtocol:
         self._move("answers")
         return data
 
+    def answer_late(self, tick: int, actions: Actions, memory: Memory | None = None) -> bytes:
+        """The actions of robots that `answer` left out, in real time: a frame "actions" for a tick before."""
+        self._require_robots()
+        return encode_actions(tick, actions, 0, memory)
+
+    def lose(self, rows: IntArray, process: str, reason: str, failed: str = "", traceback: str = "") -> bytes:
+        """Robots are lost, since their process is: a frame "lost"; with the robots whose agent failed, if one did.
+
+        They are none of this runner's any more, but may still be in a tick that the world has sent before it reads so.
+        """
+        if self.state != "joined":
+            self._require_robots()
+        agent = {"robots": failed, "traceback": traceback} if failed else {}
+        return frames.encode("lost", -1, {"rows": rows}, {"process": process, "reason": reason, **agent})
+
     def send(self, tick: int, sent: SentPackets) -> bytes:
         """Packets that the agents sent at `PacketsBetween`: a frame "sent"."""
-        self._require("sends")
+        self._require_robots()
         data = encode_sent(tick, sent, self.missed)
         self.missed = 0
-        return data
-
-    def fail(self, robots: str, traceback: str) -> bytes:
-        """The agents of these robots failed: a frame "failed". The world has to read it before the token vanishes."""
-        data = frames.encode("failed", -1, {}, {"robots": robots, "traceback": traceback})
-        self._move("fails")
-        self._drop_waiting()
         return data
 
     def leave(self) -> bytes | None:
@@ -231,7 +256,7 @@ class RunnerProtocol:
         at_ns, number, received, tx_status = decode_packets(frame, self._measures)
         self.missed += max(0, number - self._next_number)
         self._next_number = number + 1
-        self._packets.append(PacketsReceived(received, tx_status))
+        self._packets.append(PacketsReceived(received, tx_status, frame.tick, at_ns))
         self._between = PacketsBetween(frame.tick, at_ns)
 
     def _ended_by(self, frame: Frame) -> Ended:
@@ -251,6 +276,11 @@ class RunnerProtocol:
         self.dropped += len(self._packets) + (self._newest is not None)
         self._packets.clear()
         self._newest = self._between = None
+
+    def _require_robots(self) -> None:
+        """RuntimeError unless the robots' agents are made."""
+        if self.state != "acting":
+            self._require("sends")
 
     def _require(self, move: Move) -> None:
         if move not in MOVES[self.state]:

@@ -1,15 +1,18 @@
-"""One tick of one group as arrays: the readings and packets of its robots, and the actions that they build up.
+"""One tick of one group: the readings and packets of its robots, and the actions that they build up.
 
-Both handles, `Robot` and `Robots`, are views of a `StepContext`. After the step, `end` or `end_receive` returns the
-actions, and the context refuses any further use.
+Both handles, `Robot` and `Robots`, are views of a `StepContext`. `GroupContext` has the robots of a group as arrays;
+`one_robot.RobotContext` has one robot without arrays. After the step, `end` or `end_receive` returns the actions, and
+the context refuses any further use.
 """
 
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.agent.packet import Packets, ReceivedLists, undeclared
+from swarmwire.agent.packet import ListsOfTable, Packets, ReceivedLists, undeclared
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.bodies.body import IncompatibleBody
@@ -22,123 +25,53 @@ M = TypeVar("M", bound=Message)
 TX_STATUS = "radio.tx_status"  # the need for tx statuses of addressed packets
 
 
-class StepContext:
-    """The robots `readings.rows` of a group in one tick.
-
-    `received.receiver` and `tx_status.row` count these rows from 0.
-    """
+class StepContext(ABC):
+    """Some robots of a group in one tick: what the contexts of one robot and of many share."""
 
     def __init__(
         self,
         group: GroupAssignment,
         needs: tuple[str, ...],
         time: tuple[int, int, int],
-        readings: GroupReadings,
-        received: ReceivedPackets,
-        tx_status: TxStatuses,
         keys: KeyArray,
-        sent_before: IntArray,
         first_draw: int = 0,
     ) -> None:
+        """`time` is the tick, its start and the robots' period in ns; `keys` (n,) are of the robots' draws."""
         self.first_draw = first_draw  # number of this context's first call for each purpose in this tick
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
-        self.readings, self.received = readings, received
-        self._tx_status, self._needs_tx_status = tx_status, TX_STATUS in needs
-        self.tx_status_rows = tx_status.row  # (k,) places of the robots with a status
-        self.keys = keys  # (n,) of the robots' draws
-        self.n = len(readings.rows)
-        self.drive = np.zeros(self.n, np.bool_)
-        self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
-        self._sent_before = sent_before  # (n,) packets that each robot has sent so far; updated here
-        self._outbox: list[SentPackets] = []
+        self.keys, self.n = keys, len(keys)
+        self._needs_tx_status = TX_STATUS in needs
         self._states: dict[str, int] = {}  # noted in this tick -> index
         self._tables: dict[str, FloatArray] = {}  # by name in TABLES: (n, places); NaN: not set in this tick
-        self._packets: dict[type[Message], Packets[Any]] = {}
-        self._lists: ReceivedLists | None = None
 
-    def columns(self, sensor: SensorProperty[Any, Any]) -> list[FloatArray]:
-        """The fields of a built-in sensor, (n, …) each; NotDeclared if the agent's needs do not name the sensor."""
-        self._require(sensor.name)
-        return [*map(self.readings.fields.__getitem__, sensor.columns)]
+    @abstractmethod
+    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
+        """The fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
 
-    def fields(self, sensor: str) -> dict[str, FloatArray]:
-        """All fields of a sensor, (n, …) each, by name; NotDeclared if the agent's needs do not name the sensor."""
-        self._require(sensor)
-        prefix, fields = f"{sensor}.", self.readings.fields
-        return {name.removeprefix(prefix): values for name, values in fields.items() if name.startswith(prefix)}
+    @abstractmethod
+    def fields(self, sensor: str) -> Mapping[str, Any]:
+        """All fields of a sensor by name, each with a value per robot: a float or (width,).
 
-    def tx_status(self) -> TxStatuses:
-        """Tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
-        self._require(TX_STATUS)
-        return self._tx_status
-
-    def packets(self, kind: type[M]) -> Packets[M]:
-        """All packets of a message class that these robots received."""
-        packets = self._packets.get(kind)
-        if packets is None:
-            message_class(kind)
-            table = self.received
-            fields = decode_alike(kind, table.payloads, table.payload)
-            if fields is None:  # messages of several classes were received
-                table = self.tagged(kind.tag, kind.size_bytes)
-                fields = decode_rows(kind, table.payloads, table.payload)
-            packets = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
-        return packets
+        NotDeclared if the agent's needs do not name the sensor.
+        """
 
     @property
+    @abstractmethod
     def received_lists(self) -> ReceivedLists:
         """All packets that these robots received, for agents of one robot each."""
-        if self._lists is None:
-            self._lists = ReceivedLists(self.received, self.needs)
-        return self._lists
 
-    def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:
-        """The received packets with a tag and, unless it is None, of this size."""
-        matches = self.received.payloads.tags() == tag
-        if size_bytes is not None:
-            matches &= self.received.payloads.sizes == size_bytes
-        if matches.all():
-            return self.received
-        return self.received.select(np.flatnonzero(matches[self.received.payload]))
+    @abstractmethod
+    def tx_status(self) -> TxStatuses:
+        """Tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
 
-    def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
-        """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
-        place = slice(None) if row is None else row
-        receiver = np.empty(len(payloads), np.int64)
-        receiver.fill(BROADCAST)
-        if to is not None:
-            receiver[:] = to
-            if (receiver < 0).any() or (receiver != to).any():
-                raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
-        ids = self._sent_before[place].copy()
-        self._sent_before[place] += 1
-        # Without the need there are no statuses, and none crosses the wire.
-        tx_status_id = np.where(receiver == BROADCAST, NOT_MEASURED, ids) if self._needs_tx_status else None
-        self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
-        return ids
+    @abstractmethod
+    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+        """Command one robot's speeds; the last command of a tick counts."""
 
+    @abstractmethod
     def send_one(self, place: int, to: int | None, payload: bytes) -> int:
         """Queue a packet of one robot; returns its id."""
-        if to is None:
-            receiver = BROADCAST
-        elif to < 0 or int(to) != to:
-            raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
-        else:
-            receiver = int(to)
-        id_ = self._sent_before.item(place)
-        self._sent_before[place] = id_ + 1
-        tx_status_id = np.array((NOT_MEASURED if to is None else id_,)) if self._needs_tx_status else None
-        sender = self.readings.rows[place : place + 1]
-        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
-        return id_
-
-    def mask(self, rows: BoolArray) -> BoolArray:
-        """The mask of a VectorAgent; TypeError unless it is bool (n,)."""
-        mask = np.asarray(rows)
-        if mask.dtype != np.bool_ or mask.shape != (self.n,):
-            raise TypeError(f"rows: expected a mask, bool ({self.n},), got {mask.dtype} {mask.shape}")
-        return mask
 
     def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
         """Note a state of some robots, and a number: (n,) or one for all. The last note of a tick counts.
@@ -198,16 +131,156 @@ class StepContext:
             raise ValueError(f"actuate({name!r}, …): expected finite numbers, got {values!r}")
         columns[selected] = numbers
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):
+            raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
+
+    def _table(self, name: str, places: int) -> FloatArray:
+        """The numbers that were set in this tick, to write into."""
+        if name not in self._tables:
+            self._tables[name] = np.full((self.n, places), np.nan)
+        return self._tables[name]
+
+    def _require(self, need: str) -> None:
+        if need not in self.needs:
+            raise undeclared(need, self.needs)
+
+
+def receiver_of(to: int | None) -> int:
+    """The number of the receiver in a frame; ValueError unless `to` is None or the index of a robot."""
+    if to is None:
+        return BROADCAST
+    if to < 0 or int(to) != to:
+        raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
+    return int(to)
+
+
+class GroupContext(StepContext):
+    """The robots `readings.rows` of a group in one tick, as arrays.
+
+    `received.receiver` and `tx_status.row` count these rows from 0.
+    """
+
+    def __init__(
+        self,
+        group: GroupAssignment,
+        needs: tuple[str, ...],
+        time: tuple[int, int, int],
+        readings: GroupReadings,
+        received: ReceivedPackets,
+        tx_status: TxStatuses,
+        keys: KeyArray,
+        sent_before: IntArray,
+        first_draw: int = 0,
+    ) -> None:
+        super().__init__(group, needs, time, keys, first_draw)
+        self.readings, self.received = readings, received
+        self._tx_status = tx_status
+        self.tx_status_rows = tx_status.row  # (k,) places of the robots with a status
+        self.drive = np.zeros(self.n, np.bool_)
+        self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
+        self._sent_before = sent_before  # (n,) packets that each robot has sent so far; updated here
+        self._outbox: list[SentPackets] = []
+        self._packets: dict[type[Message], Packets[Any]] = {}
+        self._lists: ReceivedLists | None = None
+
+    def columns(self, sensor: SensorProperty[Any, Any]) -> list[FloatArray]:
+        """The fields of a built-in sensor, (n, …) each; NotDeclared if the agent's needs do not name the sensor."""
+        self._require(sensor.name)
+        return [*map(self.readings.fields.__getitem__, sensor.columns)]
+
+    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
+        """The fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
+        return [of.item(place) if of.ndim == 1 else of[place] for of in self.columns(sensor)]
+
+    def fields(self, sensor: str) -> dict[str, FloatArray]:
+        """All fields of a sensor, (n, …) each, by name; NotDeclared if the agent's needs do not name the sensor."""
+        self._require(sensor)
+        prefix, fields = f"{sensor}.", self.readings.fields
+        return {name.removeprefix(prefix): values for name, values in fields.items() if name.startswith(prefix)}
+
+    def tx_status(self) -> TxStatuses:
+        """Tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
+        self._require(TX_STATUS)
+        return self._tx_status
+
+    def packets(self, kind: type[M]) -> Packets[M]:
+        """All packets of a message class that these robots received."""
+        packets = self._packets.get(kind)
+        if packets is None:
+            message_class(kind)
+            table = self.received
+            fields = decode_alike(kind, table.payloads, table.payload)
+            if fields is None:  # messages of several classes were received
+                table = self.tagged(kind.tag, kind.size_bytes)
+                fields = decode_rows(kind, table.payloads, table.payload)
+            packets = self._packets[kind] = Packets[M](self.n, table, fields, self.needs)
+        return packets
+
+    @property
+    def received_lists(self) -> ReceivedLists:
+        """All packets that these robots received, for agents of one robot each."""
+        if self._lists is None:
+            self._lists = ListsOfTable(self.received, self.needs)
+        return self._lists
+
+    def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:
+        """The received packets with a tag and, unless it is None, of this size."""
+        matches = self.received.payloads.tags() == tag
+        if size_bytes is not None:
+            matches &= self.received.payloads.sizes == size_bytes
+        if matches.all():
+            return self.received
+        return self.received.select(np.flatnonzero(matches[self.received.payload]))
+
+    def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
+        """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
+        place = slice(None) if row is None else row
+        receiver = np.empty(len(payloads), np.int64)
+        receiver.fill(BROADCAST)
+        if to is not None:
+            receiver[:] = to
+            if (receiver < 0).any() or (receiver != to).any():
+                raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
+        ids = self._sent_before[place].copy()
+        self._sent_before[place] += 1
+        # Without the need there are no statuses, and none crosses the wire.
+        tx_status_id = np.where(receiver == BROADCAST, NOT_MEASURED, ids) if self._needs_tx_status else None
+        self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
+        return ids
+
+    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+        """Command one robot's speeds; the last command of a tick counts."""
+        self.drive[place] = True
+        self.linear_mps[place], self.angular_radps[place], self.lateral_mps[place] = (
+            linear_mps,
+            angular_radps,
+            lateral_mps,
+        )
+
+    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet of one robot; returns its id."""
+        receiver = receiver_of(to)
+        id_ = self._sent_before.item(place)
+        self._sent_before[place] = id_ + 1
+        tx_status_id = np.array((NOT_MEASURED if to is None else id_,)) if self._needs_tx_status else None
+        sender = self.readings.rows[place : place + 1]
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
+        return id_
+
+    def mask(self, rows: BoolArray) -> BoolArray:
+        """The mask of a VectorAgent; TypeError unless it is bool (n,)."""
+        mask = np.asarray(rows)
+        if mask.dtype != np.bool_ or mask.shape != (self.n,):
+            raise TypeError(f"rows: expected a mask, bool ({self.n},), got {mask.dtype} {mask.shape}")
+        return mask
+
     def end(self) -> Actions:
         """The robots' actions; handles of this tick raise RuntimeError from now on."""
         actions = self._actions()
         vars(self).clear()
         return actions
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name):
-            raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
 
     def end_receive(self) -> SentPackets:
         """The packets that the robots sent in `on_receive`; RuntimeError if they acted in another way."""
@@ -224,13 +297,3 @@ class StepContext:
             for name, values in self._tables.items()
         }
         return Actions(self.readings.rows, self.drive, *command, sent, **tables)
-
-    def _table(self, name: str, places: int) -> FloatArray:
-        """The numbers that were set in this tick, to write into."""
-        if name not in self._tables:
-            self._tables[name] = np.full((self.n, places), np.nan)
-        return self._tables[name]
-
-    def _require(self, need: str) -> None:
-        if need not in self.needs:
-            raise undeclared(need, self.needs)

@@ -124,6 +124,31 @@ def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
     }
 
 
+def split(assignment: Assignment, runners: int) -> list[Assignment]:
+    """Split an assignment into nearly equal parts along the robot rows, at most one part per robot."""
+    rows = np.sort(np.concatenate([group.rows for group in assignment.groups]))
+    return [part_of(assignment, part) for part in np.array_split(rows, min(runners, len(rows)))]
+
+
+def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
+    """The part of an assignment that lies in these rows."""
+    groups: list[GroupAssignment] = []
+    for group in assignment.groups:
+        selected = np.flatnonzero(np.isin(group.rows, rows))
+        if len(selected):
+            names = tuple(group.robot_names[i] for i in selected)
+            groups.append(
+                replace(
+                    group,
+                    params=params_of(group.params, selected),
+                    rows=group.rows[selected],
+                    robot_names=names,
+                    keys=group.keys[selected],
+                )
+            )
+    return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
+
+
 def robots_text(names: list[str]) -> str:
     """Robot names in a few words.
 

@@ -98,6 +98,20 @@ class Actions:
     actuators: SparseTable = NOTHING_SET  # place: among the numbers of all custom actuators of the body
     values: SparseTable = NOTHING_SET  # numbers that agents noted, such as `note(value=1.25)`
 
+    def of(self, rows: IntArray) -> "Actions":
+        """The part of these robot rows, (m,)."""
+        kept = np.isin(self.rows, rows)
+        tables = {name: getattr(self, name) for name in TABLES}
+        return Actions(
+            self.rows[kept],
+            self.drive[kept],
+            self.linear_mps[kept],
+            self.angular_radps[kept],
+            self.lateral_mps[kept],
+            self.sent.select(np.flatnonzero(np.isin(self.sent.sender, rows))),
+            **{name: table.select(np.flatnonzero(np.isin(table.rows, rows))) for name, table in tables.items()},
+        )
+
     @classmethod
     def joined(cls, parts: "list[Actions]") -> "Actions":
         """The actions of all parts."""

@@ -17,7 +17,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.gateways.serving import Served
-from swarmwire.deploy.runners import RunnerProcesses, local_endpoint
+from swarmwire.deploy.runners import AGENT_HOST, RunnerProcesses, local_endpoint
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.pacing import Pace
@@ -28,6 +28,8 @@ from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
 
+ANSWER_WITHIN = 0.8  # of a tick of real time, after which a host answers without its late processes
+HOST_GRACE_S = 1.0  # beyond the time-out of a process: its host has to report that it does not answer
 KEPT = ("wait", "stand", "coast")  # answers to a lost runner after which another may take over
 
 
@@ -85,8 +87,6 @@ class Backends:
         def trouble() -> str | None:
             return processes[0].trouble() if processes else None
 
-        parts = assignments.split(whole, self.runners)
-        names = [f"r{i}" for i in range(len(parts))]
         with local_endpoint(self.socket) as endpoint:
             around = BackendHooks(
                 trouble,
@@ -95,11 +95,12 @@ class Backends:
                 lambda change, _: self._changed(change),
                 self._refused,
             )
-            backend = self._remote(endpoint, parts, around)
+            backend = self._remote(endpoint, [whole], around)
             try:
                 backend.open()
                 specs = sorted(set(self.agents.values()))
-                processes.append(RunnerProcesses(endpoint, self.run_id, specs, names, waited_for=self.pace is None))
+                waited_for = self.pace is None
+                processes.append(RunnerProcesses(endpoint, self.run_id, specs, self.runners, waited_for=waited_for))
                 yield backend
             finally:
                 backend.close()
@@ -122,7 +123,7 @@ class Backends:
         def opened(endpoints: tuple[str, ...]) -> None:
             observer.opened(endpoints, self.run_id)
 
-        return BackendHooks(lambda: None, self.stopped, self.lost, changed, refused, opened)
+        return BackendHooks(lambda: None, self.stopped, self._lost, changed, refused, opened)
 
     def _changed(self, change: RunnerEvent) -> None:
         self.changed(change)
@@ -137,7 +138,7 @@ class Backends:
     ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
         policy = self._join_policy(factor)
-        timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
+        timeout_s, on_loss = table.runner_timeout_s + HOST_GRACE_S, table.on_runner_loss
         if self.pace:
             return RealTimeBackend(
                 door,
@@ -160,8 +161,10 @@ class Backends:
         kinds = {group: load_agent(spec) for group, spec in self.agents.items()}
         memory = {group: layout_of(kind) for group, kind in kinds.items()}
         kept = memory if scenario.run.on_runner_loss in KEPT else None
+        timeout_s = scenario.run.runner_timeout_s
+        answer_within_s = None if factor is None else ANSWER_WITHIN / (factor * static.rate_hz)
         if listening is None:
-            return JoinPolicy(memory=kept)
+            return JoinPolicy(memory=kept, timeout_s=timeout_s, answer_within_s=answer_within_s)
         groups = tuple(
             GroupInfo(
                 name=group.name,
@@ -181,16 +184,21 @@ class Backends:
             real_time=factor,
             groups=groups,
         )
-        return JoinPolicy(session_info, True, listening.start_with, listening.limits, kept)
+        return JoinPolicy(session_info, True, listening.start_with, listening.limits, kept, timeout_s, answer_within_s)
+
+    def _lost(self, loss: Loss) -> None:
+        self.lost(loss)
+        if loss.traceback:
+            self.say(loss.traceback.rstrip())
 
     def _survive(self, loss: Loss, endpoint: str) -> None:
         """Tell people of a runner that was lost, and of what they can do."""
-        self.lost(loss)
+        self._lost(loss)
         if self.scenario.run.on_runner_loss == "dead":
             self.say(f"lost runner {loss}; its robots stand still")
             return
         agents = ",".join(sorted(set(self.agents.values())))
-        takeover = f"python -m swarmwire.agent.agent_host {endpoint} {self.run_id} {agents} NAME"
+        takeover = f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME PROCESSES"
         until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
         self.say(f"lost runner {loss}; {until}, such as: {takeover}")
 

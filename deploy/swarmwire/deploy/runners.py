@@ -1,8 +1,7 @@
-"""Runner processes on this machine: where they meet the world, and the agent host that forks them."""
+"""The agent host on this machine: where it meets the world, and its process."""
 
 import os
 import secrets
-import selectors
 import shutil
 import signal
 import socket
@@ -81,24 +80,30 @@ def check_socket(path: Path) -> None:
 
 
 LEAVE_S = 3.0
+AGENT_HOST = "swarmwire.agent.agent_host"  # the program
 
 
 class RunnerProcesses:
-    """The processes of all runners of one run; none of them outlives `stop` or this process."""
-
-    program = "swarmwire.agent.agent_host"  # that forks them
+    """The agent host of a run and its processes; none of them outlives `stop` or this process."""
 
     def __init__(
-        self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool = False
+        self,
+        endpoint: str,
+        run_id: str,
+        agents: Sequence[str],
+        processes: int,
+        *,
+        name: str = "host",
+        waited_for: bool = False,
     ) -> None:
         """`waited_for` says whether the world waits for each answer, so that nothing is gained by a quick start."""
-        command = [sys.executable, "-m", self.program, endpoint, run_id, ",".join(agents), *names]
+        command = [sys.executable, "-m", AGENT_HOST, endpoint, run_id, ",".join(agents), name, str(processes)]
         # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS
         # thread: a runner's arrays are small, idle threads double its memory. What this process can import, they can.
         self._agent_host = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            stdout=2,  # prints of agents are no result of this process
             start_new_session=True,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
@@ -107,28 +112,19 @@ class RunnerProcesses:
             # a tenth less of processor time. The agent host's children have it from the agent host.
             with suppress(OSError):
                 os.sched_setscheduler(self._agent_host.pid, os.SCHED_BATCH, os.sched_param(0))
-        self._reports = selectors.DefaultSelector()
-        if self._agent_host.stdout is not None:
-            self._reports.register(self._agent_host.stdout, selectors.EVENT_READ)
 
     def trouble(self) -> str | None:
-        """What happened to a runner that ended badly, in words; None while all is well."""
-        if self._agent_host.poll() is not None:
-            return f"the runners' processes ended early (exit code {self._agent_host.returncode})"
-        stdout = self._agent_host.stdout
-        if stdout is not None and self._reports.select(timeout=0):
-            name, _, code = stdout.readline().decode().strip().partition(" ")
-            return f"the process of runner {name} ended with exit code {code}"
-        return None
+        """That the agent host ended early, in words; None while all is well."""
+        if self._agent_host.poll() is None:
+            return None
+        return f"the agent host ended early (exit code {self._agent_host.returncode})"
 
     def stop(self) -> None:
-        """Wait a moment for the runners to leave, then end those that are left."""
-        self._reports.close()
+        """Wait a moment for the host to leave, then end all that are left."""
         with suppress(subprocess.TimeoutExpired):
             self._agent_host.wait(LEAVE_S)
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._agent_host.pid, signal.SIGKILL)
         self._agent_host.wait()
-        for stream in (self._agent_host.stdin, self._agent_host.stdout):
-            if stream is not None:
-                stream.close()
+        if self._agent_host.stdin is not None:
+            self._agent_host.stdin.close()

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
@@ -14,17 +14,11 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import run
 from tests.support.agent.hosts import spec
-from tests.support.agent.made_up_world import MadeUpWorld, made_up_world
+from tests.support.agent.made_up_world import REFUSED, MadeUpWorld, made_up_world
 from tests.support.clocks import until
 
 END = frames.encode("end", -1, {})
 TIMEOUT_S = 60.0
-TWO_AT_ONCE = """
-import sys
-from swarmwire.agent import agent_host
-agent_host.AT_ONCE = 2
-sys.exit(agent_host.main(sys.argv[1:]))
-"""
 LANES = """
 from swarmwire.agent import PerRobot, Robots, State, VectorAgent, per_robot
 
@@ -57,22 +51,21 @@ params = { lane = [0, 1, 2, 3] }
 
 
 class AgentHost:
-    """An agent host with a pipe to its life line and one from its reports; `program` starts it."""
+    """An agent host of two processes, with a pipe to its life line."""
 
-    def __init__(
-        self, endpoint: str, *names: str, program: Sequence[str] = ("-m", "swarmwire.agent.agent_host")
-    ) -> None:
-        command = [sys.executable, *program, endpoint, "run1", spec("Counter"), *names]
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+    def __init__(self, endpoint: str) -> None:
+        command = [sys.executable, "-m", "swarmwire.agent.agent_host", endpoint, "run1", spec("Counter"), "host", "2"]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
-    def ended(self) -> tuple[int, str, str]:
-        """Its exit code, what it reported, and what people were told."""
-        assert self.process.stdout
+    def family(self) -> list[psutil.Process]:
+        """Its fork server and its agent processes."""
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def ended(self) -> tuple[int, str]:
+        """Its exit code, and what people read."""
         assert self.process.stderr
         code = self.process.wait(TIMEOUT_S)
-        return code, self.process.stdout.read(), self.process.stderr.read()
+        return code, self.process.stderr.read()
 
 
 @pytest.fixture
@@ -84,63 +77,60 @@ def started() -> Iterator[list[AgentHost]]:
             process.kill()
 
 
-def ready(world: MadeUpWorld, runners: int) -> None:
-    until(lambda: len([frame for frame in world.answers if frame.kind == "ready"]) == runners)
+def ready(world: MadeUpWorld) -> None:
+    until(lambda: [frame for frame in world.answers if frame.kind == "ready"])
 
 
-def test_runners_that_play_to_the_end_are_not_reported(started: list[AgentHost]) -> None:
+def close_life_line(agent_host: AgentHost) -> None:
+    assert agent_host.process.stdin
+    agent_host.process.stdin.close()
+
+
+def test_one_host_asks_for_all_robots_at_once_and_leaves_with_the_end(started: list[AgentHost]) -> None:
     with made_up_world() as world:
-        world.to_send = [END, END]
-        started.append(agent_host := AgentHost(world.endpoint, "r1", "r2"))
-        assert agent_host.ended() == (0, "", "")
+        world.to_send = [END]
+        started.append(agent_host := AgentHost(world.endpoint))
+        assert agent_host.ended() == (0, "")
+    assert len(world.asked) == 1
+    assert [(frame.kind, frame.values["processes"]) for frame in world.answers] == [("ready", 2)]
 
 
-def test_only_some_ask_for_robots_at_a_time_and_the_others_follow_as_these_have_theirs(
-    started: list[AgentHost],
+def test_a_host_without_robots_ends_with_the_worlds_reason(started: list[AgentHost]) -> None:
+    with made_up_world(join=None) as world:
+        started.append(agent_host := AgentHost(world.endpoint))
+        code, errors = agent_host.ended()
+    assert code == 1
+    assert REFUSED in errors
+
+
+@pytest.mark.parametrize("end", [close_life_line, lambda agent_host: agent_host.process.kill()], ids=["world", "host"])
+def test_no_process_outlives_the_world_or_its_host(
+    started: list[AgentHost], end: Callable[[AgentHost], object]
 ) -> None:
-    names = [f"r{i}" for i in range(5)]
     with made_up_world() as world:
-        world.holds = True
-        started.append(agent_host := AgentHost(world.endpoint, *names, program=("-c", TWO_AT_ONCE)))
-        until(lambda: len(world.asked) == 2)
-        assert len(psutil.Process(agent_host.process.pid).children()) == 2  # the others were not even forked
-        world.go_on()
-        ready(world, len(names))
-        assert len(world.asked) == len(names)
+        started.append(agent_host := AgentHost(world.endpoint))
+        ready(world)
+        family = agent_host.family()
+        assert len(family) == 3  # the fork server, and two that it forked
+        end(agent_host)
+        agent_host.process.wait(TIMEOUT_S)
+        _, alive = psutil.wait_procs(family, timeout=TIMEOUT_S)
+        assert not alive
 
 
-def test_who_cannot_join_makes_room_for_the_next(started: list[AgentHost]) -> None:
-    with made_up_world(join=None) as world:
-        started.append(agent_host := AgentHost(world.endpoint, "r1", "r2", "r3", program=("-c", TWO_AT_ONCE)))
-        assert sorted(agent_host.ended()[1].splitlines()) == ["r1 1", "r2 1", "r3 1"]
-
-
-def test_runners_that_end_badly_are_reported_by_name(started: list[AgentHost]) -> None:
-    with made_up_world(join=None) as world:
-        started.append(agent_host := AgentHost(world.endpoint, "r1", "r2"))
-        code, reported, told = agent_host.ended()
-        assert (code, sorted(reported.splitlines())) == (0, ["r1 1", "r2 1"])
-        assert "refused by the test" in told
-
-
-def test_no_runner_outlives_the_world(started: list[AgentHost]) -> None:
+def test_an_agent_process_has_no_network(started: list[AgentHost]) -> None:
     with made_up_world() as world:
-        started.append(agent_host := AgentHost(world.endpoint, "r1", "r2"))
-        ready(world, 2)
-        runners = psutil.Process(agent_host.process.pid).children()
-        assert len(runners) == 2
-        assert agent_host.process.stdin
-        agent_host.process.stdin.close()
-        assert agent_host.ended()[0] == 0
-        until(lambda: not any(runner.is_running() for runner in runners))
+        started.append(agent_host := AgentHost(world.endpoint))
+        ready(world)
+        for process in agent_host.family():
+            assert not process.net_connections("inet")
 
 
 def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[AgentHost], tmp_path: Path) -> None:
     folder = tmp_path / f"{PRIVATE}x"
     folder.mkdir()
-    started.append(agent_host := AgentHost(f"unixsock-stream/{folder}/socket", "r1"))
-    assert agent_host.process.stdin
-    agent_host.process.stdin.close()
+    started.append(agent_host := AgentHost(f"unixsock-stream/{folder}/socket"))
+    close_life_line(agent_host)
     assert agent_host.ended()[0] == 0
     assert not folder.exists()
 
@@ -171,3 +161,72 @@ def test_every_robot_gets_its_own_in_every_layout(scenario):
 def test_a_list_of_the_wrong_length_is_refused_at_the_door(scenario):
     with pytest.raises(BadInput, match=r"robots.lanes.params.lane: expected .* 4 robots, got a list of 3"):
         run(scenario, overrides=["robots.lanes.params.lane=[1, 2, 3]"])
+
+
+FAULTY = """
+import os, signal
+from swarmwire.agent import Agent, Robot
+
+def flood():
+    for line in range(20_000):
+        print(line * "flood", end="\\r")
+
+def loop():
+    while True:
+        pass
+
+FAULTS = {
+    "killed": lambda: os.kill(os.getpid(), signal.SIGKILL),
+    "frozen": lambda: os.kill(os.getpid(), signal.SIGSTOP),
+    "exception": lambda: 1 / 0,
+    "exit": lambda: os._exit(7),
+    "endless loop": loop,
+    "memory": lambda: bytes(1 << 60),
+    "output": flood,
+    "none": lambda: None,
+}
+
+class Faulty(Agent):
+    fault: str
+
+    def step(self, robot: Robot) -> None:
+        if 0.25 < robot.time_s < 0.35:
+            FAULTS[self.fault]()
+        robot.drive(0.1, 0.0)
+"""
+
+
+@pytest.mark.parametrize("pace", [None, 1.0], ids=["lockstep", "real time"])
+def test_one_faulty_process_costs_its_own_robot_alone(tmp_path: Path, pace: float | None) -> None:
+    faults = {
+        "killed": "was ended by SIGKILL",
+        "frozen": "no answer",
+        "exception": "its agent failed",
+        "exit": "ended with exit code 7",
+        "endless loop": "no answer",
+        "memory": "its agent failed",
+        "output": "",
+        "none": "",
+    }
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    file = tmp_path / "faults.toml"
+    groups = [
+        f'[robots.robot{at}]\nbody = "epuck"\ncount = 1\nagent = "faulty.py:Faulty"\nparams = {{ fault = "{fault}" }}'
+        for at, fault in enumerate(faults)
+    ]
+    head = f"""
+format = 1
+name = "faults"
+duration_s = {2.0 if pace is None else 5.0}
+arena = {{ size_m = [4.0, 4.0] }}
+run = {{ on_runner_loss = "stand", runner_timeout_s = 2.0 }}
+"""
+    file.write_text("\n".join([head, *groups]))
+    seen = Commands()
+    result = run(file, runners="per-robot", realtime=pace, observers=[seen])
+    lost = {loss.partition(", which played ")[2].partition(":")[0]: loss for loss in result.lost_runners}
+    expected = {f"robot{at}-0": reason for at, reason in enumerate(faults.values()) if reason}
+    assert set(lost) == set(expected)
+    for robot, reason in expected.items():
+        assert reason in lost[robot]
+    assert seen.last[:, 0].tolist() == [0.0 if reason else 0.1 for reason in faults.values()]

@@ -2,13 +2,14 @@
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import zenoh
 
 from swarmwire.agent import joining as joining_module
+from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import BadInput, RunnerLost
@@ -21,9 +22,11 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.comms.wire.tick_frames import encode_tick
 from tests.support.agent.hosts import MEASURES, readings, spec
 from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world
+from tests.support.agent.processes import ThreadServer
 
 END = frames.encode("end", -1, {})
 SHORT_S = 0.3
+SERVER = cast("ForkServer", ThreadServer())
 
 
 def ticks_of(*numbers: int) -> list[bytes]:
@@ -36,7 +39,7 @@ def ticks_of(*numbers: int) -> list[bytes]:
 def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
-    ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), said.append)
+    ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), said.append, SERVER, 1)
     return ended.how, ended.why, said
 
 
@@ -69,8 +72,7 @@ def test_an_agent_that_fails_is_told_to_the_world_before_the_runner_ends() -> No
     with made_up_world(session_info, robots) as world:
         world.to_send = [*ticks_of(0, 1, 2, 3), END]
         played(world)
-        failed = world.answers[-1]
-        assert failed.kind == "failed"
+        (failed,) = (frame for frame in world.answers if frame.kind == "lost")
         assert "Traceback" in str(failed.values["traceback"])
 
 
@@ -148,9 +150,9 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):
-            join(JoinSettings(endpoint, name="r"), Arrivals(), print)
+            join(JoinSettings(endpoint, name="r"), Arrivals(), print, SERVER)
     with pytest.raises(RunnerLost, match=f"nobody answers at {endpoint}") as lost:
-        join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), print)
+        join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), print, SERVER)
     assert isinstance(lost.value.__cause__, zenoh.ZError)
 
 
@@ -166,7 +168,7 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
 )
 def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict[str, Any], expected: str) -> None:
     with pytest.raises(BadInput, match=expected):
-        join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), print)
+        join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), print, SERVER)
 
 
 def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:

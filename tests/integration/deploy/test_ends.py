@@ -69,7 +69,7 @@ MOMENTS = [57, "ends"]  # amid its ticks, and while the parts are joined
 def long_run(tmp_path):
     process = started(LOSSY, *LONG, "--out", tmp_path / "run")
     children = family(process)
-    assert len(children) == 5  # an agent host and four runners
+    assert len(children) == 6  # an agent host, its fork server and four agent processes
     yield process, children
     for left in [*children, psutil.Process(process.pid)] if process.poll() is None else children:
         if left.is_running():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.assignment import split
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
@@ -117,19 +118,20 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
     """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
     simulation = Simulation(LOSSY, overrides=SHORT)
     specs = agent_specs(simulation.scenario)
-    parts = assignments.split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
+    parts = split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
     with local_endpoint(None) as endpoint:
         backend = LockstepBackend(endpoint, run_id, parts[::-1], 30.0, WallClock())
         backend.open()
-        processes = RunnerProcesses(endpoint, run_id, sorted(specs.values()), ["c", "b", "a"])
+        hosts = [RunnerProcesses(endpoint, run_id, sorted(specs.values()), 2, name=name) for name in "cba"]
         try:
             backend.start()
             loop = Loop(simulation.world, new_medium(simulation.scenario, simulation.world, traces=None), backend, [])
             loop.run(simulation.ticks)
         finally:
             backend.close()
-            processes.stop()
+            for host in hosts:
+                host.stop()
     assert loop.hexdigests() == local.trajectory_sha256
 
 

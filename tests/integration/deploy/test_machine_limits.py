@@ -24,7 +24,7 @@ from swarmwire.metrics.run_folder.layout import SUMMARY
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
 from tests.integration.examples.test_examples import EXAMPLES
-from tests.support.deploy.runs import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called, processes_of
 
 SHORT = ("--set", "duration_s=1", "--set", "robots.flock.count=4")
 NO_ROOM = "No space left on device"
@@ -183,8 +183,7 @@ class Policies(Observer):
 
     def see(self, truth: Truth) -> None:
         """Ask, in every tick."""
-        agent_host = [child for child in psutil.Process().children() if "swarmwire.agent.agent_host" in child.cmdline()]
-        self.found = [os.sched_getscheduler(runner.pid) for process in agent_host for runner in process.children()]
+        self.found = [os.sched_getscheduler(process.pid) for process in processes_of(psutil.Process())]
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="the system has no scheduling in batches")

@@ -21,7 +21,7 @@ from swarmwire.metrics.run_folder.layout import INPUTS
 from swarmwire.metrics.swarm.order import Speed
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
-from tests.support.deploy.runs import LOSSY, called
+from tests.support.deploy.runs import LOSSY, called, processes_of
 
 RELAY = """
 from swarmwire.agent import Agent, Message, Robot, u2
@@ -60,7 +60,7 @@ FLOCKING = Path(__file__).parents[3] / "scenarios" / "robots" / "flocking-epuck2
 
 def runners_here() -> list[psutil.Process]:
     """The processes of the run that goes on in this one."""
-    return [runner for agent_host in psutil.Process().children() for runner in agent_host.children()]
+    return processes_of(psutil.Process())
 
 
 def relays(folder: Path) -> list[str]:

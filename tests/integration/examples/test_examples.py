@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,8 @@ from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms import packets
 from swarmwire.comms.wire import frames
-from swarmwire.deploy import Result, Simulation, backends, repeat, run
+from swarmwire.deploy import Result, Simulation, repeat, run
 from swarmwire.deploy.config import Listening
-from swarmwire.deploy.runners import RunnerProcesses
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.joiners import HERE, Joiners
@@ -142,70 +141,47 @@ def test_every_way_moves_the_swarm_alike(way: str, plain: Result):
     assert run_of(way, 60.0).trajectory_sha256 == plain.trajectory_sha256
 
 
-class Mixed:
-    """Runners of swarmwire, but for one robot fewer of them each: the last is a process of the example."""
-
-    def __init__(
-        self, endpoint: str, run_id: str, agents: Sequence[str], names: Sequence[str], *, waited_for: bool
-    ) -> None:
-        assert waited_for
-        self._others = RunnerProcesses(endpoint, run_id, agents, names[:-1])
-        self._own = subprocess.Popen([sys.executable, str(PROGRAM), endpoint, "--name", "foreign"])
-
-    def trouble(self) -> str | None:
-        """None: a runner that is missing is told of by the time-out."""
-        return self._others.trouble()
-
-    def stop(self) -> None:
-        """End them; the example leaves by itself when the run ends."""
-        self._others.stop()
-        try:
-            self.code = self._own.wait(10.0)
-        finally:
-            self._own.kill()
-            self._own.wait()
-
-
 def scenario(**changes: object) -> Scenario:
     return load_scenario(EXAMPLES / "protocol" / "flock.toml").model_copy(update={"duration_s": 6.0, **changes})
 
 
-@pytest.fixture
-def mixed(monkeypatch: pytest.MonkeyPatch) -> list[Mixed]:
-    """What started the runners of the runs of this test."""
-    started: list[Mixed] = []
+class Both(Joiners):
+    """The example, and a runner of swarmwire for the robots that it leaves."""
 
-    def start(*given: Any, **more: Any) -> Mixed:
-        started.append(Mixed(*given, **more))
-        return started[-1]
-
-    monkeypatch.setattr(backends, "RunnerProcesses", start)
-    return started
+    def start(self, name: str, *arguments: str | Path, label: str = "") -> None:
+        if name != "foreign":
+            super().start(name, *arguments, label=label)
+            return
+        command = [sys.executable, str(PROGRAM), self.endpoint, "--name", name, *map(str, arguments)]
+        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
 
-def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(mixed: list[Mixed]) -> None:
-    boids = scenario()
-    boids = boids.model_copy(
-        update={
-            "robots": {
-                "flock": boids.robots["flock"].model_copy(
-                    update={"agent": "tests.support.examples.protocol.boids:Boid"}
-                )
-            }
-        }
-    )
-    alone, together = run(boids), run(boids, runners=2)
-    assert mixed[0].code == 0
+def with_own(folder: Path, flock: Scenario | Path, **more: Any) -> tuple[Result, int]:
+    """A run of robots of the example and of swarmwire, and the exit code of the example."""
+    joiners = Both(folder)
+    joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
+    with closing(joiners):
+        result = run(flock, listening=Listening(HERE, observer=joiners), **more)
+        return result, joiners.said("foreign")[0]
+
+
+def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(tmp_path: Path) -> None:
+    """Beside a host with a process per robot."""
+    flock = scenario().robots["flock"].model_copy(update={"agent": "tests.support.examples.protocol.boids:Boid"})
+    boids = scenario(robots={"flock": flock})
+    alone, (together, code) = run(boids), with_own(tmp_path, boids)
+    assert code == 0
     assert together.trajectory_sha256 == alone.trajectory_sha256
-    assert together.counts == alone.counts
     assert together.radio is not None
+    assert alone.radio is not None
+    assert together.radio.fates == alone.radio.fates
     assert together.radio.fates["received"] > 2000
 
 
-def test_its_robots_and_those_of_swarmwire_hear_one_another(mixed: list[Mixed]) -> None:
+def test_its_robots_and_those_of_swarmwire_hear_one_another(tmp_path: Path) -> None:
     assert Heading.tag == TAG
-    result = run(scenario(), runners=2)
-    assert mixed[0].code == 0
+    result, code = with_own(tmp_path, scenario())
+    assert code == 0
     assert not {name for name in result.counts if name.endswith("_frames")}
     order = result.metrics["order"].final
     assert order is not None
@@ -221,25 +197,10 @@ def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
     assert (VERSION, BROADCAST) == (frames.VERSION, packets.BROADCAST)
 
 
-class Both(Joiners):
-    """The example, and a runner of swarmwire for the robots that it leaves."""
-
-    def start(self, name: str, *arguments: str | Path, label: str = "") -> None:
-        if name != "foreign":
-            super().start(name, *arguments, label=label)
-            return
-        command = [sys.executable, str(PROGRAM), self.endpoint, "--name", name, *map(str, arguments)]
-        self.processes[name] = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-
-
 def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:
     """Its code is not in the run folder, and the scenario's agent does something else."""
-    joiners = Both(tmp_path)
-    joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
     flock = EXAMPLES / "protocol" / "flock.toml"
-    with closing(joiners):
-        listening = Listening(HERE, observer=joiners)
-        result = run(flock, overrides=["duration_s=3"], listening=listening, out=tmp_path / "run")
+    result, _ = with_own(tmp_path, flock, overrides=["duration_s=3"], out=tmp_path / "run")
     assert result.runner_events[0].runner == "foreign"
     assert result.inputs is not None
     assert result.inputs.first_tick == 0

@@ -11,11 +11,13 @@ from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from typing import cast
 
 import psutil
 import pytest
 
 from swarmwire.agent import runner
+from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, to_ns
@@ -31,6 +33,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.registry import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
+from tests.support.agent.processes import ThreadServer
 from tests.support.clocks import TIMEOUT_S, until
 
 RUN = "r1"
@@ -59,19 +62,19 @@ def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S)
 
 
 @contextmanager
-def processes(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator["subprocess.Popen[bytes]"]:
-    """An agent host and its runners; none is left afterwards, whatever happened."""
-    command = [sys.executable, "-m", "swarmwire.agent.agent_host", endpoint, RUN, spec(agent), *names]
+def hosts(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator[list["subprocess.Popen[bytes]"]]:
+    """Agent hosts of one process each; none is left afterwards, whatever happened."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=environment
-    ) as agent_host:
-        try:
-            yield agent_host
-        finally:
-            if agent_host.stdin is not None:
-                agent_host.stdin.close()  # the life line: it ends all that are left
-            agent_host.wait(10.0)
+    with ExitStack() as ends:
+        started: list[subprocess.Popen[bytes]] = []
+        for name in names:
+            command = [sys.executable, "-m", "swarmwire.agent.agent_host", endpoint, RUN, spec(agent), name, "1"]
+            host = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=environment)
+            started.append(ends.enter_context(host))
+            ends.callback(host.wait, 10.0)
+            if host.stdin is not None:
+                ends.callback(host.stdin.close)  # the life line: it ends the host and its process
+        yield started
 
 
 @contextmanager
@@ -81,7 +84,7 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
 
     def play() -> None:
         try:
-            runner.run(endpoint, RUN, name)
+            runner.run(endpoint, RUN, name, cast("ForkServer", ThreadServer()), 1)
         except BaseException as error:  # noqa: BLE001 - the test asks how it ended
             ends.put(error)
         else:
@@ -111,7 +114,7 @@ def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[l
     local.start()
     before: Actions | None = None
     names = [f"r{i}" for i in range(len(rows))]
-    with processes(endpoint, names) as agent_host:
+    with hosts(endpoint, names) as started:
         with opened(endpoint, parts("Chatter", *rows)) as backend:
             backend.start()
             for tick in range(6):
@@ -122,8 +125,7 @@ def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[l
                 assert len(expected.sent) == 3 * len(acting)
                 before = expected
             assert not backend.counts()
-        assert agent_host.wait(10.0) == 0  # told that the run is over, they leave by themselves
-    assert agent_host.stdout is not None
+        assert [host.wait(10.0) for host in started] == [0] * len(rows)  # they leave by themselves
 
 
 def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
@@ -160,25 +162,22 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
 
 def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) -> None:
     slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 it is robots 0 and 4 whose compass shows more than 0
-    with processes(endpoint, ["a", "b"], "Vanishing") as agent_host:
-        with opened(endpoint, slots) as backend:
-            backend.start()
-            with pytest.raises(RunnerLost) as caught:
-                three_ticks(backend, ROWS)
-            assert caught.value.robots == "flock-0, flock-3, flock-4"
-            assert caught.value.runner in {"a", "b"}
-            assert "gone" in caught.value.reason
-        assert agent_host.stdout is not None
-        assert agent_host.stdout.readline().split()[1] == b"3"  # the agent host tells the exit code
+    with hosts(endpoint, ["a", "b"], "Vanishing"), opened(endpoint, slots) as backend:
+        backend.start()
+        with pytest.raises(RunnerLost) as caught:
+            three_ticks(backend, ROWS)
+        assert caught.value.robots == "flock-0, flock-3, flock-4"
+        assert caught.value.runner in {"a", "b"}
+        assert caught.value.reason == "its process ended with exit code 3"
 
 
 def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> None:
-    with processes(endpoint, ["a", "b"], "Failing") as agent_host:
+    with hosts(endpoint, ["a", "b"], "Failing") as started:
         with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as backend:
             backend.start()
             with pytest.raises(AgentFailed) as caught:
                 three_ticks(backend, [0, 1, 2, 3])
-        assert agent_host.wait(10.0) == 0
+        assert [host.wait(10.0) for host in started] == [0, 0]
     assert caught.value.robots == "flock-0"
     assert "NotDeclared" in caught.value.traceback
     assert "print(robot.proximity)" in caught.value.traceback
@@ -226,7 +225,7 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
 def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
     with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
-        runner.run(endpoint, RUN, "r0")
+        runner.run(endpoint, RUN, "r0", cast("ForkServer", ThreadServer()))
 
 
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
@@ -321,21 +320,27 @@ input()
             world.kill()
 
 
-def kill_one(agent_host: "subprocess.Popen[bytes]") -> None:
-    child = psutil.Process(agent_host.pid).children()[0]
-    child.kill()
-    child.wait(20.0)
+def process_of(host: "subprocess.Popen[bytes]") -> psutil.Process:
+    """The agent process of a host: its fork server's child."""
+    (server,) = psutil.Process(host.pid).children()
+    return server.children()[0]
+
+
+def kill_one(host: "subprocess.Popen[bytes]") -> None:
+    process = process_of(host)
+    process.kill()
+    process.wait(20.0)
 
 
 def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
-    with ExitStack() as later, processes(endpoint, ["a", "b"]) as agent_host:
+    with ExitStack() as later, hosts(endpoint, ["a", "b"]) as started:
         around = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
         backend = LockstepBackend(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
         later.callback(backend.close)
         backend.start()
         for tick in range(2):
             backend.act(tick, one_group(tick, [0, 1, 2]), ReceivedPackets.none(MEASURES))
-        kill_one(agent_host)
+        kill_one(started[0])
         got = backend.act(2, one_group(2, [0, 1, 2]), ReceivedPackets.none(MEASURES))
         steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
         assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
@@ -344,13 +349,13 @@ def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
 
 
 def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
-    with processes(endpoint, ["a", "b"]) as agent_host:
+    with hosts(endpoint, ["a", "b"]) as started:
         asked: list[bool] = []
         around = BackendHooks(stopped=lambda: bool(asked))
         backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
         try:
             backend.start()
-            kill_one(agent_host)
+            kill_one(started[0])
             asked.append(True)
             with pytest.raises(Interrupted):
                 backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
@@ -386,7 +391,7 @@ def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(
 def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
     """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
     clock, waits = LeapingClock(), list[RunnerHealth]()
-    with processes(endpoint, ["a"]) as agent_host:
+    with hosts(endpoint, ["a"]) as started:
 
         def frozen() -> bool:
             if backend.health().ready and not waits:
@@ -398,7 +403,7 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
         backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, BackendHooks(stopped=frozen))
         with closing(backend):
             backend.start()
-            child = psutil.Process(agent_host.pid).children()[0]
+            child = process_of(started[0])
             waits.clear()
             child.suspend()
             actions = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))

@@ -79,7 +79,7 @@ class MadeUpWorld:
         frame = frames.decode(sample.payload.to_bytes())
         self.answers.append(frame)
         if self.to_send:
-            data = self.to_send.pop(-1 if frame.kind == "failed" else 0)  # after a failure nothing but the end
+            data = self.to_send.pop(-1 if frame.kind == "lost" else 0)  # after a failure nothing but the end
             self._session.put(self.keys.frame(runner_of(str(sample.key_expr))), data)
 
 

@@ -17,7 +17,7 @@ class Other(Message):
 
 
 class Chatter(Agent):
-    """Uses all that there is: sensors, draws, packets of each kind, addresses, a command in some ticks only, LEDs."""
+    """Uses all that there is: sensors, draws, packets of each kind, addresses, commands, LEDs, notes in some ticks."""
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
     gain: float = 0.5
@@ -33,6 +33,8 @@ class Chatter(Agent):
         if robot.draw.uniform("whether") < 0.7:
             robot.drive(self.gain * self.total, robot.compass.heading_rad + robot.proximity.value.sum())
         robot.led(0.0, robot.draw.uniform("green"), 0.0, which=round(10.0 * robot.time_s) % 8)
+        if robot.draw.uniform("note") < 0.5:
+            robot.note("driven" if self.total > 0.0 else "idle", value=self.total)
         robot.radio.send(Word(number=robot.draw.normal("word")))
         robot.radio.send({"x": robot.time_s}, to=0)
         robot.radio.send(Other(number=7), to=1)

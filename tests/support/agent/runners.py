@@ -1,10 +1,14 @@
-"""A runner without a network: its protocol and its agents, frame by frame."""
+"""A runner without a network: its protocol, and a process per robot, frame by frame."""
 
 from collections.abc import Callable
 
-from swarmwire.agent.runner_agents import RunnerAgents
-from swarmwire.agent.runner_protocol import Assigned, Ended, JoinOptions, RunnerProtocol
+import numpy as np
+
+from swarmwire.agent.runner_protocol import Assigned, JoinOptions, RunnerProtocol, Tick
+from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.join import JoinRequest
+from tests.support.agent.processes import Processes
 
 
 def assigned_robots(reply: bytes) -> Assigned:
@@ -26,15 +30,24 @@ class EncodedRunner:
         """`join` is the world: it answers a request with an assignment."""
         self._protocol = joining()
         assigned = self._protocol.receive_assignment(join(self._protocol.join(JoinOptions(request or JoinRequest()))))
-        self._agents = RunnerAgents(self._protocol, assigned)
-        self.ready = self._agents.handle(assigned) or b""
+        robots = sum(len(group.rows) for group in assigned.assignment.groups)
+        self._keeps_memory = assigned.memory is not None
+        self._processes = Processes(assigned.assignment, robots, assigned.memory)
+        self.ready = self._protocol.ready(robots)
 
     def answer(self, data: bytes) -> bytes:
-        """The answer to a frame."""
+        """The answer to a frame "tick"."""
         self._protocol.receive_frame(data)
         event = self._protocol.next_event()
-        assert event is not None
-        assert not isinstance(event, Ended)
-        answer = self._agents.handle(event)
-        assert answer is not None
-        return answer
+        assert isinstance(event, Tick)
+        try:
+            actions = self._processes.act(*event)
+        except AgentFailed as error:
+            rows = np.concatenate([group.rows for group in self._processes.whole.groups])
+            return self._protocol.lose(rows, "0", "its agent failed", error.robots, error.traceback)
+        if not self._keeps_memory:
+            return self._protocol.answer(actions)
+        parts = self._processes.memory
+        names = {name for part in parts for name in part}
+        memory = {name: GroupMemory.joined([part[name] for part in parts if name in part]) for name in names}
+        return self._protocol.answer(actions, memory)

@@ -81,7 +81,13 @@ def family(process: subprocess.Popen[str]) -> list[psutil.Process]:
 
 def runners_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
     """The runners' processes of a run."""
-    return [runner for agent_host in psutil.Process(process.pid).children() for runner in agent_host.children()]
+    return processes_of(psutil.Process(process.pid))
+
+
+def processes_of(world: psutil.Process) -> list[psutil.Process]:
+    """The agent processes of a world: those that the fork server of its agent host has forked."""
+    servers = [server for agent_host in world.children() for server in agent_host.children()]
+    return [process for server in servers for process in server.children()]
 
 
 @contextmanager

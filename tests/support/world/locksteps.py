@@ -6,12 +6,11 @@ from typing import Any, TypeVar
 import msgpack
 import numpy as np
 
-from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.assignment import Assignment, split
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.world.backends.allocation import split
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group, readings

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import AgentExecutor, layout_of
-from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.assignment import Assignment, split
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings, SparseTable
 from swarmwire.comms.truth import Truth
@@ -18,7 +18,7 @@ from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.scenario_parts import new_medium
-from swarmwire.world.backends.allocation import split, whole
+from swarmwire.world.backends.allocation import whole
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.loop import Loop

@@ -11,7 +11,7 @@ import psutil
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.config import JoinObserver
-from tests.support.deploy.runs import WATCHER
+from tests.support.deploy.runs import WATCHER, processes_of
 from tests.tools.soak.invariants import Broken
 from tests.tools.soak.plan import Fault, Plan
 from tests.tools.soak.processes import PYTHON, SCENARIO, Agenda, Steps, Supervised
@@ -193,7 +193,7 @@ class Nursed(Actors):
         for one in psutil.Process().children():
             with suppress(psutil.Error):  # an agent host whose runners are all dead has ended
                 if "swarmwire.agent.agent_host" in one.cmdline():
-                    found += sorted(one.children(), key=lambda child: child.pid)
+                    found += sorted(processes_of(psutil.Process()), key=lambda child: child.pid)
         return found
 
 

@@ -9,11 +9,11 @@ import msgpack
 import pytest
 import zenoh
 
-from swarmwire.agent import join_command, runner
+from swarmwire.agent import agent_process, join_command, runner
+from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
-from swarmwire.agent.runner_agents import RunnerAgents
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES
@@ -22,7 +22,7 @@ from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
 from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, spec, words
-from tests.support.agent.runners import joining
+from tests.support.agent.processes import ThreadServer
 
 KEYS = Keys("run1")
 END = frames.encode("end", -1, {})
@@ -107,8 +107,11 @@ class FakeSession:
             self._frame(Sample(Payload(self.then.pop(0))))
 
 
-def played(session: Any, arrivals: Arrivals | None = None) -> Ended:
-    return play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE)
+def played(session: Any, arrivals: Arrivals | None = None, say: Callable[[str], None] = lambda _: None) -> Ended:
+    server = ThreadServer()
+    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, cast("ForkServer", server), 1, say)
+    server.close()
+    return ended
 
 
 def kinds(session: FakeSession) -> list[tuple[str, int]]:
@@ -131,11 +134,11 @@ def test_a_runner_that_leaves_waits_for_the_confirmation() -> None:
     assert kinds(session) == [("ready", -1), ("actions", 0), ("leave", -1)]
 
 
-def test_a_runner_that_is_to_leave_while_it_joins_leaves_once_it_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_runner_that_is_to_leave_while_it_joins_leaves_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "FAREWELL_TIMEOUT_S", 0.01)  # and nobody confirms
     session, arrivals = FakeSession(), Arrivals()
-    play(session, KEYS, "r7", arrivals, lambda: NEXT_FREE, lambda _: arrivals.leave())  # pyright: ignore[reportArgumentType]
-    assert kinds(session) == [("ready", -1), ("leave", -1)]
+    played(session, arrivals, lambda _: arrivals.leave())
+    assert kinds(session) == [("leave", -1)]
 
 
 def test_a_runner_that_is_to_leave_before_it_has_found_its_world_is_interrupted() -> None:
@@ -180,10 +183,10 @@ def test_a_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequen
 @pytest.mark.parametrize("agent", ["Failing", "Nowhere"])
 def test_agents_that_fail_are_reported_in_a_frame_that_awaits_the_end(agent: str) -> None:
     session = FakeSession(*map(tick, range(9)), END, replies=(Reply(Sample(Payload(reply(agent)))),))
-    session.on_put = lambda frame: session.then.__setitem__(slice(None), [END]) if frame.kind == "failed" else None
+    session.on_put = lambda frame: session.then.__setitem__(slice(None), [END]) if frame.kind == "lost" else None
     assert played(session) == Ended("over")
-    failed = session.put_to_world[-1]
-    assert (failed.kind, failed.values["robots"]) == ("failed", "flock-0")
+    (failed,) = (frame for frame in session.put_to_world if frame.kind == "lost")
+    assert failed.values["robots"] == "flock-0"
     assert "Traceback" in failed.values["traceback"]
 
 
@@ -201,27 +204,22 @@ def test_agents_read_packets_between_ticks_and_answer_them() -> None:
 
 @pytest.mark.parametrize("keeps", [True, False])
 def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool) -> None:
-    protocol = joining()
-    assigned = protocol.receive_assignment(reply("VectorCounter", encode_memory({}) if keeps else None))
-    agents = RunnerAgents(protocol, assigned)
-    agents.handle(assigned)
-    protocol.receive_frame(tick(0))
-    event = protocol.next_event()
-    assert event is not None
-    assert not isinstance(event, Ended)
-    answer = frames.decode(agents.handle(event) or b"")
-    assert ("memory/flock/rows" in answer.arrays) == keeps
+    memory = encode_memory({}) if keeps else None
+    session = FakeSession(tick(0), END, replies=(Reply(Sample(Payload(reply("VectorCounter", memory)))),))
+    assert played(session) == Ended("over")
+    assert ("memory/flock/rows" in session.put_to_world[-1].arrays) == keeps
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIG_IGN, signal.default_int_handler], ids=["in background", "in front"])
 def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, capsys, interrupt: Any) -> None:
-    def killed(_settings: JoinSettings, arrivals: Arrivals, _say: Any) -> Ended:
+    def killed(_settings: JoinSettings, arrivals: Arrivals, *_: Any) -> Ended:
         os.kill(os.getpid(), signal.SIGTERM)
         protocol = RunnerProtocol()
         arrivals.pass_on(protocol, timeout_s=10.0)
         return cast("Ended", protocol.next_event())
 
     monkeypatch.setattr("swarmwire.agent.joining.join", killed)
+    monkeypatch.setattr(agent_process, "ForkServer", ThreadServer)
     before, ended_by = signal.signal(signal.SIGINT, interrupt), signal.getsignal(signal.SIGTERM)
     try:
         assert join_command.join_and_report(JoinSettings("tcp/127.0.0.1:1")) == INTERRUPTED

@@ -34,7 +34,8 @@ from tests.support.agent.runners import assigned_robots, joining
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
 REPLY: dict[str, Any] = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None}
-END, LEAVE, READY = (frames.encode(kind, -1, {}) for kind in ("end", "leave", "ready"))
+END, LEAVE = (frames.encode(kind, -1, {}) for kind in ("end", "leave"))
+READY = frames.encode("ready", -1, {}, {"processes": 1})
 REMOVED = frames.encode("end", -1, {}, {"why": "no answer for 3 s"})
 ZERO = np.zeros(1)
 ACTIONS = Actions(np.array([0]), ZERO != 0.0, ZERO, ZERO, ZERO)
@@ -74,8 +75,6 @@ def in_state(state: State) -> RunnerProtocol:
     protocol = playing(tick(0))
     if state == "acting":
         protocol.next_event()
-    elif state == "failed":
-        protocol.fail("flock-0", "Traceback …")
     elif state == "leaving":
         protocol.leave()
     elif state == "ended":
@@ -191,7 +190,7 @@ def test_a_runner_whose_world_vanishes_has_lost_it(state: State) -> None:
 @pytest.mark.parametrize("state", MOVES)
 def test_a_runner_with_robots_leaves_by_a_frame_and_waits_for_its_confirmation(state: State) -> None:
     protocol = in_state(state)
-    with_robots = state in ("joined", "ready", "acting", "failed")
+    with_robots = state in ("joined", "ready", "acting")
     assert protocol.leave() == (LEAVE if with_robots else None)
     if with_robots:
         receive(protocol, tick(8), packets(0), b"\xc1")
@@ -209,16 +208,17 @@ def test_a_runner_that_leaves_has_left_also_without_a_confirmation(
     assert protocol.next_event() == Ended("left")
 
 
-def test_a_failure_is_a_frame_and_then_only_the_end_counts() -> None:
-    protocol = playing(tick(0), tick(1))
-    frame = frames.decode(protocol.fail("flock-0", "Traceback …"))
-    assert (frame.kind, frame.tick) == ("failed", -1)
-    assert frame.values == {"robots": "flock-0", "traceback": "Traceback …"}
-    receive(protocol, tick(2), packets(0))
-    assert protocol.next_event() is None
-    assert protocol.dropped == 4
-    receive(protocol, END)
-    assert protocol.next_event() == Ended("over")
+@pytest.mark.parametrize("state", ["joined", "ready", "acting"])
+def test_a_lost_process_is_a_frame_and_the_others_play_on(state: State) -> None:
+    protocol = in_state(state)
+    rows = np.array([4, 7])
+    frame = frames.decode(protocol.lose(rows, "3", "no answer"))
+    assert (frame.kind, frame.tick, frame.arrays["rows"].tolist()) == ("lost", -1, [4, 7])
+    assert frame.values == {"process": "3", "reason": "no answer"}
+    frame = frames.decode(protocol.lose(rows, "3", "its agent failed", "flock-7", "Traceback …"))
+    agent = {"robots": "flock-7", "traceback": "Traceback …"}
+    assert frame.values == {"process": "3", "reason": "its agent failed", **agent}
+    assert protocol.state == state
 
 
 def test_the_request_names_the_robots_and_the_agents_of_the_runner_replace_those_of_the_world() -> None:
@@ -281,10 +281,9 @@ CALLS: dict[Move, Callable[[RunnerProtocol], object]] = {
     "is ready": RunnerProtocol.ready,
     "sends": lambda protocol: protocol.send(0, words(0)),
     "answers": lambda protocol: protocol.answer(ACTIONS),
-    "fails": lambda protocol: protocol.fail("flock-0", "Traceback …"),
     "leaves": RunnerProtocol.leave,
 }
-RARE: tuple[Move, ...] = ("fails", "leaves")
+RARE: tuple[Move, ...] = ("leaves",)
 COMMON = tuple(move for move in CALLS if move not in RARE)
 TICKS, PACKETS = st.sampled_from([*map(tick, range(30))]), st.sampled_from([*map(packets, range(9))])
 KINDS = st.sampled_from(("end", "memory", "tick", "packets", "sent", "leave")).map(

@@ -58,10 +58,20 @@ def encode_memory(memory: Memory) -> bytes:
     return frames.encode("memory", -1, memory_arrays(memory))
 
 
+def memory_in(frame: Frame) -> Memory:
+    """The memory in a frame of this machine, which is not checked."""
+    columns: dict[str, dict[str, AnyArray]] = {}
+    for key, array in frame.arrays.items():
+        if key.startswith(PREFIX):
+            group, _, column = key.removeprefix(PREFIX).partition("/")
+            columns.setdefault(group, {})[column] = array
+    return {group: GroupMemory(of.pop(ROWS), of) for group, of in columns.items()}
+
+
 def decode_memory(frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None) -> Memory:
     """The memory in a frame, of groups with these layouts; BadFrame if an array does not fit.
 
-    With `rows`, by group, each group's memory must be for exactly these robots; a group may have none.
+    With `rows`, by group, each group's memory must be of robots among these; a group may have none.
     """
     memory: Memory = {}
     for name, layout in layouts.items():
@@ -69,9 +79,7 @@ def decode_memory(frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str
         if key + ROWS not in frame.arrays:
             continue
         group_rows = checked_array(frame, key + ROWS, "<i8", (None,))
-        if rows is not None and (
-            name not in rows or len(group_rows) != len(rows[name]) or (group_rows != rows[name]).any()
-        ):
+        if rows is not None and (name not in rows or not np.isin(group_rows, rows[name]).all()):
             raise BadFrame("malformed", f"{key}{ROWS}: expected the runner's own robots")
         if (group_rows[1:] <= group_rows[:-1]).any():
             raise BadFrame("malformed", f"{key}{ROWS}: expected rising rows")

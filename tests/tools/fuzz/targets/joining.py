@@ -7,8 +7,8 @@ from hypothesis.strategies import DrawFn
 from pydantic import TypeAdapter, ValidationError
 
 from swarmwire.agent.agent import NoAgent
+from swarmwire.agent.agent_process import agents_of
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.agent.runner_agents import make_executor
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
@@ -80,7 +80,7 @@ class Join(DocumentTarget):
         free = roster.missing_robots
         try:
             roster.session_info(data)
-            assignment, _ = assigned_robots(roster.join(runner, data))
+            assignment = assigned_robots(roster.join(runner, data)).assignment
         except JoinRefused:
             if roster.missing_robots != free or roster._by_runner:
                 raise AssertionError("refused, and yet robots are allocated") from None
@@ -119,7 +119,8 @@ class Assignments(DocumentTarget):
         return [msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one}) for part, one in memories]
 
     def feed(self, case: bytes) -> None:
-        make_executor(assigned_robots(case))
+        assigned = assigned_robots(case)
+        agents_of(assigned.assignment, assigned.memory)
 
 
 class Control(DocumentTarget):

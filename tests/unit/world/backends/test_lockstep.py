@@ -17,6 +17,7 @@ from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
+from swarmwire.world.backends.registry import OnLoss
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, readings, received_from, spec
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.world.locksteps import (
@@ -234,6 +235,18 @@ def test_a_failure_without_words_names_the_runners_robots(values: dict[str, Any]
     with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, values))
     assert caught.value.robots == "flock-4 … lone-7 (4 robots)"
+
+
+@pytest.mark.parametrize("on_loss", ["dead", "stand", "coast", "wait"])
+def test_a_failed_agent_is_a_loss_where_the_run_bears_losses(on_loss: OnLoss) -> None:
+    lockstep = ready(joined(Lockstep(two_parts(), on_loss), "a", "b"), "a", "b")
+    lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+    agent = {"robots": "flock-4", "traceback": "Boom"}
+    lockstep.answer("b", frames.encode("lost", -1, {"rows": np.array([4])}, {"process": "1", "reason": "?", **agent}))
+    (loss,) = lockstep.losses
+    assert (loss.runner, loss.robots, loss.traceback) == ("b/1", "flock-4", "Boom")
+    lockstep.answer("b", frames.encode("failed", 0, {}, agent))  # and all that it has left
+    assert [(loss.runner, loss.traceback) for loss in lockstep.losses[1:]] == [("b", "Boom")]
 
 
 def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:

@@ -251,7 +251,7 @@ def test_what_a_runner_asks_for_reaches_terminals_short_and_harmless(asked: Any)
 
 
 def test_so_does_what_it_says_of_its_failure() -> None:
-    roster = made("lockstep")
+    roster = made("lockstep", "stop", JoinPolicy(OFFER))
     roster.join("a", request())
     said = {"robots": "\x1b[2J" + "x" * 1000, "traceback": "at line 1:\n\tboom\x1b[2J" + "x" * 10**6}
     with pytest.raises(AgentFailed) as failed:

@@ -188,7 +188,7 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
 
 
 @pytest.mark.parametrize(
-    "memory", [{"flock": {0: 1}}, {"flock": {0: 1, 4: 2}}, {"flock": {0: 1, 1: 2}, "scouts": {2: 1}}], ids=repr
+    "memory", [{"flock": {4: 2}}, {"flock": {0: 1, 4: 2}}, {"flock": {0: 1, 1: 2}, "scouts": {2: 1}}], ids=repr
 )
 def test_memory_of_robots_that_are_not_its_own_is_no_answer(memory: dict[str, dict[int, int]]) -> None:
     roster = lockstep("stand")

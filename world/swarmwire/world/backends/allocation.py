@@ -12,7 +12,7 @@ from typing import Generic, Literal, TypeVar
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.assignment import Assignment, GroupAssignment, params_of
+from swarmwire.comms.assignment import Assignment, GroupAssignment, params_of, part_of
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.agent_memory import GroupMemory
@@ -37,31 +37,6 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
         for rows in [_rows(static, group.start, group.stop)]
     )
     return Assignment(groups, static.rate_hz, scenario.radio.measures.columns if scenario.radio else None)
-
-
-def split(assignment: Assignment, runners: int) -> list[Assignment]:
-    """Split an assignment into nearly equal parts along the robot rows, at most one part per robot."""
-    rows = np.sort(np.concatenate([group.rows for group in assignment.groups]))
-    return [part_of(assignment, part) for part in np.array_split(rows, min(runners, len(rows)))]
-
-
-def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
-    """The part of an assignment that lies in these rows."""
-    groups: list[GroupAssignment] = []
-    for group in assignment.groups:
-        selected = np.flatnonzero(np.isin(group.rows, rows))
-        if len(selected):
-            names = tuple(group.robot_names[i] for i in selected)
-            groups.append(
-                replace(
-                    group,
-                    params=params_of(group.params, selected),
-                    rows=group.rows[selected],
-                    robot_names=names,
-                    keys=group.keys[selected],
-                )
-            )
-    return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
 
 
 def merged(parts: list[Assignment]) -> Assignment:
@@ -126,6 +101,7 @@ class Allocation:
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
     foreign: bool = False  # whether the runner sent no hashes of its agents, so that their code is unknown
+    processes: int = 1  # of the runner, between which its robots are divided
 
     def __post_init__(self) -> None:
         self._all_rows = rows_of(self.assignment)
@@ -141,6 +117,13 @@ class Allocation:
             part_rows = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
             if part_rows:
                 self.memory.setdefault(name, []).extend(part_rows)
+
+    def keep(self, rows: IntArray) -> None:
+        """Keep these robots alone, (m,) rising."""
+        self.assignment = part_of(self.assignment, rows)
+        self.rows = self.rows[np.isin(self.rows, rows)]
+        self.memory = {name: [part.of(rows) for part in parts] for name, parts in self.memory.items()}
+        self._all_rows = rows_of(self.assignment)
 
     def may(self, move: Move) -> bool:
         """Whether the state allows the move."""
@@ -213,6 +196,16 @@ class Allocations(Generic[AllocationT]):
         self._allocations.append(allocation)
         self.owner = self._owners()
         return allocation
+
+    def split_off(self, source: AllocationT, rows: IntArray) -> AllocationT:
+        """An allocation of these robots of `source`, (n,) rising but not all, in the same state; it has no runner."""
+        part = self._new_allocation(part_of(source.assignment, rows))
+        part.state = source.state
+        part.remember(source, rows)
+        source.keep(source.all_rows[~np.isin(source.all_rows, rows)])
+        self._allocations.append(part)
+        self.owner = self._owners()
+        return part
 
     def _leave_rest(self, source: AllocationT, rows: IntArray) -> None:
         """Replace an allocation by one of its remaining robots; remove it if none remain."""

@@ -60,6 +60,9 @@ class JoinPolicy:
         start_with: the number of robots with an agent at which the first tick may begin; None: all.
         limits: the most runners, the most robots of each, and their time-outs.
         memory: by group, the layout of the agent memory that the next runner gets; None: none is kept.
+        timeout_s: a process of a host that does not answer for so long is lost.
+        answer_within_s: in real time, the time after which a host sends the answers of the processes that have
+            answered, without the others; None: it waits for all.
     """
 
     session_info: SessionInfo | None = None
@@ -67,6 +70,8 @@ class JoinPolicy:
     start_with: int | None = None
     limits: JoinLimits = LIMITS
     memory: Mapping[str, Layout] | None = None
+    timeout_s: float = 10.0
+    answer_within_s: float | None = None
 
 
 DEFAULT_JOIN_POLICY = JoinPolicy()  # of runners that the run starts itself

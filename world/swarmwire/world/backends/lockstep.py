@@ -230,6 +230,15 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
             allocation.memory = allocation.memory_at_start
         allocation.actions, allocation.idle = None, True
 
+    def _split_off(self, allocation: LockstepAllocation, rows: IntArray) -> LockstepAllocation:
+        actions, memory_at_start = allocation.actions, allocation.memory_at_start
+        part = super()._split_off(allocation, rows)
+        if self._open is not None and actions is not None:  # its answer to this tick is discarded
+            part.memory.clear()
+            part.memory.update({name: [of.of(rows) for of in parts] for name, parts in memory_at_start.items()})
+            allocation.actions = actions.of(allocation.all_rows)
+        return part
+
     def _count_undelivered(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         for name, undelivered in (("packets_without_agent", received), ("tx_status_without_agent", tx_status)):
             if len(undelivered):

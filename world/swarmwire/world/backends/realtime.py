@@ -23,7 +23,6 @@ Then `puts` returns, many times in a tick, the packets to send and their times; 
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +33,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.interfaces import SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings, joined_tables
+from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Allocation, rows_of
@@ -44,13 +44,14 @@ from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerHealth
 NO_PENDING = -1  # time of the oldest unanswered frame of a robot that has none
 
 
-class _SentFrame(NamedTuple):
+@dataclass(eq=False)
+class _SentFrame:
     """A frame that was sent to a runner."""
 
     tick: int
-    rows: IntArray  # (n,) robot rows in the order of the answer
-    packets: int  # received packets in it
-    tx_status: int  # transmit statuses in it
+    rows: IntArray  # (n,) robot rows without an answer, in the order of the answer
+    receivers: IntArray  # (k,) of the packets in it
+    senders: IntArray  # (k,) of the transmit statuses in it
     at_ns: int  # wall time, without pauses
 
 
@@ -135,7 +136,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
             if allocation.state == "ready" or self._on_loss not in NON_BLOCKING:
                 self._pending_since_ns[rows[self._pending_since_ns[rows] == NO_PENDING]] = start_ns
             if allocation.state == "ready":
-                allocation.unanswered.append(_SentFrame(tick, rows, len(part_received), len(part_status), now_ns))
+                allocation.unanswered.append(_SentFrame(tick, rows, part_received.receiver, part_status.row, now_ns))
                 out.append((allocation.runner or "", encode_tick(tick, part, part_received, part_status)))
             elif allocation.state != "dead":
                 self.packets_dropped += len(part_received)
@@ -184,12 +185,22 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         sent_frame = next((sent_frame for sent_frame in allocation.unanswered if sent_frame.tick == frame.tick), None)
         if sent_frame is None:
             raise BadFrame("wrong_tick", str(frame.tick))
-        actions, allocation.memory = decode_actions(frame, sent_frame.rows), self._memory(allocation, frame)
-        while allocation.unanswered[0] is not sent_frame:
-            self._drop(allocation.unanswered.popleft())
-        allocation.unanswered.popleft()
-        self.late[sent_frame.rows] += frame.tick < self._tick
-        self._pending_since_ns[sent_frame.rows], self._stopped[sent_frame.rows] = NO_PENDING, False
+        # A host may leave out robots whose processes are late, and send their answers later.
+        rows = frames.checked_array(frame, "rows", "<i8", (None,))
+        if not np.isin(rows, sent_frame.rows).all():
+            raise BadFrame("malformed", "rows: expected the runner's own robots, each once")
+        actions, allocation.memory = decode_actions(frame, rows), self._memory(allocation, frame)
+        for older in [*allocation.unanswered]:
+            if older is sent_frame:
+                break
+            self._drop(older, rows)
+            if not len(older.rows):
+                allocation.unanswered.remove(older)
+        sent_frame.rows = sent_frame.rows[~np.isin(sent_frame.rows, rows)]
+        if not len(sent_frame.rows):
+            allocation.unanswered.remove(sent_frame)
+        self.late[rows] += frame.tick < self._tick
+        self._pending_since_ns[rows], self._stopped[rows] = NO_PENDING, False
         commanded = actions.rows[actions.drive]
         self._drive[commanded] = True
         command: FloatArray = np.array((actions.linear_mps, actions.angular_radps, actions.lateral_mps))
@@ -214,17 +225,30 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
     def _free(self, allocation: RealTimeAllocation, runner: str, what: What, reason: str) -> None:
         super()._free(allocation, runner, what, reason)
         del self._numbers[runner]
-        while allocation.unanswered:
-            self._drop(allocation.unanswered.popleft())
+        for frame_sent in allocation.unanswered:
+            self._drop(frame_sent, frame_sent.rows)
+        allocation.unanswered.clear()
         if self._on_loss in NON_BLOCKING:
             self._pending_since_ns[allocation.all_rows] = NO_PENDING  # no frame is pending: nothing for the watchdog
         if allocation.state == "dead" or self._on_loss == "stand":
             self._stop(allocation.all_rows)
 
-    def _drop(self, frame_sent: _SentFrame) -> None:
-        self.frames_dropped += 1
-        self.packets_dropped += frame_sent.packets
-        self.tx_status_dropped += frame_sent.tx_status
+    def _split_off(self, allocation: RealTimeAllocation, rows: IntArray) -> RealTimeAllocation:
+        for frame_sent in [*allocation.unanswered]:
+            self._drop(frame_sent, rows)
+            if not len(frame_sent.rows):
+                allocation.unanswered.remove(frame_sent)
+        return super()._split_off(allocation, rows)
+
+    def _drop(self, frame_sent: _SentFrame, rows: IntArray) -> None:
+        """Count a frame as dropped by these of its robots, which have not answered it, and forget them."""
+        left = frame_sent.rows[~np.isin(frame_sent.rows, rows)]
+        dropped = frame_sent.rows[np.isin(frame_sent.rows, rows)]
+        if len(dropped):
+            self.frames_dropped += 1
+            self.packets_dropped += int(np.isin(frame_sent.receivers, dropped).sum())
+            self.tx_status_dropped += int(np.isin(frame_sent.senders, dropped).sum())
+            frame_sent.rows = left
 
     def _stop(self, rows: IntArray) -> None:
         self._stopped[rows] = self._drive[rows] = True

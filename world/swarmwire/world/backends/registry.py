@@ -12,13 +12,15 @@ from dataclasses import dataclass
 from typing import Generic, Literal
 
 import msgpack
+import numpy as np
 
+from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
 from swarmwire.comms.wire.join import JoinLimits, SessionInfo
-from swarmwire.world.backends.allocation import Allocations, AllocationT
+from swarmwire.world.backends.allocation import Allocation, Allocations, AllocationT
 from swarmwire.world.backends.join_policy import (
     DEFAULT_JOIN_POLICY,
     MAX_REASON_LETTERS,
@@ -73,6 +75,7 @@ class RunnerHealth:
     waits_for: str = ""  # the first runner that it waits for, and its robots
 
 
+MAX_PROCESS_LETTERS = 40  # of the name that a host gives to one of its processes
 MAX_TRACEBACK = 100_000  # characters of a runner's traceback, which is shown on terminals
 OnLoss = Literal["stop", "dead", "wait", "stand", "coast"]
 NON_BLOCKING = ("stand", "coast")  # policies under which a run that has begun waits for no runner
@@ -80,11 +83,12 @@ NON_BLOCKING = ("stand", "coast")  # policies under which a run that has begun w
 
 @dataclass(frozen=True)
 class Loss:
-    """A runner that was lost in a run that goes on."""
+    """A runner, or a process of an agent host, that was lost in a run that goes on."""
 
     runner: str
     robots: str
     reason: str
+    traceback: str = ""  # of its agent, if that failed
 
     def __str__(self) -> str:
         return f"{self.runner}, which played {self.robots}: {self.reason}"
@@ -96,12 +100,12 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     A free allocation holds robots without a runner. A runner that joins gets an allocation of its robots, cut from the
     free ones; `allocation.MOVES` holds the states. The loss of a runner has these effects, by `on_loss`:
 
-        a frame "failed"        AgentFailed                     (ends the run)
         a loss    stop          RunnerLost                      (ends the run; so does any loss before the first tick)
                   dead          the allocation is given up      (its robots stand still until the end)
                   wait          the allocation is free again    (the run waits until a runner plays its robots)
                   stand, coast  the allocation is free again    (the run goes on: its robots stand, or repeat their
                                                                 last command)
+        a frame "failed"        as a loss, but `stop` raises AgentFailed
         a frame "leave"         as a loss, but `stop` raises Interrupted: nothing failed
 
     An open run, whose runners come from elsewhere, tolerates losses before the first tick, too. Any other frame that
@@ -188,7 +192,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         """The health of the runners."""
         playing = [allocation for allocation in self._allocations if allocation.state in ("ready", "waiting")]
         return RunnerHealth(
-            len(playing),
+            sum(allocation.processes for allocation in playing),
             len(self.losses),
             frames_dropped=self._counts["frames_dropped_by_runners"],
             left=self._counts["runners_left"],
@@ -229,7 +233,8 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         memory = None
         if self._policy.memory is not None:
             memory = encode_memory({name: GroupMemory.joined(parts) for name, parts in allocation.memory.items()})
-        return msgpack.packb({**allocation.assignment.as_mapping(), "v": frames.VERSION, "memory": memory})
+        answer = {"timeout_s": self._policy.timeout_s, "answer_within_s": self._policy.answer_within_s}
+        return msgpack.packb({**allocation.assignment.as_mapping(), "v": frames.VERSION, "memory": memory, **answer})
 
     def gone(self, runner: str, reason: str) -> None:
         """A runner's liveliness token vanished: it is lost if it plays robots."""
@@ -244,7 +249,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
                 self._lose(allocation, reason)
 
     def answer(self, runner: str, data: bytes) -> list[tuple[str, bytes]]:
-        """Take a frame from a runner, and return frames to send, by runner. AgentFailed if the frame reports one."""
+        """Take a frame from a runner, and return frames to send, by runner; errors as the table above."""
         allocation = self._by_runner.get(runner)
         try:
             if allocation is None:
@@ -257,12 +262,15 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
                     self._counts["frames_dropped_by_runners"] += dropped
             elif frame.kind == "sent":
                 self._sent_between(allocation, frame)
+            elif frame.kind == "lost":
+                self._process_lost(allocation, frame)
             elif frame.kind == "failed":
-                self._failed(allocation, frame)
+                self._lose(allocation, "its agent failed", _failure(allocation, frame))
             elif frame.kind == "leave":
                 self._leave(allocation)
             elif frame.kind == "ready" and allocation.may("is ready"):
                 allocation.move("is ready")
+                allocation.processes = _processes(frame, allocation)
                 self._ready(allocation)
                 return [(runner, missed) for missed in self._catch_up(allocation)]
             else:
@@ -305,10 +313,12 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         """The memory of an allocation after this answer; BadFrame if the frame's memory is malformed."""
         if self._policy.memory is None:
             return allocation.memory
+        memory = dict(allocation.memory)
         rows = {group.name: group.rows for group in allocation.assignment.groups}
-        return allocation.memory | {
-            name: [memory] for name, memory in decode_memory(frame, self._policy.memory, rows).items()
-        }
+        for name, newest in decode_memory(frame, self._policy.memory, rows).items():
+            others = rows[name][~np.isin(rows[name], newest.rows)]  # of processes that are late
+            memory[name] = [*(old for part in memory.get(name, []) if len((old := part.of(others)).rows)), newest]
+        return memory
 
     def _holds_up(self, allocation: AllocationT) -> bool:
         """Whether the loop must wait for the runner of this allocation."""
@@ -316,12 +326,36 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
             return allocation.state == "waiting"
         return allocation.state not in ("ready", "dead")
 
-    def _lose(self, allocation: AllocationT, reason: str) -> None:
+    def _lose(self, allocation: AllocationT, reason: str, failure: AgentFailed | None = None) -> None:
         runner, robots = allocation.runner or "that did not join", allocation.assignment.robots_text
         if not self.bears_losses:
-            raise RunnerLost(runner, robots, reason)
+            raise failure or RunnerLost(runner, robots, reason)
         self._free(allocation, runner, "lost", reason)
-        self.losses.append(Loss(runner, robots, reason))
+        self.losses.append(Loss(runner, robots, reason, failure.traceback if failure else ""))
+
+    def _process_lost(self, allocation: AllocationT, frame: frames.Frame) -> None:
+        """A process of a host is gone: its robots are lost as those of a runner of its own; BadFrame if none are."""
+        rows = np.unique(frames.checked_array(frame, "rows", "<i8", (None,)))
+        process, reason = frame.values.get("process"), frame.values.get("reason")
+        if type(process) is not str or type(reason) is not str or not len(rows):
+            raise BadFrame("malformed", "expected rows, process and reason")
+        if not np.isin(rows, allocation.all_rows).all():
+            raise BadFrame("malformed", "rows: expected the runner's own robots")
+        why = printable(reason, MAX_REASON_LETTERS)
+        failure = _failure(allocation, frame) if "traceback" in frame.values else None
+        if len(rows) == len(allocation.all_rows):
+            self._lose(allocation, why, failure)
+            return
+        part = self._split_off(allocation, rows)
+        part.runner = f"{allocation.runner}/{printable(process, MAX_PROCESS_LETTERS)}"
+        self._by_runner[part.runner] = part
+        self._lose(part, why, failure)
+
+    def _split_off(self, allocation: AllocationT, rows: IntArray) -> AllocationT:
+        """Split some robots of a runner off, which are about to be lost."""
+        part = self._allocations.split_off(allocation, rows)
+        allocation.processes = max(allocation.processes - 1, 1)
+        return part
 
     def _leave(self, allocation: AllocationT) -> None:
         runner = allocation.runner or ""
@@ -350,11 +384,20 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     def _record(self, what: What, runner: str, allocation: AllocationT, reason: str = "") -> None:
         self.events.append(RunnerEvent(what, runner, allocation.assignment.robot_names, self._tick, reason))
 
-    def _failed(self, allocation: AllocationT, frame: frames.Frame) -> None:
-        match frame.values:
-            case {"robots": str(robots), "traceback": str(traceback)}:
-                raise AgentFailed(
-                    printable(robots, MAX_REASON_LETTERS), printable(traceback, MAX_TRACEBACK, keep="\n\t")
-                )
-            case _:
-                raise AgentFailed(allocation.assignment.robots_text, "(the runner sent no traceback)")
+
+def _failure(allocation: Allocation, frame: frames.Frame) -> AgentFailed:
+    """The failure of an agent in a frame "failed" or "lost"."""
+    match frame.values:
+        case {"robots": str(robots), "traceback": str(traceback)}:
+            shown = printable(traceback, MAX_TRACEBACK, keep="\n\t")
+            return AgentFailed(printable(robots, MAX_REASON_LETTERS), shown)
+        case _:
+            return AgentFailed(allocation.assignment.robots_text, "(the runner sent no traceback)")
+
+
+def _processes(frame: frames.Frame, allocation: Allocation) -> int:
+    """The number of a runner's processes in its frame "ready"; BadFrame for one that cannot be."""
+    processes = frame.values.get("processes", 1)
+    if type(processes) is not int or not 1 <= processes <= len(allocation.all_rows):
+        raise BadFrame("malformed", "processes: expected at least one, and at most one for each robot")
+    return processes

@@ -297,7 +297,8 @@ class ZenohBackend(ABC, Generic[R]):
         for event in self._registry.events[self._events_reported :]:
             if event.what in ("lost", "left"):
                 reason = {"why": event.reason} if event.reason else {}
-                self._publishers.pop(event.runner).put(frames.encode("end", -1, {}, reason))
+                if publisher := self._publishers.pop(event.runner, None):  # none for a process of a host
+                    publisher.put(frames.encode("end", -1, {}, reason))
                 self._present.discard(event.runner)
             self._hooks.changed(event, self._registry.missing_robots)
         self._events_reported = len(self._registry.events)

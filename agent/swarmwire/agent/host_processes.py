@@ -1,0 +1,209 @@
+"""The agent processes of a host: each gets its part of a tick, and answers; one that is gone or silent is lost alone.
+
+A process has at most one frame to answer, so no socket fills up. A tick for a process that is still busy waits, and is
+replaced by the next; in lockstep that does not happen. `AgentProcesses` has no network: the host carries its frames.
+"""
+
+import select
+import socket
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.process_frames import (
+    ACTIONS,
+    FAILED,
+    FIELDS,
+    Buffers,
+    RecordFields,
+    TickCutter,
+    content,
+    frame_kind,
+    frame_tick,
+    message,
+    receive,
+    record_fields,
+    send,
+)
+from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.assignment import Assignment, split
+from swarmwire.comms.packets import ReceivedPackets, TxStatuses
+from swarmwire.comms.tick_io import Readings
+
+
+@dataclass(eq=False)
+class AgentProcess:
+    """One process as its host sees it."""
+
+    number: int
+    assignment: Assignment
+    socket: socket.socket
+    busy_since_ns: int | None = None  # unanswered since; None: it waits for a frame
+    is_ready: bool = False
+    in_step: bool = False  # whether the unanswered frame is a tick
+    next_tick: Buffers = field(default_factory=list[bytes | memoryview])  # that waits while it is busy
+    next_packets: deque[Buffers] = field(default_factory=deque[Buffers])
+    fields_known: int = 0  # groups whose fields it has
+
+    @property
+    def rows(self) -> IntArray:
+        """Its robot rows, rising."""
+        return np.sort(np.concatenate([group.rows for group in self.assignment.groups]))
+
+
+class Answer(NamedTuple):
+    """A frame "actions" of a process."""
+
+    process: AgentProcess
+    tick: int
+    is_step: bool  # to a tick; else to packets between two
+    frame: bytes
+
+
+class Lost(NamedTuple):
+    """A process that is gone, or was ended: it answered nothing for too long."""
+
+    process: AgentProcess
+    reason: str
+
+
+class Failed(NamedTuple):
+    """A process that ended, since an agent raised: the robots of that, and the traceback."""
+
+    process: AgentProcess
+    robots: str
+    traceback: str
+
+
+class AgentProcesses:
+    """The agent processes of the robots of an assignment."""
+
+    def __init__(self, server: ForkServer, assignment: Assignment, processes: int, memory: bytes | None) -> None:
+        """Fork so many, at most one per robot. They are made ready in `events`."""
+        parts = split(assignment, processes)
+        rows = [np.sort(np.concatenate([group.rows for group in part.groups])).tolist() for part in parts]
+        sockets = server.fork(assignment, rows, memory)
+        for sock in sockets:
+            sock.setblocking(False)
+        self._server = server
+        self._processes = {
+            sock.fileno(): AgentProcess(number, part, sock)
+            for number, (part, sock) in enumerate(zip(parts, sockets, strict=True))
+        }
+        self._by_number = list(self._processes.values())
+        self._cutter = TickCutter(
+            [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()
+        )
+        self._fields: dict[str, RecordFields] = {}
+        self._poll = select.epoll()
+        for file in self._processes:
+            self._poll.register(file, select.EPOLLIN)
+
+    def fileno(self) -> int:
+        """The file that is readable once `events` has any."""
+        return self._poll.fileno()
+
+    @property
+    def are_ready(self) -> bool:
+        """Whether there are any, and their agents are made."""
+        return bool(self._processes) and all(process.is_ready for process in self._processes.values())
+
+    def __len__(self) -> int:
+        return len(self._processes)
+
+    def tick(
+        self, tick: int, now_ns: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses
+    ) -> list[AgentProcess]:
+        """Send each process its part of a tick; returns those that have robots in it."""
+        for name, group in readings.items():
+            if name not in self._fields:
+                self._fields[name] = record_fields(group)
+        asked: list[AgentProcess] = []
+        for process, buffers in zip(
+            self._by_number, self._cutter.tick(tick, readings, received, tx_status), strict=True
+        ):
+            if buffers and process.socket.fileno() >= 0:
+                asked.append(process)
+                process.next_tick = buffers
+                self._send_next(process, now_ns)
+        return asked
+
+    def packets(self, tick: int, at_ns: int, now_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+        """Send each process its packets and statuses between two ticks."""
+        for process, buffers in zip(
+            self._by_number, self._cutter.packets(tick, at_ns, received, tx_status), strict=True
+        ):
+            if buffers and process.socket.fileno() >= 0:
+                process.next_packets.append(buffers)
+                self._send_next(process, now_ns)
+
+    def events(self, now_ns: int) -> list[Answer | Lost | Failed]:
+        """Read what the processes sent, and send what waited for them."""
+        events: list[Answer | Lost | Failed] = []
+        for file, _ in self._poll.poll(0, max(len(self._processes), 1)):
+            process = self._processes[file]
+            try:
+                frame = receive(process.socket)
+            except OSError:
+                frame = b""
+            if not frame:
+                events.append(self.lose(process, ""))
+                continue
+            process.busy_since_ns = None
+            kind = frame_kind(frame)
+            if kind == FAILED:
+                self.lose(process, "")
+                events.append(Failed(process, **content(frame)))
+                continue
+            if kind == ACTIONS:
+                events.append(Answer(process, frame_tick(frame), process.in_step, frame))
+            process.is_ready = True
+            self._send_next(process, now_ns)
+        return events
+
+    def silent(self, now_ns: int, timeout_ns: int) -> list[AgentProcess]:
+        """The processes that have not answered for so long."""
+        return [
+            process
+            for process in self._processes.values()
+            if process.busy_since_ns is not None and now_ns - process.busy_since_ns > timeout_ns
+        ]
+
+    def lose(self, process: AgentProcess, reason: str) -> Lost:
+        """End a process; without a reason, it is the way in which it ended by itself."""
+        del self._processes[process.socket.fileno()]
+        self._poll.unregister(process.socket)
+        process.socket.close()
+        how = self._server.end(process.number)
+        return Lost(process, reason or f"its process {how}")
+
+    def close(self) -> None:
+        """End all processes."""
+        for process in [*self._processes.values()]:
+            process.socket.close()
+        self._processes.clear()
+        self._poll.close()
+
+    def _send_next(self, process: AgentProcess, now_ns: int) -> None:
+        """Send the next frame, if the process waits for one."""
+        if process.busy_since_ns is not None or not process.is_ready:
+            return
+        buffers: Buffers = []
+        if process.next_packets:
+            buffers, process.in_step = process.next_packets.popleft(), False
+        elif process.next_tick:
+            buffers, process.next_tick, process.in_step = process.next_tick, [], True
+        if not buffers:
+            return
+        process.busy_since_ns = now_ns
+        try:
+            if process.fields_known < len(self._fields):
+                names = [group.name for group in process.assignment.groups if group.name in self._fields]
+                send(process.socket, [message(FIELDS, {name: self._fields[name] for name in names})])
+                process.fields_known = len(self._fields)
+            send(process.socket, buffers)
+        except OSError:  # it is gone or reads nothing: `events` finds the end of its socket, or `silent` finds it
+            return

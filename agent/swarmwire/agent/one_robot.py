@@ -1,0 +1,304 @@
+"""The agent of one robot in a process of its own: a step without arrays.
+
+Packets, numbers of sensors and commands are plain floats and tuples, read and written with `struct`: in a process that
+shares its cores with hundreds of others, each use of numpy costs cold memory. An array is made only if the agent asks
+for one, as with the rays of a scan. The results are those of `host.AgentExecutor`, bit for bit.
+"""
+
+from collections.abc import Iterator, Mapping
+from struct import Struct
+from typing import Any, cast
+
+import msgpack
+import numpy as np
+
+from swarmwire.agent.agent import Agent
+from swarmwire.agent.host import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
+from swarmwire.agent.packet import ReceivedLists
+from swarmwire.agent.parameters import make
+from swarmwire.agent.process_frames import (
+    COMMAND,
+    COUNT,
+    HEAD,
+    NOT_ACTING,
+    PACKET_NUMBERS,
+    ROW,
+    SENT_PACKET,
+    STATUS,
+    TICK,
+    RecordFields,
+    answer_head,
+    packet_struct,
+)
+from swarmwire.agent.robot import Robot
+from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
+from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
+from swarmwire.comms.sensors.sensor import SensorProperty
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, encode_memory
+
+Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
+Status = tuple[int, int, int]  # row, id, result
+COLUMNS = {"receiver": 0, "sender": 1, "sequence": 2, "received_at_ns": 3}  # places in the head
+
+
+class OneRobotLists(ReceivedLists):
+    """The packets that one robot received."""
+
+    __slots__ = ("_measures", "_packets")
+
+    def __init__(self, packets: list[Packet], measures: tuple[str, ...], needs: tuple[str, ...]) -> None:
+        super().__init__(needs)
+        self._packets, self._measures = packets, measures
+
+    def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
+        """The payloads with a tag and, unless it is None, of this size; `row` is 0."""
+        low, high = tag & 0xFF, tag >> 8
+        for at, (_, payload) in enumerate(self._packets):
+            size = len(payload)
+            fits = size >= TAG_BYTES if size_bytes is None else size == size_bytes
+            if fits and payload[0] == low and payload[1] == high:
+                yield at, payload, 0, size
+
+    def _list(self, name: str) -> list[Any]:
+        place = COLUMNS[name] if name in COLUMNS else PACKET_NUMBERS + self._measures.index(name)
+        return [head[place] for head, _ in self._packets]
+
+
+class RobotContext(StepContext):
+    """One robot in one tick, without arrays."""
+
+    def __init__(
+        self,
+        agent: "OneRobotAgent",
+        time: tuple[int, int, int],
+        record: bytes | memoryview,
+        packets: list[Packet],
+        statuses: list[Status],
+        first_draw: int = 0,
+    ) -> None:
+        """`record` are the robot's readings; the lists are in the order of their tables."""
+        super().__init__(agent.group, agent.needs, time, agent.group.keys, first_draw)
+        self._agent, self._record, self._received, self._statuses = agent, record, packets, statuses
+        self._command: tuple[float, float, float, float] = NO_COMMAND
+        self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
+        self._lists: OneRobotLists | None = None
+
+    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
+        """The fields of a built-in sensor, each a float or (width,); NotDeclared as `fields`."""
+        self._require(sensor.name)
+        return [self._value(column) for column in sensor.columns]
+
+    def fields(self, sensor: str) -> Mapping[str, Any]:
+        """All fields of a sensor by name; NotDeclared if the agent's needs do not name the sensor."""
+        self._require(sensor)
+        prefix = f"{sensor}."
+        names = [name for name in self._agent.fields if name.startswith(prefix)]
+        return {name.removeprefix(prefix): (self._value(name),) for name in names}
+
+    def _value(self, column: str) -> Any:
+        first, last, is_single = self._agent.fields[column]
+        if is_single:
+            return FLOAT.unpack_from(self._record, first)[0]
+        return np.frombuffer(self._record, np.float64, (last - first) // FLOAT.size, first)
+
+    @property
+    def received_lists(self) -> OneRobotLists:
+        """All packets that the robot received."""
+        if self._lists is None:
+            self._lists = OneRobotLists(self._received, self._agent.measures, self.needs)
+        return self._lists
+
+    def tx_status(self) -> TxStatuses:
+        """Tx statuses of packets that the robot sent; NotDeclared if the agent's needs do not name them."""
+        self._require(TX_STATUS)
+        if not self._statuses:
+            return NO_TX_STATUSES
+        _, ids, results = np.array(self._statuses).T
+        return TxStatuses(np.zeros(len(ids), np.int64), ids, results)
+
+    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+        """Command the robot's speeds; the last command of a tick counts."""
+        self._command = 1.0, float(linear_mps), float(angular_radps), float(lateral_mps)
+
+    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet; returns its id."""
+        receiver, id_ = receiver_of(to), self._agent.sent
+        self._agent.sent = id_ + 1
+        tx_status_id = id_ if self._needs_tx_status and receiver != BROADCAST else NOT_MEASURED
+        self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
+        return id_
+
+    def end(self, robots: int = 1) -> bytes:
+        """The frame "actions"; the handle of this tick raises RuntimeError from now on."""
+        payloads = b"".join([payload for _, payload in self._outbox])
+        rest = self._rest() if self._tables or self._agent.keeps_memory else b""
+        parts = [answer_head(self.tick, robots, len(self._outbox), len(payloads), rest)]
+        if robots:
+            parts += (ROW.pack(self._agent.row), COMMAND.pack(*self._command))
+        parts += [SENT_PACKET.pack(*head) for head, _ in self._outbox]
+        parts += (payloads, rest)
+        vars(self).clear()
+        return b"".join(parts)
+
+    def end_receive(self) -> bytes:
+        """The frame "actions" of no robot, with the packets of `on_receive`; RuntimeError if it acted otherwise."""
+        if self._command[0] or self._tables:
+            raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
+        return self.end(robots=0)
+
+    def _rest(self) -> bytes:
+        """The sparse tables: of each its rows, places and values; and the names of states."""
+        tables: dict[str, Any] = {}
+        for name, values in self._tables.items():
+            (place,) = np.nonzero(~np.isnan(values[0]))
+            tables[name] = [self._agent.row] * len(place), place.tolist(), values[0, place].tolist()
+        memory = {"memory": self._agent.memory()} if self._agent.keeps_memory else {}
+        return msgpack.packb({"tables": tables, "states": list(self._states), **memory})
+
+
+FLOAT = Struct("<d")
+NO_COMMAND = 0.0, 0.0, 0.0, 0.0
+
+
+class OneRobotAgent:
+    """The `Agent` of a process's only robot.
+
+    Attributes:
+        group: the robot's group, with this robot alone.
+        row: the robot row.
+        sent: packets that the robot has sent so far.
+        fields: the place of each field in a record, in bytes: first, last, whether it is a single number.
+        measures: the names of the medium's measurements.
+    """
+
+    def __init__(
+        self, assignment: Assignment, kind: type[Agent], memory: Memory | None = None, *, keeps_memory: bool = False
+    ) -> None:
+        """AgentFailed if the agent cannot be made; `memory` is of an earlier agent of the robot.
+
+        With `keeps_memory`, each answer has the robot's memory.
+        """
+        (self.group,) = assignment.groups
+        self.needs, self.row, self.sent = kind.needs, int(self.group.rows[0]), 0
+        if memory:
+            self.sent = int(memory[self.group.name].columns[SENT][0])
+        self.keeps_memory = keeps_memory
+        self.fields: dict[str, tuple[int, int, bool]] = {}
+        self.measures = assignment.measures or ()
+        self.first_own = self.sent  # id of the first packet of this agent
+        self.acted = True  # whether the robot stepped in the last tick of its group, or is new
+        self._kind, self._rate_hz = kind, assignment.rate_hz
+        self._receives = kind.on_receive is not Agent.on_receive
+        self._head, self._record_bytes = packet_struct(len(self.measures)), 0
+        self._waiting: tuple[list[Packet], list[Status]] = [], []  # that arrived between ticks
+        self._last_record: memoryview | None = None  # of the last step, for `on_receive`
+        self._receive_calls = 0  # since the last step
+        self._agent = self._new_agent()
+
+    def memory(self) -> bytes:
+        """The robot's memory: a frame."""
+        columns = {SENT: np.array([self.sent]), FIRST_OWN: np.array([self.first_own]), ACTED: np.array([self.acted])}
+        return encode_memory({self.group.name: GroupMemory(self.group.rows, columns)})
+
+    def set_fields(self, fields: Mapping[str, RecordFields]) -> None:
+        """Set the fields of the records, by group: before the first tick."""
+        (of_group,) = fields.values()
+        self.fields = {name: (8 * first, 8 * last, single) for name, first, last, single in of_group}
+        self._record_bytes = 8 * (of_group[-1].last if of_group else 0)
+
+    def act(self, frame: bytes) -> bytes:
+        """The frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
+        _, kind, tick, at_ns, *_ = HEAD.unpack_from(frame)
+        return self._step(tick, frame) if kind == TICK else self._between(tick, at_ns, frame)
+
+    def _step(self, tick: int, frame: bytes) -> bytes:
+        (count,) = COUNT.unpack_from(frame, HEAD.size)
+        at = HEAD.size + COUNT.size + (ROW.size if count == 1 else 0)
+        record = memoryview(frame)[at : at + self._record_bytes]
+        if count == NOT_ACTING:
+            packets, statuses = self._packets(frame, at)
+            self._keep(packets, statuses)
+            return answer_head(tick, 0, 0, 0)
+        packets, statuses = self._packets(frame, at + self._record_bytes * count)
+        if self._waiting[0] or self._waiting[1]:
+            self._keep(packets, statuses)
+            packets, statuses = self._waiting
+            self._waiting = [], []
+        if count == 0:  # the robot is dead: what waited for it is lost, and its agent with it
+            self.acted = False
+            rest = msgpack.packb({"memory": self.memory()}) if self.keeps_memory else b""
+            return answer_head(tick, 0, 0, 0, rest) + rest
+        if not self.acted:  # it is back, with a new agent
+            self._agent, self.first_own, self.acted = self._new_agent(), self.sent, True
+        start_ns = tick_start_ns(tick, self._rate_hz)
+        time = tick, start_ns, tick_start_ns(tick + self.group.act_every_ticks, self._rate_hz) - start_ns
+        context = RobotContext(self, time, record, packets, self._own(statuses))
+        self._last_record, self._receive_calls = record, 0
+        self._call(self._agent.step, context)
+        return context.end()
+
+    def _between(self, tick: int, at_ns: int, frame: bytes) -> bytes:
+        self._keep(*self._packets(frame, HEAD.size))
+        if not self._receives or self._last_record is None or not self.acted:
+            return answer_head(tick, 0, 0, 0)
+        (packets, statuses), self._waiting = self._waiting, ([], [])
+        self._receive_calls += 1
+        own = self._own(statuses)
+        start_ns = tick_start_ns(tick, self._rate_hz)
+        period_ns = tick_start_ns(tick + self.group.act_every_ticks, self._rate_hz) - start_ns
+        first_draw = self._receive_calls * DRAWS_PER_CALL
+        context = RobotContext(self, (tick, at_ns, period_ns), self._last_record, packets, own, first_draw)
+        if packets or own:
+            self._call(self._agent.on_receive, context)
+        try:
+            return context.end_receive()
+        except RuntimeError as error:
+            raise failed(list(self.group.robot_names), error) from error
+
+    def _call(self, method: Any, context: RobotContext) -> None:
+        try:
+            method(Robot(context, 0))
+        except (Exception, SystemExit) as error:
+            raise failed(list(self.group.robot_names), error, context) from error
+
+    def _packets(self, frame: bytes, at: int) -> tuple[list[Packet], list[Status]]:
+        """The packets and statuses of a frame, which begin at a byte."""
+        *_, count, statuses, _ = HEAD.unpack_from(frame)
+        packets: list[Packet] = []
+        after = at + count * self._head.size
+        start = after + statuses * STATUS.size  # of the payloads
+        for head in self._head.iter_unpack(memoryview(frame)[at:after]):
+            end = start + head[4]
+            packets.append((head, frame[start:end]))
+            start = end
+        if not statuses:
+            return packets, []
+        return packets, cast(
+            "list[Status]", list(STATUS.iter_unpack(memoryview(frame)[after : after + statuses * STATUS.size]))
+        )
+
+    def _keep(self, packets: list[Packet], statuses: list[Status]) -> None:
+        """Keep packets and statuses until the robot steps or reads them, in the order of their tables."""
+        if packets:
+            self._waiting[0].extend(packets)
+            self._waiting[0].sort(key=_by_time)
+        if statuses:
+            self._waiting[1].extend(statuses)
+            self._waiting[1].sort()
+
+    def _own(self, statuses: list[Status]) -> list[Status]:
+        """Statuses of packets of this agent: those of an earlier one are left out."""
+        return [status for status in statuses if self.first_own <= status[1] < self.sent]
+
+    def _new_agent(self) -> Agent:
+        try:
+            return make(self._kind, self.group.params)
+        except (Exception, SystemExit) as error:
+            raise failed(list(self.group.robot_names), error) from error
+
+
+def _by_time(packet: Packet) -> tuple[int, int, int]:
+    head, _ = packet
+    return head[3], head[1], head[2]

@@ -1,0 +1,141 @@
+"""Robots in processes of their own act as in one process, bit for bit: frames that are cut, steps without arrays."""
+
+import socket
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.agent.agent_process import ManyRobots, agents_of
+from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.one_robot import OneRobotAgent
+from swarmwire.agent.process_frames import message, receive, send
+from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
+from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.wire.agent_memory import encode_memory
+from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
+from tests.support.agent.processes import Processes
+
+ROWS = range(6)
+AGENTS = ("Chatter", "Counter", "Insisting", "VectorInsisting", "VectorCounter")
+
+
+def everything(actions: Actions) -> list[Any]:
+    """Actions as plain values, with their tables and the ids of transmit statuses."""
+    order = np.argsort(actions.sent.sender, kind="stable")
+    notes = {
+        (row, actions.notes.names[int(at)]) for row, at in zip(actions.notes.rows, actions.notes.value, strict=True)
+    }
+    values = sorted(zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True))
+    return [plain(actions), actions.sent.tx_status_ids[order].tolist(), notes, values]
+
+
+def statuses(sent: SentPackets) -> TxStatuses:
+    """A status of each unicast packet."""
+    at = np.flatnonzero(sent.tx_status_ids >= 0)
+    table = np.array((sent.sender[at], sent.tx_status_ids[at], sent.sender[at] % 2))
+    return TxStatuses(*table[:, np.lexsort((table[1], table[0]))])
+
+
+@given(
+    agents=st.tuples(st.sampled_from(AGENTS), st.sampled_from(AGENTS)),
+    second=st.sets(st.sampled_from(ROWS), max_size=5),
+    processes=st.integers(1, len(ROWS)),
+    acting=st.lists(st.sets(st.sampled_from(ROWS)), min_size=1, max_size=6),
+)
+def test_the_actions_are_those_of_one_process(
+    agents: tuple[str, str], second: set[int], processes: int, acting: list[set[int]]
+) -> None:
+    """For any processes, agents and robots that act: the others are dead, and come back with new agents."""
+    groups = {"flock": sorted({*ROWS} - second), "others": sorted(second)}
+    kinds = zip(groups.items(), agents, strict=True)
+    whole = assignment(*(group(spec(agent), rows, name) for (name, rows), agent in kinds if rows))
+    one, many = AgentExecutor(whole), Processes(whole, processes)
+    received, tx_status = SILENCE, NO_TX_STATUSES
+    for tick, alive in enumerate(acting):
+        sensed = {name: readings(tick, [row for row in rows if row in alive]) for name, rows in groups.items() if rows}
+        expected = one.act(tick, sensed, received, tx_status)
+        actions = many.act(tick, sensed, received, tx_status)
+        assert actions.rows.tolist() == expected.rows.tolist()
+        assert everything(actions) == everything(expected)
+        received, tx_status = received_from(expected.sent, sorted(alive)), statuses(expected.sent)
+
+
+@given(
+    agents=st.sampled_from(("Echo", "VectorEcho", "Chatter")),
+    processes=st.integers(1, len(ROWS)),
+    steps=st.lists(st.tuples(st.booleans(), st.sets(st.sampled_from(ROWS), min_size=1)), min_size=1, max_size=8),
+)
+def test_packets_between_ticks_are_those_of_one_process(
+    agents: str, processes: int, steps: list[tuple[bool, set[int]]]
+) -> None:
+    whole = assignment(group(spec(agents), [*ROWS]))
+    one, many = AgentExecutor(whole), Processes(whole, processes)
+    for tick, (is_step, senders) in enumerate(steps):
+        received = received_from(words(*sorted(senders)), [*ROWS])
+        if is_step:
+            sensed = {"flock": readings(tick, [*ROWS])}
+            expected = one.act(tick, sensed, received)
+            assert everything(many.act(tick, sensed, received, NO_TX_STATUSES)) == everything(expected)
+        else:
+            one.receive(received, NO_TX_STATUSES)
+            expected = one.on_receive(tick, 1000 * tick)
+            sent = many.on_receive(tick, 1000 * tick, received, NO_TX_STATUSES)
+            assert sorted(zip(sent.sender.tolist(), map(sent.payloads.row, range(len(sent))), strict=True)) == sorted(
+                zip(expected.sender.tolist(), map(expected.payloads.row, range(len(expected))), strict=True)
+            )
+
+
+def test_one_agent_has_no_arrays_and_vector_agents_have() -> None:
+    kinds = {name: type(agents_of(assignment(group(spec(name), [3])), None)) for name in ("Counter", "VectorCounter")}
+    assert kinds == {"Counter": OneRobotAgent, "VectorCounter": ManyRobots}
+
+
+@pytest.mark.parametrize("agent", ["Counter", "VectorCounter"])
+def test_memory_goes_on_in_the_next_process(agent: str) -> None:
+    """The numbers of packets go on, and the State of a VectorAgent."""
+    whole = assignment(group(spec(agent), [*ROWS]))
+    first, one = Processes(whole, 6, encode_memory({})), AgentExecutor(whole)
+    sensed = {"flock": readings(0, [*ROWS])}
+    one.act(0, sensed, SILENCE)
+    first.act(0, sensed, SILENCE, NO_TX_STATUSES)
+    memory = one.memory(["flock"])
+    for part in first.memory:
+        kept = memory["flock"].of(part["flock"].rows)
+        assert {name: column.tolist() for name, column in part["flock"].columns.items()} == {
+            name: column.tolist() for name, column in kept.columns.items()
+        }
+    again, as_before = Processes(whole, 3, encode_memory(memory)), AgentExecutor(whole, memory)
+    sensed = {"flock": readings(1, [*ROWS])}
+    expected = as_before.act(1, sensed, SILENCE)
+    assert everything(again.act(1, sensed, SILENCE, NO_TX_STATUSES)) == everything(expected)
+
+
+def test_a_failure_names_the_robot_and_begins_in_the_agents_code() -> None:
+    processes = Processes(assignment(group(spec("Failing"), [0])), 1)
+
+    def play() -> None:
+        for tick in range(20):
+            processes.act(tick, {"flock": readings(tick, [0])}, SILENCE, NO_TX_STATUSES)
+
+    with pytest.raises(AgentFailed) as caught:
+        play()
+    assert caught.value.robots == "flock-0"
+    first, *_ = [line for line in caught.value.traceback.splitlines() if "File " in line]
+    assert "players.py" in first
+
+
+def test_a_frame_of_any_size_arrives_whole() -> None:
+    """Also one of several messages."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        for size in (0, 1, 65_000, 65_535, 65_536, 200_000, 1_000_000):
+            frame = message(0, b"x" * size)
+            sender = threading.Thread(target=send, args=(ours, [frame[:10], frame[10:]]))
+            sender.start()
+            assert receive(theirs) == frame
+            sender.join()
