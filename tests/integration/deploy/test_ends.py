@@ -242,7 +242,7 @@ class Vandal(Observer):
         if truth.tick != 3:
             return
         with open_runner(unix_endpoint(self._path)) as session:
-            answer = self.keys.answer("r0")
+            answer = self.keys.answer("host")
             rows = np.arange(7, dtype=np.int64)
             nothing = {"rows": rows, "command": np.zeros((4, 7))}
             for key, payload in (
@@ -252,9 +252,9 @@ class Vandal(Observer):
                 (answer, frames.encode("dance", 4, {})),
                 (answer, frames.encode("actions", 1, nothing)),
                 (self.keys.answer("stranger"), frames.encode("actions", 4, {})),
-                (self.keys.frame("r1"), b"\x00garbage"),
-                (self.keys.frame("r1"), frames.encode("tick", 0, {})),
-                ("swarmwire/*/answer/r0", frames.encode("failed", 4, {}, {"robots": "all", "traceback": "lies"})),
+                (self.keys.frame("host"), b"\x00garbage"),
+                (self.keys.frame("host"), frames.encode("tick", 0, {})),
+                ("swarmwire/*/answer/host", frames.encode("failed", 4, {}, {"robots": "all", "traceback": "lies"})),
             ):
                 session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
             # The loop, in whose thread this runs, can only answer afterwards.
