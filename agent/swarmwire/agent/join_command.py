@@ -4,7 +4,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import FrameType
@@ -83,9 +83,8 @@ def join_and_report(settings: "JoinSettings", processes: int | None = None) -> i
     if replace(settings.network, connect=(settings.endpoint,)).warning is not None:
         _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
     arrivals = Arrivals()
-    with _leaving_by_signals(arrivals):
+    with closing(server), _leaving_by_signals(arrivals):
         ended = join(settings, arrivals, _say, server, processes)
-    server.close()
     _say(_END_TEXTS[ended.how] + (f": {ended.why}" if ended.why else ""))
     return _EXIT_CODES[ended.how]
 

@@ -29,7 +29,6 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
 
 ANSWER_WITHIN = 0.8  # of a tick of real time, after which a host answers without its late processes
-HOST_GRACE_S = 1.0  # beyond the time-out of a process: its host has to report that it does not answer
 KEPT = ("wait", "stand", "coast")  # answers to a lost runner after which another may take over
 
 
@@ -138,7 +137,7 @@ class Backends:
     ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
         policy = self._join_policy(factor)
-        timeout_s, on_loss = table.runner_timeout_s + HOST_GRACE_S, table.on_runner_loss
+        timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
         if self.pace:
             return RealTimeBackend(
                 door,

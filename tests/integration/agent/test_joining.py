@@ -2,14 +2,13 @@
 
 import hashlib
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 import zenoh
 
 from swarmwire.agent import joining as joining_module
-from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import BadInput, RunnerLost
@@ -22,11 +21,11 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.comms.wire.tick_frames import encode_tick
 from tests.support.agent.hosts import MEASURES, readings, spec
 from tests.support.agent.made_up_world import NOTHING, OFFER, OFFERED, REFUSED, MadeUpWorld, given, made_up_world
-from tests.support.agent.processes import ThreadServer
+from tests.support.agent.processes import thread_server
 
 END = frames.encode("end", -1, {})
 SHORT_S = 0.3
-SERVER = cast("ForkServer", ThreadServer())
+SERVER = thread_server()
 
 
 def ticks_of(*numbers: int) -> list[bytes]:

@@ -17,6 +17,7 @@ from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
+from tests.support.agent.processes import thread_server
 from tests.support.deploy.pseudo_terminal import terminal
 from tests.support.deploy.runs import LOSSY, called, swarmwire
 
@@ -252,4 +253,4 @@ def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why)
 
 def test_where_nobody_listens_it_says_so():
     with pytest.raises(RunnerLost, match="nobody answers at tcp/127.0.0.1:1$"):
-        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print)
+        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print, thread_server())

@@ -21,6 +21,7 @@ from swarmwire.deploy.live.following import read_live
 from swarmwire.deploy.live.remote_control import Announced, RemoteControl, controlling, found_runs
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
+from tests.support.agent.processes import thread_server
 from tests.support.clocks import until
 from tests.support.deploy.joiners import HERE, Joiners
 from tests.support.deploy.runs import LOSSY
@@ -214,7 +215,7 @@ def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():
         endpoint = listens_at(world)[0]
         token = world.liveliness().declare_token(Keys("3f2a").world)
         with pytest.raises(BadInput, match=r"--run: expected one of the runs at .*: 3f2a, got 1234"):
-            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), print)
+            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), print, thread_server())
         with pytest.raises(RunnerLost, match="told nothing of its run"):  # this one is asked
-            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), print)
+            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), print, thread_server())
         token.undeclare()

@@ -11,13 +11,11 @@ from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import cast
 
 import psutil
 import pytest
 
 from swarmwire.agent import runner
-from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import WallClock, to_ns
@@ -33,7 +31,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.registry import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
-from tests.support.agent.processes import ThreadServer
+from tests.support.agent.processes import thread_server
 from tests.support.clocks import TIMEOUT_S, until
 
 RUN = "r1"
@@ -84,7 +82,7 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
 
     def play() -> None:
         try:
-            runner.run(endpoint, RUN, name, cast("ForkServer", ThreadServer()), 1)
+            runner.run(endpoint, RUN, name, thread_server(), 1)
         except BaseException as error:  # noqa: BLE001 - the test asks how it ended
             ends.put(error)
         else:
@@ -225,7 +223,7 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
 def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
     with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
-        runner.run(endpoint, RUN, "r0", cast("ForkServer", ThreadServer()))
+        runner.run(endpoint, RUN, "r0", thread_server())
 
 
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(

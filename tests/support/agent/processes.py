@@ -3,10 +3,11 @@
 import socket
 import threading
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
-from swarmwire.agent.agent_process import agents_of, serve
+from swarmwire.agent.agent_process import ForkServer, agents_of, serve
 from swarmwire.agent.process_frames import TickCutter, in_order, read_actions, record_fields
 from swarmwire.comms.assignment import Assignment, part_of, split
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
@@ -43,6 +44,11 @@ class Processes:
         pairs = zip(self.agents, frames, strict=True)
         actions, _ = read_actions([agents.act(b"".join(buffers)) for agents, buffers in pairs if buffers])
         return actions.sent
+
+
+def thread_server() -> ForkServer:
+    """A `ThreadServer`, as what it stands for."""
+    return cast("ForkServer", ThreadServer())
 
 
 class ThreadServer:

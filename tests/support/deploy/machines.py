@@ -29,6 +29,7 @@ from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.simulation import finished
+from tests.support.agent.processes import thread_server
 from tests.support.deploy.runs import LOSSY
 
 SHORT = ["duration_s=2"]
@@ -112,7 +113,7 @@ class GuardedWorld(Observer, JoinObserver):
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
         options = JoinOptions(JoinRequest(names=robots))
         with self.session_of(name) as session:
-            runner.play(session, self.keys, name, runner.Arrivals(), lambda: options)
+            runner.play(session, self.keys, name, runner.Arrivals(), lambda: options, thread_server(), 1)
 
 
 class Machine:

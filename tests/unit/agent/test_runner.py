@@ -10,7 +10,6 @@ import pytest
 import zenoh
 
 from swarmwire.agent import agent_process, join_command, runner
-from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
@@ -22,7 +21,7 @@ from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
 from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, spec, words
-from tests.support.agent.processes import ThreadServer
+from tests.support.agent.processes import thread_server
 
 KEYS = Keys("run1")
 END = frames.encode("end", -1, {})
@@ -108,8 +107,8 @@ class FakeSession:
 
 
 def played(session: Any, arrivals: Arrivals | None = None, say: Callable[[str], None] = lambda _: None) -> Ended:
-    server = ThreadServer()
-    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, cast("ForkServer", server), 1, say)
+    server = thread_server()
+    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, server, 1, say)
     server.close()
     return ended
 
@@ -219,7 +218,7 @@ def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, caps
         return cast("Ended", protocol.next_event())
 
     monkeypatch.setattr("swarmwire.agent.joining.join", killed)
-    monkeypatch.setattr(agent_process, "ForkServer", ThreadServer)
+    monkeypatch.setattr(agent_process, "ForkServer", thread_server)
     before, ended_by = signal.signal(signal.SIGINT, interrupt), signal.getsignal(signal.SIGTERM)
     try:
         assert join_command.join_and_report(JoinSettings("tcp/127.0.0.1:1")) == INTERRUPTED

@@ -49,6 +49,9 @@ class ListenSettings:
     access: Mapping[str, Any] | None = None
 
 
+HOST_GRACE_S = 1.0  # beyond the time-out of a process: its host has to report that it does not answer
+
+
 @dataclass(frozen=True)
 class JoinPolicy:
     """The conditions under which runners join a run.

@@ -37,7 +37,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Allocation, rows_of
-from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy
+from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, HOST_GRACE_S, JoinPolicy
 from swarmwire.world.backends.lockstep import acting_rows, split_readings, split_received, split_tx_status
 from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerHealth, RunnerRegistry, What
 
@@ -128,7 +128,8 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         for allocation, part, part_received, part_status in zip(
             self._allocations, parts, received_parts, status_parts, strict=True
         ):
-            if allocation.unanswered and now_ns - allocation.unanswered[0].at_ns > self._timeout_ns:
+            grace_ns = to_ns(HOST_GRACE_S) if allocation.processes > 1 else 0
+            if allocation.unanswered and now_ns - allocation.unanswered[0].at_ns > self._timeout_ns + grace_ns:
                 self._lose(allocation, f"no answer for {to_s(self._timeout_ns):g} s")
             if not part:  # none of its groups acts
                 continue

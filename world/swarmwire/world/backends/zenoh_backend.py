@@ -24,7 +24,13 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy, JoinRefused, ListenSettings
+from swarmwire.world.backends.join_policy import (
+    DEFAULT_JOIN_POLICY,
+    HOST_GRACE_S,
+    JoinPolicy,
+    JoinRefused,
+    ListenSettings,
+)
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import Loss, OnLoss, RunnerEvent, RunnerHealth, RunnerRegistry
 
@@ -204,7 +210,7 @@ class ZenohBackend(ABC, Generic[R]):
 
     def _allow_time(self) -> None:
         self._checked_ns = self._clock.now_ns()
-        self._deadline_ns = self._checked_ns + to_ns(self._wait_timeout_s)
+        self._deadline_ns = self._checked_ns + to_ns(self._wait_timeout_s + HOST_GRACE_S)
 
     def _check_time(self) -> int:
         """The time. If this process was frozen, all deadlines move by that time: no runner is to blame for it."""
