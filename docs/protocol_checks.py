@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from swarmwire.agent import runner
+from swarmwire.agent import runner_protocol
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.bodies.body import load_body
@@ -24,7 +24,7 @@ from swarmwire.world.backends import inbox, join_policy, lockstep, realtime, reg
 
 PAGE = Path(__file__).parent / "protocol.md"
 ROWS = np.array([4, 6])
-ENCODERS = (runner, tick_frames, zenoh_backend)
+ENCODERS = (runner_protocol, tick_frames, zenoh_backend)
 COUNTERS = (frames, frames, tick_frames, join_policy, registry, lockstep, realtime, inbox)
 
 
@@ -70,7 +70,7 @@ def _joining(page: _Page) -> Iterator[Comparison]:
         "session_info": _names(SessionInfo) | {"v"},
         "group": _names(GroupInfo),
         "join request": _names(JoinRequest) | {"v"},
-        "assignment": {*assigned, "v", "memory"},
+        "assignment": {*assigned, "v", "memory", "timeout_s", "answer_within_s"},
         "assigned group": set(assigned["groups"][0]),
         "frame": set(msgpack.unpackb(frames.encode("end", -1, {}))),
     }.items():

@@ -25,6 +25,7 @@ swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages
 .ci/uv run --no-sync python -m docs.pictures.runner_states
+.ci/uv run --no-sync python -m docs.pictures.agent_processes
 .ci/uv run --no-sync python -m docs.pictures.parts
 .ci/uv run --no-sync python -m docs.pictures.robots
 .ci/uv run --no-sync python -m docs.pictures.tick_figure

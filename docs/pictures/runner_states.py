@@ -27,8 +27,7 @@ RUNNER: Places = {
     "joined": (360.0, 90.0),
     "ready": (520.0, 90.0),
     "acting": (690.0, 90.0),
-    "failed": (420.0, 210.0),
-    "leaving": (610.0, 210.0),
+    "leaving": (520.0, 210.0),
     "ended": (60.0, 210.0),
 }
 WITH_ROBOTS = ("joined", "ready", "acting")  # in one frame, from which the moves start that all of them have

@@ -14,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -134,6 +135,8 @@ def _fork(control: socket.socket, assignment: Assignment, memory: bytes | None) 
         control.close()
         of_host.close()
         _end_with_parent()
+        with suppress(OSError):  # without memory, the system is to end this process and not the world
+            Path("/proc/self/oom_score_adj").write_text("500")
         _exit_after(lambda: serve(of_process, lambda: agents_of(assignment, memory)))
     of_process.close()
     socket.send_fds(control, [b"s"], [of_host.fileno()])
