@@ -22,9 +22,7 @@ def draw(to: Path = DOCS / "agent-processes.svg") -> None:
         text(452.0, 124.0, "①", 14),
         text(566.0, 110.0, "①", 14),
         text(20.0, 350.0, "① a zenoh session: one frame to the host and one back in each tick", 13),
-        text(
-            20.0, 371.0, "② a pair of Unix sockets: one frame to the process and one back; it has no other socket", 13
-        ),
+        text(20.0, 371.0, "② a pair of Unix sockets: one frame to the process, one back; it has no other socket", 13),
     ]
     title = "One zenoh session for each agent host, one socket pair for each agent process"
     to.write_text(page(title, 790.0, 384.0, shapes), encoding="utf-8")
