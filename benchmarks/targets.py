@@ -67,7 +67,7 @@ TARGETS = {
     "processes-1000-memory": most(16, "of world, agent host and runners together, as sum of their PSS"),
     "wire-over-floor": most(
         1.6,
-        "a tick of `processes-200` over that of as many processes that echo as many bytes, plus the agents' own time",
+        "a tick of `processes-200` over as many bytes to processes that only answer, plus the agents' own time",
     ),
     "realtime-50": most(
         2, "50 robots that relay, 2 runners, 1 ms subtick: 99 % of packets are handed over no later than so after due"

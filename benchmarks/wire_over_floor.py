@@ -1,64 +1,44 @@
-"""What a lockstep tick costs beyond zenoh and the agents: against processes that only answer, in the same minutes.
+"""A lockstep tick beside its floor: as many processes that only answer, in the same minutes, and the agents' time.
 
-After every few ticks of the run as many bytes go to 200 processes that answer at once, with as many bytes, and nothing
-else: the floor. Agents tell how much processor time their steps took; on so many cores the sum of it is added to the
-floor.
+After every few ticks of the run as many bytes go to as many processes, over socket pairs, and come back: the floor.
+Agents tell how much processor time their steps took; the sum of it, shared by the cores, is added to the floor.
 """
 
-# zenoh's stubs leave out the return type of put.
-# pyright: reportUnknownMemberType=false
-
 import os
-import queue
 import statistics
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any
-from unittest.mock import patch
-
-import zenoh
 
 from benchmarks import scenes
-from benchmarks.echoes import RUN
 from benchmarks.lines import report
+from swarmwire.agent import process_frames
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
-from swarmwire.comms.wire import frames, tick_frames
-from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.sessions import close_session, open_world, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.world.scenario_file import scenario_from
 
 AGENT = "benchmarks.agents:TimedBoid"
 EVERY, WARM = 10, 20  # ticks
+READINGS, MEASURES, PAYLOAD_BYTES, PACKETS = 9, 2, 6, 10  # of a robot: rays and heading; range and bearing
 CLOCK = WallClock()
 
 
 class Floor:
-    """Processes that only answer, and a world's session that asks them."""
+    """The processes that only answer."""
 
-    def __init__(self, session: zenoh.Session, names: list[str], sent_bytes: int) -> None:
-        keys = Keys(RUN)
-        self._inbox: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-        self._subscriber = session.declare_subscriber(keys.any_answer, (self._inbox.put, self._inbox))
-        self._frames = [
-            session.declare_publisher(keys.frame(name), congestion_control=zenoh.CongestionControl.BLOCK, express=True)
-            for name in names
-        ]
-        self._data = bytes(sent_bytes)
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        assert process.stdin
+        assert process.stdout
+        self._stdin, self._stdout = process.stdin, process.stdout
 
     def tick_s(self) -> float:
-        """How long it takes to ask them all and to have all answers."""
-        start_s = CLOCK.now_ns() * 1e-9
-        for publisher in self._frames:
-            publisher.put(self._data)
-        for _ in self._frames:
-            self._inbox.get(timeout=60.0).payload.to_bytes()
-        return CLOCK.now_ns() * 1e-9 - start_s
+        """How long it takes to send each a frame and to have all answers."""
+        self._stdin.write("\n")
+        self._stdin.flush()
+        return int(self._stdout.readline()) * 1e-9
 
 
 class Stopwatch(Observer):
@@ -72,11 +52,11 @@ class Stopwatch(Observer):
     def see(self, truth: Truth) -> None:
         """The end of a tick."""
         now_s = CLOCK.now_ns() * 1e-9
-        if truth.tick >= WARM and truth.value is not None:
+        if truth.tick >= WARM and truth.tick % EVERY and truth.value is not None:  # the first after a floor is cold
             self.tick_s.append(now_s - self._since_s)
             self.agents_s.append(float(truth.value.sum()))
         if truth.tick % EVERY == EVERY - 1:
-            self._floor.tick_s()  # the first after a while finds its processes cold
+            self._floor.tick_s()  # so is the first of the floor
             self.floor_s += [self._floor.tick_s() for _ in range(3)]
         self._since_s = CLOCK.now_ns() * 1e-9
 
@@ -84,10 +64,11 @@ class Stopwatch(Observer):
 def wire_over_floor(name: str, repeats: int, *, robots: int, ticks: int) -> None:
     """A tick over the floor plus the agents' own time."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10, AGENT), name)
-    sent_bytes, answer_bytes = _sizes(lambda: run(scenario.model_copy(update={"duration_s": 2.0}), runners=robots))
-    with _echoes([f"e{at}" for at in range(robots)], sent_bytes, answer_bytes) as floor:
+    run(scenario.model_copy(update={"duration_s": 1.0}))  # kernels
+    sent_bytes, answer_bytes = _sizes()
+    with _floor(robots, sent_bytes, answer_bytes) as floor:
         watch = Stopwatch(floor)
-        result = run(scenario, runners=robots, observers=[watch])
+        result = run(scenario, runners="per-robot", observers=[watch])
     tick_s, floor_s = statistics.median(watch.tick_s), statistics.median(watch.floor_s)
     cores = os.cpu_count() or 1
     agents_s = statistics.median(watch.agents_s) / cores
@@ -103,41 +84,17 @@ def wire_over_floor(name: str, repeats: int, *, robots: int, ticks: int) -> None
     report(name, tick_s / (floor_s + agents_s), "x floor and agents", result, config)
 
 
-def _sizes(run_some: Callable[[], object]) -> tuple[int, int]:
-    """Bytes of the middle frame of a run and of the middle answer."""
-    sent, answers = list[int](), list[int]()
-    encode, decode = tick_frames.encode_tick, frames.decode
-
-    def encoded(*given: Any) -> bytes:
-        data = encode(*given)
-        sent.append(len(data))
-        return data
-
-    def decoded(data: bytes) -> frames.Frame:
-        answers.append(len(data))
-        return decode(data)
-
-    with patch("swarmwire.world.backends.lockstep.encode_tick", encoded), patch.object(frames, "decode", decoded):
-        run_some()
-    return int(statistics.median(sent)), int(statistics.median(answers))
+def _sizes() -> tuple[int, int]:
+    """Bytes of the frame to a process that receives ten packets, and of its answer with one."""
+    packet = process_frames.packet_struct(MEASURES).size + PAYLOAD_BYTES
+    head = process_frames.HEAD.size + process_frames.COUNT.size + process_frames.ROW.size
+    return head + 8 * READINGS + PACKETS * packet, len(process_frames.answer_head(0, 1, 1, PAYLOAD_BYTES)) + 78
 
 
 @contextmanager
-def _echoes(names: list[str], sent_bytes: int, answer_bytes: int) -> Generator[Floor]:
-    with tempfile.TemporaryDirectory(prefix="sw-") as folder:
-        endpoint = unix_endpoint(f"{folder}/floor")
-        session = open_world(endpoint, runner_timeout_s=60.0)
-        alive: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
-        tokens = session.liveliness().declare_subscriber(Keys(RUN).any_alive, (alive.put, alive), history=True)
-        command = [sys.executable, "-m", "benchmarks.echoes", endpoint, str(answer_bytes), *names]
-        with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
-            try:
-                for _ in names:
-                    alive.get(timeout=60.0)
-                yield Floor(session, names, sent_bytes)
-            finally:
-                if process.stdin is not None:
-                    process.stdin.close()
-                process.wait()
-                del tokens
-                close_session(session)
+def _floor(processes: int, sent_bytes: int, answer_bytes: int) -> Generator[Floor]:
+    command = [sys.executable, "-m", "benchmarks.floor", *map(str, (processes, sent_bytes, answer_bytes))]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield Floor(process)
+        if process.stdin:
+            process.stdin.close()
