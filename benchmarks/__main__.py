@@ -15,7 +15,7 @@ from benchmarks.deploy_fleet import deploy_fleet
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
-from benchmarks.processes import BOID, FLOCKING, processes
+from benchmarks.processes import BOID, processes
 from benchmarks.radio import CASES as AIRS
 from benchmarks.radio import air_cost, air_scaling
 from benchmarks.realtime import realtime
@@ -42,7 +42,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     **dict.fromkeys(AIRS, air_cost),
     "radio-scaling": air_scaling,
     "campaign-1000x10": campaign,
-    "processes-100": partial(processes, robots=100, ticks=300, agent=FLOCKING),
+    "processes-100": partial(processes, robots=100, ticks=300, agent=BOID),
     "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),
     "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
     "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),

@@ -12,7 +12,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.runners import AGENT_HOST
 from swarmwire.world.scenario_file import scenario_from
 
-FLOCKING, BOID = "swarmwire.agent.behaviours:Flocking", "benchmarks.agents:Boid"
+BOID = "benchmarks.agents:Boid"
 
 
 class Consumption(Observer):

@@ -58,19 +58,19 @@ TARGETS = {
     "campaign-1000x10": most(
         25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),
-    "processes-100": Target(3, "100 e-pucks flocking, a process each, 11.4 packets received per robot and tick"),
+    "processes-100": Target(8, "100 e-pucks that flock, each an `Agent` in plain Python in its own process"),
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(15, "memory that a runner does not share with others"),
-    "processes-200": Target(2, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets received"),
-    "processes-1000": Target(0.4, "1,000 of them"),
-    "processes-1000-start": most(60, "from the call to the first tick, imports left out"),
-    "processes-1000-memory": most(16, "of world, agent host and runners together, as sum of their PSS"),
+    "processes-200": Target(5, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets received"),
+    "processes-1000": Target(1.0, "1,000 of them"),
+    "processes-1000-start": most(10, "from the call to the first tick, imports left out"),
+    "processes-1000-memory": most(4, "of world, agent host and runners together, as sum of their PSS"),
     "wire-over-floor": most(
         1.6,
         "a tick of `processes-200` over as many bytes to processes that only answer, plus the agents' own time",
     ),
     "realtime-50": most(
-        2, "50 robots that relay, 2 runners, 1 ms subtick: 99 % of packets are handed over no later than so after due"
+        1.5, "50 robots that relay, 2 runners, 1 ms subtick: 99 % of packets are handed over no later than so after due"
     ),
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
