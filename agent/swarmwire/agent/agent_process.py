@@ -26,6 +26,7 @@ from swarmwire.agent.process_frames import (
     FAILED,
     FIELDS,
     HEAD,
+    MAX_MESSAGE,
     READY,
     TICK,
     RecordField,
@@ -172,14 +173,18 @@ def serve(sock: socket.socket, make: Callable[[], "OneRobotAgent | ManyRobots"])
     try:
         agents = make()
         send(sock, (message(READY, None),))
+        act = agents.act
         while frame := receive(sock):
-            if frame_kind(frame) == FIELDS:
-                fields: dict[str, list[list[Any]]] = content(frame)
-                agents.set_fields({name: tuple(RecordField(*of) for of in group) for name, group in fields.items()})
-            else:
-                send(sock, (agents.act(frame),))
+            if frame_kind(frame) != FIELDS:
+                answer = act(frame)
+                sock.send(answer) if len(answer) < MAX_MESSAGE else send(sock, (answer,))
+                continue
+            fields: dict[str, list[list[Any]]] = content(frame)
+            agents.set_fields({name: tuple(RecordField(*of) for of in group) for name, group in fields.items()})
     except AgentFailed as error:
-        send(sock, (message(FAILED, {"robots": error.robots, "traceback": error.traceback}),))
+        *_, last = traceback.format_exception_only(error.__cause__)
+        failure = {"robots": error.robots, "traceback": error.traceback, "reason": f"its agent failed: {last.strip()}"}
+        send(sock, (message(FAILED, failure),))
     except OSError:  # the host is gone
         return
     while receive(sock):  # the host closes the socket once it has read the failure

@@ -76,6 +76,7 @@ class Failed(NamedTuple):
     process: AgentProcess
     robots: str
     traceback: str
+    reason: str
 
 
 class AgentProcesses:

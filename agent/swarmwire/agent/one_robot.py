@@ -17,15 +17,16 @@ from swarmwire.agent.host import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
 from swarmwire.agent.packet import ReceivedLists
 from swarmwire.agent.parameters import make
 from swarmwire.agent.process_frames import (
-    COMMAND,
+    ACTIONS,
+    ANSWER_OF_ONE,
     COUNT,
     HEAD,
     NOT_ACTING,
     PACKET_NUMBERS,
-    ROW,
     SENT_PACKET,
     STATUS,
     TICK,
+    TICK_OF_ONE,
     RecordFields,
     answer_head,
     packet_struct,
@@ -33,7 +34,7 @@ from swarmwire.agent.process_frames import (
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
 from swarmwire.comms.sensors.sensor import SensorProperty
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, encode_memory
@@ -72,15 +73,21 @@ class RobotContext(StepContext):
     def __init__(
         self,
         agent: "OneRobotAgent",
-        time: tuple[int, int, int],
-        record: bytes | memoryview,
+        tick: int,
+        time_ns: int,
+        period_ns: int,
+        frame: bytes,
         packets: list[Packet],
         statuses: list[Status],
         first_draw: int = 0,
     ) -> None:
-        """`record` are the robot's readings; the lists are in the order of their tables."""
-        super().__init__(agent.group, agent.needs, time, agent.group.keys, first_draw)
-        self._agent, self._record, self._received, self._statuses = agent, record, packets, statuses
+        """`frame` has the robot's readings; the lists are in the order of their tables."""
+        # As StepContext, whose call costs as much as these lines.
+        self.first_draw, self.group, self.needs = first_draw, agent.group, agent.needs
+        self.tick, self.time_ns, self.period_ns = tick, time_ns, period_ns
+        self.keys, self.n = agent.group.keys, 1
+        self._states, self._tables = {}, {}
+        self._agent, self._frame, self._received, self._statuses = agent, frame, packets, statuses
         self._command: tuple[float, float, float, float] = NO_COMMAND
         self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
         self._lists: OneRobotLists | None = None
@@ -100,8 +107,8 @@ class RobotContext(StepContext):
     def _value(self, column: str) -> Any:
         first, last, is_single = self._agent.fields[column]
         if is_single:
-            return FLOAT.unpack_from(self._record, first)[0]
-        return np.frombuffer(self._record, np.float64, (last - first) // FLOAT.size, first)
+            return FLOAT.unpack_from(self._frame, first)[0]
+        return np.frombuffer(self._frame, np.float64, (last - first) // FLOAT.size, first)
 
     @property
     def received_lists(self) -> OneRobotLists:
@@ -126,21 +133,27 @@ class RobotContext(StepContext):
         """Queue a packet; returns its id."""
         receiver, id_ = receiver_of(to), self._agent.sent
         self._agent.sent = id_ + 1
-        tx_status_id = id_ if self._needs_tx_status and receiver != BROADCAST else NOT_MEASURED
+        tx_status_id = id_ if receiver != BROADCAST and TX_STATUS in self.needs else NOT_MEASURED
         self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
         return id_
 
     def end(self, robots: int = 1) -> bytes:
         """The frame "actions"; the handle of this tick raises RuntimeError from now on."""
-        payloads = b"".join([payload for _, payload in self._outbox])
-        rest = self._rest() if self._tables or self._agent.keeps_memory else b""
-        parts = [answer_head(self.tick, robots, len(self._outbox), len(payloads), rest)]
+        agent, outbox = self._agent, self._outbox
+        rest = self._rest() if self._tables or agent.keeps_memory else b""
+        if outbox:
+            payloads = b"".join([payload for _, payload in outbox])
+            sent = b"".join([SENT_PACKET.pack(*head) for head, _ in outbox]) + payloads
+        else:
+            payloads = sent = b""
         if robots:
-            parts += (ROW.pack(self._agent.row), COMMAND.pack(*self._command))
-        parts += [SENT_PACKET.pack(*head) for head, _ in self._outbox]
-        parts += (payloads, rest)
+            size = ANSWER_OF_ONE.size + len(sent) + len(rest)
+            numbers = (size, ACTIONS, self.tick, 1, len(outbox), len(payloads), agent.row)
+            data = ANSWER_OF_ONE.pack(*numbers, *self._command) + sent + rest
+        else:
+            data = answer_head(self.tick, 0, len(outbox), len(payloads), rest) + sent + rest
         vars(self).clear()
-        return b"".join(parts)
+        return data
 
     def end_receive(self) -> bytes:
         """The frame "actions" of no robot, with the packets of `on_receive`; RuntimeError if it acted otherwise."""
@@ -169,7 +182,7 @@ class OneRobotAgent:
         group: the robot's group, with this robot alone.
         row: the robot row.
         sent: packets that the robot has sent so far.
-        fields: the place of each field in a record, in bytes: first, last, whether it is a single number.
+        fields: the place of each field in a frame, in bytes: first, last, whether it is a single number.
         measures: the names of the medium's measurements.
     """
 
@@ -193,7 +206,7 @@ class OneRobotAgent:
         self._receives = kind.on_receive is not Agent.on_receive
         self._head, self._record_bytes = packet_struct(len(self.measures)), 0
         self._waiting: tuple[list[Packet], list[Status]] = [], []  # that arrived between ticks
-        self._last_record: memoryview | None = None  # of the last step, for `on_receive`
+        self._last_frame: bytes | None = None  # of the last step, for `on_receive`
         self._receive_calls = 0  # since the last step
         self._agent = self._new_agent()
 
@@ -205,43 +218,55 @@ class OneRobotAgent:
     def set_fields(self, fields: Mapping[str, RecordFields]) -> None:
         """Set the fields of the records, by group: before the first tick."""
         (of_group,) = fields.values()
-        self.fields = {name: (8 * first, 8 * last, single) for name, first, last, single in of_group}
+        start = TICK_OF_ONE.size
+        self.fields = {name: (start + 8 * first, start + 8 * last, single) for name, first, last, single in of_group}
         self._record_bytes = 8 * (of_group[-1].last if of_group else 0)
 
     def act(self, frame: bytes) -> bytes:
         """The frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
-        _, kind, tick, at_ns, *_ = HEAD.unpack_from(frame)
-        return self._step(tick, frame) if kind == TICK else self._between(tick, at_ns, frame)
-
-    def _step(self, tick: int, frame: bytes) -> bytes:
-        (count,) = COUNT.unpack_from(frame, HEAD.size)
-        at = HEAD.size + COUNT.size + (ROW.size if count == 1 else 0)
-        record = memoryview(frame)[at : at + self._record_bytes]
-        if count == NOT_ACTING:
-            packets, statuses = self._packets(frame, at)
-            self._keep(packets, statuses)
-            return answer_head(tick, 0, 0, 0)
-        packets, statuses = self._packets(frame, at + self._record_bytes * count)
+        if len(frame) < TICK_OF_ONE.size:
+            return self._act_otherwise(frame)
+        _, kind, tick, _, count, status_count, _, acting, _ = TICK_OF_ONE.unpack_from(frame)
+        if kind != TICK or acting != 1:
+            return self._act_otherwise(frame)
+        packets: list[Packet] = []
+        statuses: list[Status] = []
+        if count or status_count:
+            packets, statuses = self._packets(frame, TICK_OF_ONE.size + self._record_bytes, count, status_count)
         if self._waiting[0] or self._waiting[1]:
             self._keep(packets, statuses)
             packets, statuses = self._waiting
             self._waiting = [], []
-        if count == 0:  # the robot is dead: what waited for it is lost, and its agent with it
-            self.acted = False
-            rest = msgpack.packb({"memory": self.memory()}) if self.keeps_memory else b""
-            return answer_head(tick, 0, 0, 0, rest) + rest
         if not self.acted:  # it is back, with a new agent
             self._agent, self.first_own, self.acted = self._new_agent(), self.sent, True
-        start_ns = tick_start_ns(tick, self._rate_hz)
-        time = tick, start_ns, tick_start_ns(tick + self.group.act_every_ticks, self._rate_hz) - start_ns
-        context = RobotContext(self, time, record, packets, self._own(statuses))
-        self._last_record, self._receive_calls = record, 0
-        self._call(self._agent.step, context)
+        start_ns = tick * NS_PER_S // self._rate_hz
+        period_ns = (tick + self.group.act_every_ticks) * NS_PER_S // self._rate_hz - start_ns
+        context = RobotContext(self, tick, start_ns, period_ns, frame, packets, statuses and self._own(statuses))
+        self._last_frame, self._receive_calls = frame, 0
+        try:
+            self._agent.step(Robot(context, 0))
+        except (Exception, SystemExit) as error:
+            raise failed(list(self.group.robot_names), error, context) from error
         return context.end()
 
-    def _between(self, tick: int, at_ns: int, frame: bytes) -> bytes:
-        self._keep(*self._packets(frame, HEAD.size))
-        if not self._receives or self._last_record is None or not self.acted:
+    def _act_otherwise(self, frame: bytes) -> bytes:
+        """The answer to packets, or to a tick in which the robot does not act: its group does not, or it is dead."""
+        _, kind, tick, at_ns, count, status_count, _ = HEAD.unpack_from(frame)
+        if kind != TICK:
+            self._keep(*self._packets(frame, HEAD.size, count, status_count))
+            return self._between(tick, at_ns)
+        (acting,) = COUNT.unpack_from(frame, HEAD.size)
+        packets, statuses = self._packets(frame, HEAD.size + COUNT.size, count, status_count)
+        if acting == NOT_ACTING:
+            self._keep(packets, statuses)
+            return answer_head(tick, 0, 0, 0)
+        self._waiting = [], []  # what waited for it is lost, and its agent with it
+        self.acted = False
+        rest = msgpack.packb({"memory": self.memory()}) if self.keeps_memory else b""
+        return answer_head(tick, 0, 0, 0, rest) + rest
+
+    def _between(self, tick: int, at_ns: int) -> bytes:
+        if not self._receives or self._last_frame is None or not self.acted:
             return answer_head(tick, 0, 0, 0)
         (packets, statuses), self._waiting = self._waiting, ([], [])
         self._receive_calls += 1
@@ -249,23 +274,19 @@ class OneRobotAgent:
         start_ns = tick_start_ns(tick, self._rate_hz)
         period_ns = tick_start_ns(tick + self.group.act_every_ticks, self._rate_hz) - start_ns
         first_draw = self._receive_calls * DRAWS_PER_CALL
-        context = RobotContext(self, (tick, at_ns, period_ns), self._last_record, packets, own, first_draw)
-        if packets or own:
-            self._call(self._agent.on_receive, context)
+        context = RobotContext(self, tick, at_ns, period_ns, self._last_frame, packets, own, first_draw)
+        try:
+            if packets or own:
+                self._agent.on_receive(Robot(context, 0))
+        except (Exception, SystemExit) as error:
+            raise failed(list(self.group.robot_names), error, context) from error
         try:
             return context.end_receive()
         except RuntimeError as error:
             raise failed(list(self.group.robot_names), error) from error
 
-    def _call(self, method: Any, context: RobotContext) -> None:
-        try:
-            method(Robot(context, 0))
-        except (Exception, SystemExit) as error:
-            raise failed(list(self.group.robot_names), error, context) from error
-
-    def _packets(self, frame: bytes, at: int) -> tuple[list[Packet], list[Status]]:
-        """The packets and statuses of a frame, which begin at a byte."""
-        *_, count, statuses, _ = HEAD.unpack_from(frame)
+    def _packets(self, frame: bytes, at: int, count: int, statuses: int) -> tuple[list[Packet], list[Status]]:
+        """So many packets and statuses of a frame, which begin at a byte."""
         packets: list[Packet] = []
         after = at + count * self._head.size
         start = after + statuses * STATUS.size  # of the payloads

@@ -246,8 +246,8 @@ class AgentHost:
                     out += self._answered(event)
                 case Lost(process, reason):
                     out.append(self._lost(process, reason))
-                case Failed(process, robots, traceback):
-                    out.append(self._lost(process, "its agent failed", robots, traceback))
+                case Failed(process, robots, traceback, reason):
+                    out.append(self._lost(process, reason, robots, traceback))
         if self._protocol.state == "joined" and self._processes.are_ready:
             out.append(self._protocol.ready(len(self._processes)))
         if (data := self._complete()) is not None:

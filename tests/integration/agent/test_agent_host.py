@@ -201,10 +201,10 @@ def test_one_faulty_process_costs_its_own_robot_alone(tmp_path: Path, pace: floa
     faults = {
         "killed": "was ended by SIGKILL",
         "frozen": "no answer",
-        "exception": "its agent failed",
+        "exception": "its agent failed: ZeroDivisionError",
         "exit": "ended with exit code 7",
         "endless loop": "no answer",
-        "memory": "its agent failed",
+        "memory": "its agent failed: MemoryError",
         "output": "",
         "none": "",
     }
