@@ -24,12 +24,13 @@ class Consumption(Observer):
         all_gb: memory of world, agent host and runners together, as the sum of their PSS.
         runner_us: processor time of a runner in a tick.
         world_ms: processor time of the world in a tick.
+        host_ms: processor time of the agent host in a tick.
     """
 
     def __init__(self, first: int, last: int) -> None:
         self.first, self.last = first, last
-        self.uss_mb, self.all_gb, self.runner_us, self.world_ms = list[float](), 0.0, 0.0, 0.0
-        self._begun_s = (0.0, 0.0)
+        self.uss_mb, self.all_gb, self.runner_us, self.world_ms, self.host_ms = list[float](), 0.0, 0.0, 0.0, 0.0
+        self._begun_s = (0.0, 0.0, 0.0)
 
     def see(self, truth: Truth) -> None:
         """Read at two ticks; the memory at the first."""
@@ -45,11 +46,12 @@ class Consumption(Observer):
             self.all_gb = (
                 sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *agent_host])]) / 1e9
             )
-        its_s, theirs_s = _processor_s(world), sum(map(_processor_s, runners))
+        its_s, theirs_s, hosts_s = (sum(map(_processor_s, of)) for of in ([world], runners, agent_host))
         ticks = self.last - self.first
         self.world_ms = (its_s - self._begun_s[0]) / ticks * 1e3
         self.runner_us = (theirs_s - self._begun_s[1]) / ticks / len(runners) * 1e6
-        self._begun_s = its_s, theirs_s
+        self.host_ms = (hosts_s - self._begun_s[2]) / ticks * 1e3
+        self._begun_s = its_s, theirs_s, hosts_s
 
 
 def _processor_s(process: psutil.Process) -> float:
@@ -75,6 +77,7 @@ def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -
         "radio": "disk, 2 m, loss 0.3, latency 0.1 s",
         "runner_us_per_tick": round(taken.runner_us),
         "world_ms_per_tick": round(taken.world_ms, 1),
+        "host_ms_per_tick": round(taken.host_ms, 1),
     }
     report(name, statistics.median(factors), "x real time", results[0], {**config, **spread(factors)})
     starts = [result.start_time_s for result in results]

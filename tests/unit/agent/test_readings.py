@@ -5,6 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import agent_group
@@ -15,6 +17,7 @@ from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.sensors.camera import Blob
 from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.sensors.rays import Around, RadialSpec
 from swarmwire.comms.sensors.simple import BatterySpec
 from tests.support.agent.hosts import MEASURES, group, readings
 
@@ -265,3 +268,15 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
     assert acted(arm) == each  # three numbers, and three robots: never a number for each robot
     assert acted(np.array([arm, [np.nan] * 3, arm])) == each
     assert acted(1.0) == [(row, 1 + k, 1.0) for row in (2, 5) for k in range(3)]
+
+
+RAYS = st.tuples(st.sampled_from((0.0, 1e-300, 0.1)) | st.floats(0.0, 1.0), st.floats(-360.0, 360.0))
+
+
+@given(st.lists(RAYS, min_size=1, max_size=20))
+def test_the_vector_sum_of_one_robot_is_bit_for_bit_that_of_many(rays: list[tuple[float, float]]) -> None:
+    values, angles_deg = zip(*rays, strict=True)
+    spec, value = RadialSpec(angles_deg=angles_deg), np.array(values)
+    one = Around(value, spec).vector_sum()
+    many = Around(np.array([value, value[::-1]]), spec).vector_sum()
+    assert [number.hex() for number in one] == [float(numbers[0]).hex() for numbers in many]
