@@ -15,14 +15,13 @@ import numpy as np
 from swarmwire.agent.agent_process import ForkServer
 from swarmwire.agent.process_frames import (
     ACTIONS,
+    ANSWER_HEAD,
     FAILED,
     FIELDS,
     Buffers,
     RecordFields,
     TickCutter,
     content,
-    frame_kind,
-    frame_tick,
     message,
     receive,
     record_fields,
@@ -154,15 +153,16 @@ class AgentProcesses:
                 events.append(self.lose(process, ""))
                 continue
             process.busy_since_ns = None
-            kind = frame_kind(frame)
+            _, kind, tick, *_ = ANSWER_HEAD.unpack_from(frame)
             if kind == FAILED:
                 self.lose(process, "")
                 events.append(Failed(process, **content(frame)))
                 continue
             if kind == ACTIONS:
-                events.append(Answer(process, frame_tick(frame), process.in_step, frame))
+                events.append(Answer(process, tick, process.in_step, frame))
             process.is_ready = True
-            self._send_next(process, now_ns)
+            if process.next_tick or process.next_packets:
+                self._send_next(process, now_ns)
         return events
 
     def silent(self, now_ns: int, timeout_ns: int) -> list[AgentProcess]:

@@ -270,11 +270,6 @@ def frame_kind(frame: bytes) -> int:
     return KIND.unpack_from(frame, KIND.size)[0]
 
 
-def frame_tick(frame: bytes) -> int:
-    """The tick of a frame."""
-    return KIND.unpack_from(frame, 2 * KIND.size)[0]
-
-
 def receive(sock: socket) -> bytes:
     """The next frame; empty if the other end is closed."""
     data = sock.recv(MAX_MESSAGE)
