@@ -124,9 +124,11 @@ def _serve_forks(control: socket.socket) -> None:
                         statuses[process] = os.waitpid(pids[process], 0)[1]
                     send(control, (message(KILL, _in_words(statuses[process])),))
     finally:
-        for process, pid in enumerate(pids):
-            if process not in statuses:
-                os.kill(pid, signal.SIGKILL)
+        left = [pid for process, pid in enumerate(pids) if process not in statuses]
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
+        for pid in left:
+            os.waitpid(pid, 0)
 
 
 def _fork(control: socket.socket, assignment: Assignment, memory: bytes | None) -> int:

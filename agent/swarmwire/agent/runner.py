@@ -47,6 +47,7 @@ TIMED_OUT = "Timeout"  # zenoh's error for a world that does not answer
 NO_ANSWER = (
     f"the world did not answer to join within {JOIN_TIMEOUT_S:g} s: it stands still, or this machine is too busy"
 )
+WITH_ROBOTS = ("joined", "ready", "acting")  # states of the protocol
 NEXT_FREE = JoinOptions()  # the next free part, with the world's agents
 
 
@@ -208,10 +209,8 @@ class AgentHost:
                 if arrivals.fileno() in readable:
                     for data in arrivals.pass_on_all(self._protocol):
                         put(data)
-                if self._processes.fileno() in readable:
-                    for data in self._read():
-                        put(data)
-                for data in self._check_time():
+                frames_out = self._read() if self._processes.fileno() in readable else []
+                for data in frames_out + self._check_time():
                     put(data)
                 while (event := self._protocol.next_event()) is not None:
                     if isinstance(event, Ended):
@@ -241,6 +240,8 @@ class AgentHost:
         """Take in what the processes sent: frames for the world."""
         out: list[bytes] = []
         for event in self._processes.events(self._clock.now_ns()):
+            if self._protocol.state not in WITH_ROBOTS:  # the world has ended this runner, or it leaves
+                continue
             match event:
                 case Answer():
                     out += self._answered(event)
@@ -278,6 +279,8 @@ class AgentHost:
     def _check_time(self) -> list[bytes]:
         """Lose processes that are silent; in real time, leave out those that are late."""
         now_ns, out = self._clock.now_ns(), list[bytes]()
+        if self._protocol.state not in WITH_ROBOTS:
+            return out
         for process in self._processes.silent(now_ns, self._timeout_ns):
             out.append(self._lost(*self._processes.lose(process, f"no answer for {to_s(self._timeout_ns):g} s")))
         if self._within_ns is not None and now_ns - self._opened_ns >= self._within_ns:

@@ -6,8 +6,8 @@
     joined     is ready  ready    `ready`, once the agents are made
     ready      is asked  acting   the event `Tick`
     acting     answers   ready    `answer`
-    ready      sends     ready    `send`, at the event `PacketsBetween`, and `answer_late`
-    ready      loses     ready    `lose`, as the robots of a process are lost; so do joined and acting
+    ready      sends     ready    `send`, at the event `PacketsBetween`, `answer_late`, and `lose`: a process is gone
+    acting     sends     acting   likewise; `lose` also while joined
     these 3    leaves    leaving  `leave`; the runner stays until the world confirms it
     all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
 
@@ -47,7 +47,7 @@ MOVES: dict[State, dict[Move, State]] = {
     "joining": {"joins": "joined", "ends": "ended"},
     "joined": {"is ready": "ready", "leaves": "leaving", "ends": "ended"},
     "ready": {"is asked": "acting", "sends": "ready", "leaves": "leaving", "ends": "ended"},
-    "acting": {"answers": "ready", "leaves": "leaving", "ends": "ended"},
+    "acting": {"answers": "ready", "sends": "acting", "leaves": "leaving", "ends": "ended"},
     "leaving": {"ends": "ended"},
     "ended": {},
 }
@@ -215,7 +215,7 @@ class RunnerProtocol:
 
     def answer_late(self, tick: int, actions: Actions, memory: Memory | None = None) -> bytes:
         """The actions of robots that `answer` left out, in real time: a frame "actions" for a tick before."""
-        self._require_robots()
+        self._require("sends")
         return encode_actions(tick, actions, 0, memory)
 
     def lose(self, rows: IntArray, process: str, reason: str, failed: str = "", traceback: str = "") -> bytes:
@@ -224,13 +224,13 @@ class RunnerProtocol:
         They are none of this runner's any more, but may still be in a tick that the world has sent before it reads so.
         """
         if self.state != "joined":
-            self._require_robots()
+            self._require("sends")
         agent = {"robots": failed, "traceback": traceback} if failed else {}
         return frames.encode("lost", -1, {"rows": rows}, {"process": process, "reason": reason, **agent})
 
     def send(self, tick: int, sent: SentPackets) -> bytes:
         """Packets that the agents sent at `PacketsBetween`: a frame "sent"."""
-        self._require_robots()
+        self._require("sends")
         data = encode_sent(tick, sent, self.missed)
         self.missed = 0
         return data
@@ -276,11 +276,6 @@ class RunnerProtocol:
         self.dropped += len(self._packets) + (self._newest is not None)
         self._packets.clear()
         self._newest = self._between = None
-
-    def _require_robots(self) -> None:
-        """RuntimeError unless the robots' agents are made."""
-        if self.state != "acting":
-            self._require("sends")
 
     def _require(self, move: Move) -> None:
         if move not in MOVES[self.state]:

@@ -197,7 +197,7 @@ class Backends:
             self.say(f"lost runner {loss}; its robots stand still")
             return
         agents = ",".join(sorted(set(self.agents.values())))
-        takeover = f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME PROCESSES"
+        takeover = f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME 1"
         until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
         self.say(f"lost runner {loss}; {until}, such as: {takeover}")
 

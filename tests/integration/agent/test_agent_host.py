@@ -217,9 +217,9 @@ def test_one_faulty_process_costs_its_own_robot_alone(tmp_path: Path, pace: floa
     head = f"""
 format = 1
 name = "faults"
-duration_s = {2.0 if pace is None else 5.0}
+duration_s = {2.0 if pace is None else 8.0}
 arena = {{ size_m = [4.0, 4.0] }}
-run = {{ on_runner_loss = "stand", runner_timeout_s = 2.0 }}
+run = {{ on_runner_loss = "stand", runner_timeout_s = 4.0 }}
 """
     file.write_text("\n".join([head, *groups]))
     seen = Commands()

@@ -173,7 +173,7 @@ class RunnerFrames(FrameTarget):
                 case Tick():
                     host.act(*event)
                 case PacketsReceived():
-                    host.receive(*event)
+                    host.receive(event.received, event.tx_status)
                 case PacketsBetween():
                     host.on_receive(*event)
         except AgentFailed as error:
