@@ -17,6 +17,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
 IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
 BoolColumn = NDArray[np.bool_]  # bool, (n,), or (n, width)
+DTYPES = ((FloatColumn, np.float64), (IntColumn, np.int64), (BoolColumn, np.bool_))
 
 FROZEN = "_frozen"  # set on a VectorAgent after its construction
 
@@ -48,12 +49,11 @@ class State:
         super().__init_subclass__()
         cls.columns = dict(cls.columns)
         for name, hint in get_type_hints(cls).items():
-            default = getattr(cls, name, None)
+            default, dtypes = getattr(cls, name, None), [dtype for column, dtype in DTYPES if column == hint]
             if name != "columns" and hasattr(State, name):
                 raise TypeError(f"{cls.__name__}.{name}: the name is taken by State")
-            if isinstance(default, _Default) and hint in (FloatColumn, IntColumn, BoolColumn):
-                dtype = np.dtype(get_args(get_args(hint)[1])[0])
-                cls.columns[name] = (dtype, default.value, default.shape)
+            if isinstance(default, _Default) and dtypes:
+                cls.columns[name] = (np.dtype(dtypes[0]), default.value, default.shape)
             elif name != "columns":
                 raise TypeError(
                     f"{cls.__name__}.{name}: expected FloatColumn, IntColumn or BoolColumn = column(default)"

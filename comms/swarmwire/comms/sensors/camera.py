@@ -1,7 +1,7 @@
 """An omnidirectional camera: the sensor `camera`."""
 
 from dataclasses import dataclass
-from math import radians, tan
+from math import isfinite, radians, tan
 from typing import ClassVar, Self
 
 import numpy as np
@@ -81,9 +81,8 @@ class CameraReading:
     @classmethod
     def of(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
         """The reading of these columns (max_blobs,), nan where there is no blob."""
-        seen = np.isfinite(distance_m)
-        columns = (column[seen].tolist() for column in (distance_m, bearing_rad, colour))
-        return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True)])
+        columns = (column.tolist() for column in (distance_m, bearing_rad, colour))
+        return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True) if isfinite(d)])
 
 
 @dataclass(frozen=True)

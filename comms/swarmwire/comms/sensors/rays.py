@@ -6,14 +6,14 @@ ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `Around` serve the li
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 import numpy as np
 
 from swarmwire.comms.angles import wrap_by_atan2
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise, RangedSensorSpec
+from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec
 
 FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple
 SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by
@@ -58,6 +58,8 @@ class Around(Generic[N, S]):
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
     spec: S
+    if not TYPE_CHECKING:
+        value = LazyArray()
 
     @property
     def angle_rad(self) -> FloatArray:
@@ -66,11 +68,12 @@ class Around(Generic[N, S]):
 
     def vector_sum(self) -> tuple[N, N]:
         """X and y of the sum of the sensors as vectors of length `value` towards `angle_rad`."""
-        value = self.value
-        if value.ndim == 1 and len(value) <= FEW:
-            values, (cosines, sines) = value.tolist(), self.spec.direction_lists
+        given: FloatArray | memoryview = self.__dict__["value"]
+        if given.ndim == 1 and len(given) <= FEW:
+            values = cast("list[float]", given.tolist())
+            cosines, sines = self.spec.direction_lists
             return cast("tuple[N, N]", (_dot(values, cosines), _dot(values, sines)))
-        cosine, sine = self.spec.direction
+        value, (cosine, sine) = self.value, self.spec.direction
         if value.ndim == 1:  # called once per robot and tick: faster than the call with an axis
             return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
         return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))

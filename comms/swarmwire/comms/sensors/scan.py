@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.sensors.rays import ray_directions
-from swarmwire.comms.sensors.sensor import Draw, Field, Noise, RangedSensorSpec
+from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, Noise, RangedSensorSpec
 
 FULL_DEG = 360.0
 
@@ -85,6 +85,8 @@ class ScanReading:
 
     range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
     spec: ScanSpec
+    if not TYPE_CHECKING:
+        range_m = LazyArray()
 
     @property
     def angle_rad(self) -> FloatArray:

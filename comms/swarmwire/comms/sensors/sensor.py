@@ -174,6 +174,27 @@ class SensorProperty(Generic[One, Many]):
         raise AttributeError(f"the reading of the sensor {self.name} cannot be set")
 
 
+class LazyArray:
+    """A field of a reading whose numbers become an array when it is first read, if they were given as a memoryview.
+
+    A plain `Agent` often needs none, and numpy's memory is cold in a process that steps one robot.
+    """
+
+    def __set_name__(self, owner: type[Any], name: str) -> None:
+        self._name = name
+
+    def __get__(self, reading: object, owner: type[Any] | None = None) -> FloatArray:
+        if reading is None:
+            raise AttributeError(self._name)  # it is no default of the field
+        values = reading.__dict__[self._name]
+        if isinstance(values, memoryview):
+            values = reading.__dict__[self._name] = np.asarray(values)
+        return values
+
+    def __set__(self, reading: object, values: FloatArray | memoryview) -> None:
+        reading.__dict__[self._name] = values
+
+
 class CustomReading:
     """The reading of a custom sensor: each of its fields is an attribute.
 

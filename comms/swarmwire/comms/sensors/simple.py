@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from math import hypot, pi
-from typing import ClassVar, Generic, Self
+from typing import TYPE_CHECKING, ClassVar, Generic, Self
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise, RangedSensorSpec, SensorSpec
+from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec, SensorSpec
 
 
 @dataclass(frozen=True)
@@ -175,6 +175,8 @@ class GroundReading:
     """The floor under the ground sensors, in the order of the spec."""
 
     shade: FloatArray  # (…, points) 0 black to 1 white
+    if not TYPE_CHECKING:
+        shade = LazyArray()
 
 
 @dataclass(frozen=True)
