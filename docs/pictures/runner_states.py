@@ -9,6 +9,7 @@ from pathlib import Path
 
 from docs.pictures.svg import arc, arrow, box, page, text
 from swarmwire.agent import runner_protocol
+from swarmwire.agent.runner_protocol import WITH_ROBOTS
 from swarmwire.world.backends import allocation
 
 DOCS = Path(__file__).parents[1]
@@ -30,7 +31,6 @@ RUNNER: Places = {
     "leaving": (520.0, 210.0),
     "ended": (60.0, 210.0),
 }
-WITH_ROBOTS = ("joined", "ready", "acting")  # in one frame, from which the moves start that all of them have
 HALF_WIDTH, HALF_HEIGHT = 46.0, 20.0  # of a state's box
 RISE = 0.2  # of an arrow back, for its length
 
@@ -48,7 +48,7 @@ def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
         state: {move: after for move, after in of.items() if after not in ("ended", state)}
         for state, of in runner_protocol.MOVES.items()
     }
-    shared = _shared(moves, WITH_ROBOTS)
+    shared = _shared(moves, WITH_ROBOTS)  # moves that start from the frame around these states
     for state in WITH_ROBOTS:
         moves[state] = {move: after for move, after in moves[state].items() if move not in shared}
     (left, y), (right, _), margin = RUNNER[WITH_ROBOTS[0]], RUNNER[WITH_ROBOTS[-1]], HALF_WIDTH + 12.0

@@ -1,8 +1,8 @@
 """Agent processes: the robots of one process behind a socket to their agent host, and the server that forks them.
 
 The fork server is forked from the host before that opens its network session, so it has no threads; it imports the
-agents' code once, for all processes. An agent process has no network: one socket to its host is all that it can use. It
-ends with its host and with the fork server, whatever its agent does.
+agents' code once, for all processes. An agent process gets one socket to its host and no network. It ends with its host
+and with the fork server, whatever its agent does.
 """
 
 import ctypes
@@ -14,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -26,7 +27,6 @@ from swarmwire.agent.process_frames import (
     FAILED,
     FIELDS,
     HEAD,
-    MAX_MESSAGE,
     READY,
     TICK,
     RecordField,
@@ -42,12 +42,12 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.comms.assignment import Assignment, GroupAssignment, part_of
 from swarmwire.comms.errors import AgentFailed, BadFrame
-from swarmwire.comms.packets import SentPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, decode_memory, encode_memory
 from swarmwire.comms.wire.frames import Frame
 
+LOAD, FORK, KILL = range(3)  # requests of a host to its fork server
 PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
 
 
@@ -94,9 +94,6 @@ class ForkServer:
         os.waitpid(self.pid, 0)
 
 
-LOAD, FORK, KILL = range(3)
-
-
 def _serve_forks(control: socket.socket) -> None:
     """Carry out the host's requests until it is gone; then kill all processes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the host
@@ -105,24 +102,24 @@ def _serve_forks(control: socket.socket) -> None:
     try:
         while frame := receive(control):
             request = content(frame)
-            match frame_kind(frame):
-                case 0:
-                    for agent in request:
-                        with suppress(NoAgent):
-                            load_agent(agent)
-                case 1:
-                    whole = Assignment.from_mapping(request["assignment"])
-                    gc.collect()
-                    gc.freeze()  # the collector would write to, and so copy, every shared page
-                    memory = request["memory"]
-                    pids += [_fork(control, part_of(whole, np.array(rows)), memory) for rows in request["rows"]]
-                case _:
-                    process = int(request)
-                    if process not in statuses:
-                        with suppress(ProcessLookupError):
-                            os.kill(pids[process], signal.SIGKILL)
-                        statuses[process] = os.waitpid(pids[process], 0)[1]
-                    send(control, (message(KILL, _in_words(statuses[process])),))
+            kind = frame_kind(frame)
+            if kind == LOAD:
+                for agent in request:
+                    with suppress(NoAgent):
+                        load_agent(agent)
+            elif kind == FORK:
+                whole = Assignment.from_mapping(request["assignment"])
+                gc.collect()
+                gc.freeze()  # the collector would write to, and so copy, every shared page
+                memory = request["memory"]
+                pids += [_fork(control, part_of(whole, np.array(rows)), memory) for rows in request["rows"]]
+            elif kind == KILL:
+                process = int(request)
+                if process not in statuses:
+                    with suppress(ProcessLookupError):
+                        os.kill(pids[process], signal.SIGKILL)
+                    statuses[process] = os.waitpid(pids[process], 0)[1]
+                send(control, (message(KILL, _in_words(statuses[process])),))
     finally:
         left = [pid for process, pid in enumerate(pids) if process not in statuses]
         for pid in left:
@@ -178,8 +175,7 @@ def serve(sock: socket.socket, make: Callable[[], "OneRobotAgent | ManyRobots"])
         act = agents.act
         while frame := receive(sock):
             if frame_kind(frame) != FIELDS:
-                answer = act(frame)
-                sock.send(answer) if len(answer) < MAX_MESSAGE else send(sock, (answer,))
+                send(sock, (act(frame),))
                 continue
             fields: dict[str, list[list[Any]]] = content(frame)
             agents.set_fields({name: tuple(RecordField(*of) for of in group) for name, group in fields.items()})
@@ -218,12 +214,7 @@ class ManyRobots:
             return write_actions(tick, actions, rest)
         tick, at_ns, received, tx_status = read_packets(frame, self._measures)
         self._executor.receive(received, tx_status)
-        return write_actions(tick, _only(self._executor.on_receive(tick, at_ns)), {})
-
-
-def _only(sent: SentPackets) -> Actions:
-    none = Actions.joined([])
-    return Actions(none.rows, none.drive, none.linear_mps, none.angular_radps, none.lateral_mps, sent)
+        return write_actions(tick, replace(Actions.joined([]), sent=self._executor.on_receive(tick, at_ns)), {})
 
 
 def agents_of(assignment: Assignment, memory: bytes | None) -> OneRobotAgent | ManyRobots:

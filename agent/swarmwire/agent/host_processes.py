@@ -50,7 +50,7 @@ class AgentProcess:
     @property
     def rows(self) -> IntArray:
         """Its robot rows, rising."""
-        return np.sort(np.concatenate([group.rows for group in self.assignment.groups]))
+        return np.sort(self.assignment.rows)
 
 
 class Answer(NamedTuple):
@@ -63,19 +63,15 @@ class Answer(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """A process that is gone, or was ended: it answered nothing for too long."""
+    """A process that is gone, or was ended: it answered nothing for too long.
+
+    If its agent raised, also the robots that it played, and the traceback.
+    """
 
     process: AgentProcess
     reason: str
-
-
-class Failed(NamedTuple):
-    """A process that ended, since an agent raised: the robots of that, and the traceback."""
-
-    process: AgentProcess
-    robots: str
-    traceback: str
-    reason: str
+    robots: str = ""
+    traceback: str = ""
 
 
 class AgentProcesses:
@@ -84,8 +80,7 @@ class AgentProcesses:
     def __init__(self, server: ForkServer, assignment: Assignment, processes: int, memory: bytes | None) -> None:
         """Fork so many, at most one per robot. They are made ready in `events`."""
         parts = split(assignment, processes)
-        rows = [np.sort(np.concatenate([group.rows for group in part.groups])).tolist() for part in parts]
-        sockets = server.fork(assignment, rows, memory)
+        sockets = server.fork(assignment, [part.rows.tolist() for part in parts], memory)
         for sock in sockets:
             sock.setblocking(False)
         self._server = server
@@ -140,9 +135,9 @@ class AgentProcesses:
                 process.next_packets.append(buffers)
                 self._send_next(process, now_ns)
 
-    def events(self, now_ns: int) -> list[Answer | Lost | Failed]:
+    def events(self, now_ns: int) -> list[Answer | Lost]:
         """Read what the processes sent, and send what waited for them."""
-        events: list[Answer | Lost | Failed] = []
+        events: list[Answer | Lost] = []
         for file, _ in self._poll.poll(0, max(len(self._processes), 1)):
             process = self._processes[file]
             try:
@@ -156,7 +151,7 @@ class AgentProcesses:
             _, kind, tick, *_ = ANSWER_HEAD.unpack_from(frame)
             if kind == FAILED:
                 self.lose(process, "")
-                events.append(Failed(process, **content(frame)))
+                events.append(Lost(process, **content(frame)))
                 continue
             if kind == ACTIONS:
                 events.append(Answer(process, tick, process.in_step, frame))

@@ -34,7 +34,7 @@ from swarmwire.agent.process_frames import (
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
 from swarmwire.comms.sensors.sensor import SensorProperty
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, encode_memory
@@ -82,11 +82,7 @@ class RobotContext(StepContext):
         first_draw: int = 0,
     ) -> None:
         """`frame` has the robot's readings; the lists are in the order of their tables."""
-        # As StepContext, whose call costs as much as these lines.
-        self.first_draw, self.group, self.needs = first_draw, agent.group, agent.needs
-        self.tick, self.time_ns, self.period_ns = tick, time_ns, period_ns
-        self.keys, self.n = agent.group.keys, 1
-        self._states, self._tables = {}, {}
+        super().__init__(agent.group, agent.needs, (tick, time_ns, period_ns), agent.group.keys, first_draw)
         self._agent, self._frame, self._received, self._statuses = agent, frame, packets, statuses
         self._command: tuple[float, float, float, float] = NO_COMMAND
         self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
@@ -102,13 +98,13 @@ class RobotContext(StepContext):
         self._require(sensor)
         prefix = f"{sensor}."
         names = [name for name in self._agent.fields if name.startswith(prefix)]
-        return {name.removeprefix(prefix): (self._value(name),) for name in names}
+        return {name.removeprefix(prefix): (np.asarray(self._value(name)),) for name in names}
 
     def _value(self, column: str) -> Any:
         first, last, is_single = self._agent.fields[column]
         if is_single:
             return FLOAT.unpack_from(self._frame, first)[0]
-        return np.frombuffer(self._frame, np.float64, (last - first) // FLOAT.size, first)
+        return memoryview(self._frame)[first:last].cast("d")
 
     @property
     def received_lists(self) -> OneRobotLists:
@@ -133,7 +129,7 @@ class RobotContext(StepContext):
         """Queue a packet; returns its id."""
         receiver, id_ = receiver_of(to), self._agent.sent
         self._agent.sent = id_ + 1
-        tx_status_id = id_ if receiver != BROADCAST and TX_STATUS in self.needs else NOT_MEASURED
+        tx_status_id = id_ if receiver != BROADCAST and self._needs_tx_status else NOT_MEASURED
         self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
         return id_
 
@@ -239,9 +235,8 @@ class OneRobotAgent:
             self._waiting = [], []
         if not self.acted:  # it is back, with a new agent
             self._agent, self.first_own, self.acted = self._new_agent(), self.sent, True
-        start_ns = tick * NS_PER_S // self._rate_hz
-        period_ns = (tick + self.group.act_every_ticks) * NS_PER_S // self._rate_hz - start_ns
-        context = RobotContext(self, tick, start_ns, period_ns, frame, packets, statuses and self._own(statuses))
+        start_ns, own = tick_start_ns(tick, self._rate_hz), statuses and self._own(statuses)
+        context = RobotContext(self, tick, start_ns, self._period_ns(tick), frame, packets, own)
         self._last_frame, self._receive_calls = frame, 0
         try:
             self._agent.step(Robot(context, 0))
@@ -271,10 +266,8 @@ class OneRobotAgent:
         (packets, statuses), self._waiting = self._waiting, ([], [])
         self._receive_calls += 1
         own = self._own(statuses)
-        start_ns = tick_start_ns(tick, self._rate_hz)
-        period_ns = tick_start_ns(tick + self.group.act_every_ticks, self._rate_hz) - start_ns
         first_draw = self._receive_calls * DRAWS_PER_CALL
-        context = RobotContext(self, tick, at_ns, period_ns, self._last_frame, packets, own, first_draw)
+        context = RobotContext(self, tick, at_ns, self._period_ns(tick), self._last_frame, packets, own, first_draw)
         try:
             if packets or own:
                 self._agent.on_receive(Robot(context, 0))
@@ -284,6 +277,11 @@ class OneRobotAgent:
             return context.end_receive()
         except RuntimeError as error:
             raise failed(list(self.group.robot_names), error) from error
+
+    def _period_ns(self, tick: int) -> int:
+        """The time from a tick to the robot's next."""
+        after = tick + self.group.act_every_ticks
+        return tick_start_ns(after, self._rate_hz) - tick_start_ns(tick, self._rate_hz)
 
     def _packets(self, frame: bytes, at: int, count: int, statuses: int) -> tuple[list[Packet], list[Status]]:
         """So many packets and statuses of a frame, which begin at a byte."""

@@ -20,9 +20,10 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent_process import ForkServer
-from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Answer, Failed, Lost
+from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Answer, Lost
 from swarmwire.agent.process_frames import in_order, read_actions
 from swarmwire.agent.runner_protocol import (
+    WITH_ROBOTS,
     Assigned,
     Ended,
     JoinOptions,
@@ -47,7 +48,6 @@ TIMED_OUT = "Timeout"  # zenoh's error for a world that does not answer
 NO_ANSWER = (
     f"the world did not answer to join within {JOIN_TIMEOUT_S:g} s: it stands still, or this machine is too busy"
 )
-WITH_ROBOTS = ("joined", "ready", "acting")  # states of the protocol
 NEXT_FREE = JoinOptions()  # the next free part, with the world's agents
 
 
@@ -221,7 +221,7 @@ class AgentHost:
 
     def _wait_s(self) -> float:
         """The time until something has to be checked."""
-        if self._tick is None or self._within_ns is None:
+        if self._within_ns is None or not self._asked or self._protocol.state != "acting":
             return CHECK_S
         return max(0.0, min(CHECK_S, to_s(self._opened_ns + self._within_ns - self._clock.now_ns())))
 
@@ -245,10 +245,8 @@ class AgentHost:
             match event:
                 case Answer():
                     out += self._answered(event)
-                case Lost(process, reason):
-                    out.append(self._lost(process, reason))
-                case Failed(process, robots, traceback, reason):
-                    out.append(self._lost(process, reason, robots, traceback))
+                case Lost():
+                    out.append(self._lost(event))
         if self._protocol.state == "joined" and self._processes.are_ready:
             out.append(self._protocol.ready(len(self._processes)))
         if (data := self._complete()) is not None:
@@ -270,7 +268,8 @@ class AgentHost:
             return [self._protocol.answer_late(answer.tick, actions, _memory(rests))]
         return [self._protocol.send(answer.tick, actions.sent)] if len(actions.sent) else []
 
-    def _lost(self, process: AgentProcess, reason: str, failed: str = "", traceback: str = "") -> bytes:
+    def _lost(self, lost: Lost) -> bytes:
+        process, reason, failed, traceback = lost
         self._asked.discard(process)
         self._answers = [answer for answer in self._answers if answer.process is not process]
         self._say(f"lost {process.assignment.robots_text}: {reason}" + (f"\n{traceback.rstrip()}" if traceback else ""))
@@ -282,7 +281,7 @@ class AgentHost:
         if self._protocol.state not in WITH_ROBOTS:
             return out
         for process in self._processes.silent(now_ns, self._timeout_ns):
-            out.append(self._lost(*self._processes.lose(process, f"no answer for {to_s(self._timeout_ns):g} s")))
+            out.append(self._lost(self._processes.lose(process, f"no answer for {to_s(self._timeout_ns):g} s")))
         if self._within_ns is not None and now_ns - self._opened_ns >= self._within_ns:
             self._asked.clear()
         if (data := self._complete()) is not None:

@@ -51,6 +51,7 @@ MOVES: dict[State, dict[Move, State]] = {
     "leaving": {"ends": "ended"},
     "ended": {},
 }
+WITH_ROBOTS: tuple[State, ...] = ("joined", "ready", "acting")
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ class Assigned(NamedTuple):
 
     assignment: Assignment
     memory: bytes | None  # a frame
-    timeout_s: float = 10.0  # a process that does not answer for so long is lost
-    answer_within_s: float | None = None  # in real time, the time after which late processes are left out
+    timeout_s: float  # a process that does not answer for so long is lost
+    answer_within_s: float | None  # in real time, the time after which late processes are left out
 
 
 class Tick(NamedTuple):
@@ -105,8 +106,8 @@ class Ended(NamedTuple):
 class _Times(Struct):
     """The times in a reply to a request."""
 
-    timeout_s: float = 10.0
-    answer_within_s: float | None = None
+    timeout_s: float
+    answer_within_s: float | None
 
 
 Event = Tick | PacketsReceived | PacketsBetween | Ended
@@ -159,9 +160,7 @@ class RunnerProtocol:
             raise BadFrame("malformed", "memory: expected a frame")
         if memory is not None:
             frames.decode(memory)
-        times = frames.typed(
-            _Times, {name: reply[name] for name in ("timeout_s", "answer_within_s") if name in reply}, ""
-        )
+        times = frames.typed(_Times, {name: reply[name] for name in _Times.__struct_fields__ if name in reply}, "")
         assigned = Assigned(assignment, memory, times.timeout_s, times.answer_within_s)
         self._rows = {group.name: group.rows for group in assignment.groups}
         self._measures = assignment.measures or ()

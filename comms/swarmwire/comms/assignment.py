@@ -41,6 +41,11 @@ class Assignment:
         return tuple(name for group in self.groups for name in group.robot_names)
 
     @property
+    def rows(self) -> IntArray:
+        """The robot rows, group after group: not rising where a group has several arenas."""
+        return np.concatenate([group.rows for group in self.groups])
+
+    @property
     def robots_text(self) -> str:
         """The robots in a few words: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
         return robots_text(list(self.robot_names))

@@ -72,7 +72,7 @@ class Backends:
             return
         if self.listening is not None:
             hooks = self._listening_hooks(self.listening)
-            backend = self._remote(self.listening.for_agents(self.run_id), [whole], hooks)
+            backend = self._remote(self.listening.for_agents(self.run_id), whole, hooks)
             with closing(backend):
                 backend.open()
                 yield backend
@@ -94,7 +94,7 @@ class Backends:
                 lambda change, _: self._changed(change),
                 self._refused,
             )
-            backend = self._remote(endpoint, [whole], around)
+            backend = self._remote(endpoint, whole, around)
             try:
                 backend.open()
                 specs = sorted(set(self.agents.values()))
@@ -133,7 +133,7 @@ class Backends:
         self.say(f"refused {runner!r}: {why}")
 
     def _remote(
-        self, door: ListenSettings | str, parts: list[Assignment], around: BackendHooks
+        self, door: ListenSettings | str, whole: Assignment, around: BackendHooks
     ) -> LockstepBackend | RealTimeBackend:
         table, factor = self.scenario.run, self.pace.factor if self.pace else None
         policy = self._join_policy(factor)
@@ -142,7 +142,7 @@ class Backends:
             return RealTimeBackend(
                 door,
                 self.run_id,
-                parts,
+                [whole],
                 timeout_s,
                 self.clock,
                 around,
@@ -152,7 +152,7 @@ class Backends:
                 policy,
                 self.subticks,
             )
-        return LockstepBackend(door, self.run_id, parts, timeout_s, self.clock, around, on_loss, policy=policy)
+        return LockstepBackend(door, self.run_id, [whole], timeout_s, self.clock, around, on_loss, policy=policy)
 
     def _join_policy(self, factor: float | None) -> JoinPolicy:
         """The terms on which runners join, in real time at this factor, or in lockstep."""

@@ -15,7 +15,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
-from tests.support.agent.hosts import assignment, group, spec
+from tests.support.agent.hosts import TIMES, assignment, group, spec
 
 REFUSED = "refused by the test"
 NOTHING = b""  # an answer that is none
@@ -26,7 +26,7 @@ OFFER = SessionInfo("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode
 
 def given(**change: Any) -> bytes:
     """The answer to a runner that joins."""
-    return msgpack.packb({"v": frames.VERSION, **ASSIGNED.as_mapping(), "memory": None, **change})
+    return msgpack.packb({"v": frames.VERSION, **ASSIGNED.as_mapping(), "memory": None, **TIMES, **change})
 
 
 class MadeUpWorld:

@@ -20,7 +20,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, spec, words
+from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, received_from, spec, words
 from tests.support.agent.processes import thread_server
 
 KEYS = Keys("run1")
@@ -29,7 +29,7 @@ END = frames.encode("end", -1, {})
 
 def reply(agent: str, memory: bytes | None = None) -> bytes:
     robots = assignment(group(spec(agent), [0])).as_mapping()
-    return msgpack.packb({**robots, "v": frames.VERSION, "memory": memory})
+    return msgpack.packb({**robots, "v": frames.VERSION, "memory": memory, **TIMES})
 
 
 def tick(number: int) -> bytes:

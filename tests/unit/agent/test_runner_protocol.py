@@ -29,11 +29,11 @@ from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import SILENCE, assignment, group, readings, received_from, words
+from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, received_from, words
 from tests.support.agent.runners import assigned_robots, joining
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
-REPLY: dict[str, Any] = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None}
+REPLY: dict[str, Any] = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None, **TIMES}
 END, LEAVE = (frames.encode(kind, -1, {}) for kind in ("end", "leave"))
 READY = frames.encode("ready", -1, {}, {"processes": 1})
 REMOVED = frames.encode("end", -1, {}, {"why": "no answer for 3 s"})

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from numba import njit
 from rich.console import Console
 
@@ -144,11 +145,14 @@ def test_each_says_what_and_where_and_what_to_do():
 
 def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(monkeypatch, capsys):
     def raises(error):
-        def app(_):
+        app = typer.Typer()
+
+        @app.command()
+        def fails():
             raise error
 
         monkeypatch.setattr(cli, "app", app)
-        return called(monkeypatch, capsys, "run")
+        return called(monkeypatch, capsys)
 
     code, out, errors = raises(OSError(errno.EMFILE, "Too many open files"))
     assert (code, out, errors.count("\n")) == (1, "", 1)

@@ -3,10 +3,11 @@
 import io
 import re
 import sys
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
-from typer.core import TyperOption
+from typer.core import TyperCommand, TyperGroup, TyperOption
+from typer.main import get_command
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.comms.wire.ending import end_now
@@ -101,14 +102,18 @@ def let_help_flow(app: typer.Typer) -> None:
             let_help_flow(group.typer_instance)
 
 
-def leave_out_types_of_flags() -> None:
-    """Show flags without a type in help texts: typer would write `--view <bool>`, as if the flag took a value."""
-    shown = TyperOption.display_type_rich
-    TyperOption.display_type_rich = lambda self, ctx: None if self.is_flag else shown(self, ctx)  # type: ignore[method-assign]
+def show_flags_without_type(command: TyperCommand | TyperGroup, parent: Any = None) -> None:
+    """In help texts typer would write `--view <bool>`, as if the flag took a value."""
+    context = command.context_class(command, parent, **command.context_settings)
+    for param in command.get_params(context):
+        if isinstance(param, TyperOption) and param.is_flag:
+            param.metavar = ""
+    if isinstance(command, TyperGroup):
+        for below in command.commands.values():
+            show_flags_without_type(cast("TyperCommand | TyperGroup", below), context)
 
 
 let_help_flow(app)
-leave_out_types_of_flags()
 
 
 def main() -> None:
@@ -117,7 +122,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a letter that a terminal lacks must not end a run
             stream.reconfigure(errors="replace")
     try:
-        app(sys.argv[1:])
+        command = cast("TyperCommand | TyperGroup", get_command(app))
+        show_flags_without_type(command)
+        command(sys.argv[1:])
     except BadInput as error:
         sys.exit(_fail(error, BAD_INPUT))
     except Interrupted as error:

@@ -2,6 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from math import ceil
 
@@ -68,9 +69,9 @@ class _DeliveryRatio(OfWindow):
 
         return measure
 
+    @abstractmethod
     def _receivers(self, tally: PacketCounts) -> IntArray:
         """The receivers that the ratio is of, (arenas,)."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -107,6 +107,17 @@ def test_of_two_answers_in_a_tick_the_newer_commands_and_both_send() -> None:
     assert taken(runners)[0] == {0: 3.0, 2: 3.0}
 
 
+@pytest.mark.parametrize("rows", [[0, 0], [1], [7]])
+def test_a_partial_answer_has_own_robots_each_once(rows: list[int]) -> None:
+    runners = playing()
+    opened(runners, 0)
+    zeros = np.zeros(len(rows))
+    runners.answer("a", encode_actions(0, Actions(np.array(rows), zeros.astype(bool), zeros, zeros, zeros)))
+    assert runners.counts() == {"malformed_frames": 1}
+    runners.answer("a", said("a", 0, 1.0))
+    assert taken(runners)[0] == {0: 1.0, 2: 1.0}
+
+
 def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_newer_colour_counts() -> None:
     runners = playing()
     opened(runners, 0)

@@ -104,7 +104,7 @@ class Allocation:
     processes: int = 1  # of the runner, between which its robots are divided
 
     def __post_init__(self) -> None:
-        self._all_rows = rows_of(self.assignment)
+        self._all_rows = self.assignment.rows
 
     @property
     def all_rows(self) -> IntArray:
@@ -123,7 +123,7 @@ class Allocation:
         self.assignment = part_of(self.assignment, rows)
         self.rows = self.rows[np.isin(self.rows, rows)]
         self.memory = {name: [part.of(rows) for part in parts] for name, parts in self.memory.items()}
-        self._all_rows = rows_of(self.assignment)
+        self._all_rows = self.assignment.rows
 
     def may(self, move: Move) -> bool:
         """Whether the state allows the move."""
@@ -134,11 +134,6 @@ class Allocation:
         if not self.may(move):
             raise RuntimeError(f"an allocation that is {self.state} has no move {move!r}")
         self.state = MOVES[self.state][move]
-
-
-def rows_of(assignment: Assignment) -> IntArray:
-    """The robot rows of an assignment, group after group."""
-    return np.concatenate([group.rows for group in assignment.groups])
 
 
 NO_ALLOCATION = -1  # owner of a robot that is in no allocation

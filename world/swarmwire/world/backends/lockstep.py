@@ -22,7 +22,7 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
-from swarmwire.world.backends.allocation import NO_ALLOCATION, Allocation, rows_of
+from swarmwire.world.backends.allocation import NO_ALLOCATION, Allocation
 from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy
 from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerRegistry, What
 
@@ -200,7 +200,7 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
         )
 
     def _new_allocation(self, assignment: Assignment) -> LockstepAllocation:
-        return LockstepAllocation(assignment, rows_of(assignment), idle=True)
+        return LockstepAllocation(assignment, assignment.rows, idle=True)
 
     def _acted(self, allocation: LockstepAllocation, frame: Frame) -> None:
         if frame.tick != self._tick or not allocation.may("answers"):

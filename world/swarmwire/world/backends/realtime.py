@@ -36,7 +36,7 @@ from swarmwire.comms.tick_io import Actions, Readings, joined_tables
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
-from swarmwire.world.backends.allocation import Allocation, rows_of
+from swarmwire.world.backends.allocation import Allocation
 from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, HOST_GRACE_S, JoinPolicy
 from swarmwire.world.backends.lockstep import acting_rows, split_readings, split_received, split_tx_status
 from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerHealth, RunnerRegistry, What
@@ -188,7 +188,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
             raise BadFrame("wrong_tick", str(frame.tick))
         # A host may leave out robots whose processes are late, and send their answers later.
         rows = frames.checked_array(frame, "rows", "<i8", (None,))
-        if not np.isin(rows, sent_frame.rows).all():
+        if len(np.unique(rows)) < len(rows) or not np.isin(rows, sent_frame.rows).all():
             raise BadFrame("malformed", "rows: expected the runner's own robots, each once")
         actions, allocation.memory = decode_actions(frame, rows), self._memory(allocation, frame)
         for older in [*allocation.unanswered]:
@@ -218,7 +218,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
             self._counts["packets_frames_missed_by_runners"] += missed
 
     def _new_allocation(self, assignment: Assignment) -> RealTimeAllocation:
-        return RealTimeAllocation(assignment, rows_of(assignment))
+        return RealTimeAllocation(assignment, assignment.rows)
 
     def _catch_up(self, allocation: RealTimeAllocation) -> Sequence[bytes]:
         return ()  # the next tick is soon
