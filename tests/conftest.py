@@ -52,7 +52,7 @@ ORDER = (
 # Tracing and Python in place of kernels slow all tests down; the full profile has more examples of each.
 LIMITED = PROFILE == "quick" and sys.gettrace() is None and not numba.config.DISABLE_JIT
 CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"
-STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system", "time.sleep"}
+STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system"}
 
 _too_slow: list[str] = []
 _unit_test = False  # whether a unit test is running in this process
@@ -98,7 +98,7 @@ sys.addaudithook(_refuse_processes)
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
-    """A unit test starts no process and does not sleep."""
+    """A unit test starts no process."""
     global _unit_test  # noqa: PLW0603 - an audit hook takes no argument of ours and cannot be removed
     _unit_test = _is_unit(item)
     try:
