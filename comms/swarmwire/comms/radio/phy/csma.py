@@ -14,6 +14,7 @@ from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.phy import reception
 from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, TIMER, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF, SENSING, SILENT, TURNAROUND
+from swarmwire.comms.truth import NO_ROBOT
 
 BACKOFF = purpose("csma backoff")
 
@@ -38,11 +39,13 @@ def start_cca(params, state, events, r, now_ns):
 def end_cca(params, state, events, r, now_ns):
     """The CCA has ended: turn around to send, or back off again. True on channel access failure.
 
-    As in ns-3, the channel is busy if a frame began during the CCA or is on air at its end; a frame that ended during
-    the CCA does not count.
+    As in ns-3, the channel is busy while the receiver is locked to a frame, however weak (BUSY_RX), and by energy if a
+    frame began during the CCA or is on air at its end; a frame that ended during the CCA does not count.
     """
     radio, rx = state.robot[r], state.reception[r]
-    if max(rx.peak_mw, rx.power_mw) + rx.jam_mw < params.cca_ed_mw and radio.on_air == SILENT:
+    is_receiving = rx.locked_to != NO_ROBOT
+    has_energy = max(rx.peak_mw, rx.power_mw) + rx.jam_mw >= params.cca_ed_mw
+    if not (is_receiving or has_energy) and radio.on_air == SILENT:
         radio.stage = TURNAROUND
         reception.stop_receiving(state, r)
         schedule(events, SEND, r, now_ns + params.turnaround_ns)

@@ -152,6 +152,13 @@ def test_a_lone_broadcast_of_802154_goes_on_air_after_whole_backoffs():
     assert sorted(set(((wait_ns - 320_000) / 320_000).tolist())) == list(range(8))
 
 
+def test_802154_does_not_send_into_a_frame_that_it_is_receiving():
+    """-100 dBm: received without errors, though below the threshold of energy (-96.6 dBm); equal backoffs collide."""
+    pose, sent = at((0, 0), (60, 0)), packets([0, 1], size=100)
+    told = run(make_medium(with_access("csma-802154"), 2), pose, lambda _: sent, 100, 1)
+    assert told.fates()["RECEIVED"] / 200 == pytest.approx(7 / 8, abs=0.05)
+
+
 def test_a_lone_frame_of_80211_goes_on_air_after_difs():
     """50 us at 802.11b."""
     told = run(make_medium(with_access("dcf"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 20, 1)
