@@ -169,7 +169,7 @@ from swarmwire.agent import Agent, Robot
 
 def flood():
     for line in range(20_000):
-        print(line * "flood", end="\\r")
+        print(line, "flood" * 20, end="\\r")
 
 def loop():
     while True:
