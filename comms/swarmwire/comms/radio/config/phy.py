@@ -242,6 +242,13 @@ class Access:
         at_least=-200,
         at_most=100,
     )
+    cca_time_s: float | None = parameter(
+        None,
+        help="of dcf: how long after its start a frame is sensed; who is due until then sends into it; without it 4 us",
+        unit="s",
+        at_least=0,
+        at_most=1,
+    )
     max_retries: int | None = parameter(
         None,
         help="how often an addressed packet is sent again; without it the standard's 3 or 7",

@@ -283,6 +283,8 @@ def _check_fits(radio: Radio, where: str) -> None:
             raise BadInput(
                 where, f"radio.access.{name}", f'expected method csma-802154 or dcf with it, got "{access.method}"'
             )
+    if access.cca_time_s is not None and access.method != "dcf":
+        raise BadInput(where, "radio.access.cca_time_s", f'expected method dcf with it, got "{access.method}"')
     fits = ("threshold", "table", RECEPTIONS.get(radio.frame, reception.model))
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"

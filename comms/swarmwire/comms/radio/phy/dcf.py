@@ -3,6 +3,9 @@
 A station that finds the medium idle sends after DIFS, as in ns-3; the standard lets it send at once. Each frame is
 followed by a new backoff. Remaining slots freeze while the medium is busy and count on when it is idle again. After a
 frame that was not decoded the medium counts as idle only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
+
+A station senses a change only `cca_time_ns` after it (aCCATime): until then its slots count on, and if its backoff ends
+it sends into the frame of the other. Its receiver meanwhile works as if it had sensed it at once.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -27,10 +30,19 @@ def request_access(params, state, events, r, now_ns):
     radio = state.robot[r]
     radio.stage = BACKING_OFF
     if state.reception[r].is_busy:
-        _draw_backoff_if_none(params, state, r)
         return
-    counted_ns = radio.free_from_ns + radio.backoff_slots * params.slot_ns
-    schedule(events, SEND, r, max(now_ns, counted_ns) + params.difs_ns)
+    counted_ns = radio.free_from_ns + params.difs_ns + radio.backoff_slots * params.slot_ns
+    if radio.backoff_slots == 0 or counted_ns <= now_ns:
+        counted_ns = max(now_ns, radio.free_from_ns) + params.difs_ns
+    schedule(events, SEND, r, counted_ns)
+
+
+@kernel()
+def defer(params, state, r):
+    """Draw a backoff for a packet that finds the medium busy and no slots left of the last one (9.2.5.1)."""
+    radio = state.robot[r]
+    if radio.stage == BACKING_OFF and state.reception[r].is_busy and radio.backoff_slots == 0:
+        radio.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
 
 
 @kernel(inline="always")
@@ -49,10 +61,10 @@ def _change(params, state, events, r, now_ns):
     radio, reception = state.robot[r], state.reception[r]
     reception.is_busy = not reception.is_busy
     if reception.is_busy:
-        counted = (now_ns - radio.free_from_ns - params.difs_ns) // params.slot_ns
+        sensed_ns = now_ns + params.cca_time_ns
+        counted = (sensed_ns - radio.free_from_ns - params.difs_ns) // params.slot_ns
         radio.backoff_slots = max(radio.backoff_slots - max(counted, 0), 0)
-        # A robot that sends at this very moment cannot have sensed the other frame.
-        if radio.stage == BACKING_OFF and due_ns(events, SEND, r) > now_ns:
+        if radio.stage == BACKING_OFF and due_ns(events, SEND, r) > sensed_ns:
             cancel(events, SEND, r)
     else:
         radio.free_from_ns = max(now_ns, radio.eifs_until_ns)
@@ -65,13 +77,6 @@ def draw_backoff(params, state, r):
     """Draw the backoff that follows the robot's frame, keyed by (robot, sequence, attempt)."""
     radio = state.robot[r]
     radio.backoff_slots = _backoff_slots(params, state, r, SLOTS)
-
-
-@kernel()
-def _draw_backoff_if_none(params, state, r):
-    radio = state.robot[r]
-    if radio.backoff_slots == 0:
-        radio.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
 
 
 @kernel()

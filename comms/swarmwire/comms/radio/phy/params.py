@@ -48,6 +48,7 @@ class PhyParams(NamedTuple):
     max_be: int
     max_backoffs: int
     # DCF.
+    cca_time_ns: int  # from a change on the medium until carrier sense reports it
     slot_ns: int
     difs_ns: int
     eifs_extra_ns: int  # EIFS - DIFS
@@ -97,6 +98,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         min_be=csma.min_be,
         max_be=csma.max_be,
         max_backoffs=csma.max_backoffs,
+        cca_time_ns=dcf.cca_time_ns if access.cca_time_s is None else to_ns(access.cca_time_s),
         slot_ns=dcf.slot_ns,
         difs_ns=dcf.difs_ns,
         eifs_extra_ns=dcf.sifs_ns + ack_ns,  # EIFS - DIFS: SIFS and an acknowledgement
