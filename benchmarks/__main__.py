@@ -17,7 +17,7 @@ from benchmarks.first_compile import first_compile
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import BOID, processes
 from benchmarks.radio import CASES as AIRS
-from benchmarks.radio import air_cost, air_scaling
+from benchmarks.radio import air_cost, air_scaling, line_of_sight
 from benchmarks.realtime import realtime
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
@@ -41,6 +41,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "view-cost-radio": partial(view_cost, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(AIRS, air_cost),
     "radio-scaling": air_scaling,
+    "line-of-sight-9500": line_of_sight,
     "campaign-1000x10": campaign,
     "processes-100": partial(processes, robots=100, ticks=300, agent=BOID),
     "processes-200": partial(processes, robots=200, ticks=200, agent=BOID),

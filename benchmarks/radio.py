@@ -19,9 +19,11 @@ from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
+from swarmwire.comms.truth import Obstacle
 from swarmwire.deploy.scenario_parts import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10
+BOX_M = (0.2, 0.1)
 STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis
 PLACES_KEY = 1
 SHADOWED = ("radio.shadowing.deviation_db=4", "radio.shadowing.correlation_m=5", "radio.fading.distribution=rayleigh")
@@ -36,6 +38,7 @@ class Case:
     in_range: float  # other robots within the nominal reach of one far from the border
     payload_bytes: int
     keys: tuple[str, ...] = ()
+    boxes: int = 0  # of BOX_M, at random places and turned at random
 
     @property
     def radio(self) -> Radio:
@@ -49,6 +52,7 @@ CASES = {
     "radio-disk-1000": Case("unit-disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
     "radio-wifi-80": Case("wifi-a-6M", 80, 600, 128),
 }
+LINE_OF_SIGHT = Case("unit-disk", 1000, 7.8, 20, ("radio.range_m=5.0", "radio.line_of_sight=true"), boxes=9500)
 SCALING = CASES["radio-802154-1000"]
 SIZES = (100, 1000, 10_000)
 
@@ -73,7 +77,8 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
     assert reach_m is not None
     side_m = float(np.sqrt(robots * np.pi * reach_m**2 / case.in_range))
     keys = np.array([derive_key("arena", 1)], np.uint64)
-    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacle_arrays(((),)), RATE_HZ)
+    obstacles = obstacle_arrays((boxes(case.boxes, side_m),))
+    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacles, RATE_HZ)
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
@@ -97,12 +102,20 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
         "preset": case.preset,
         "keys": list(case.keys),
         "side_m": round(side_m, 1),
+        "boxes": case.boxes,
         "in_range": round(in_range / packets, 1),
         "received": round(float(fates[Fate.RECEIVED]) / packets, 1),
         "collided": round(float(fates[Fate.COLLIDED]) / packets, 1),
         "ticks": ticks,
     }
     return Cost(spent_ns * 1e-9 / ticks, told)
+
+
+def boxes(count: int, side_m: float) -> tuple[Obstacle, ...]:
+    """So many boxes over a square with this side."""
+    rng = np.random.default_rng(PLACES_KEY)
+    rows = rng.uniform([-0.5 * side_m, -0.5 * side_m, -np.pi], [0.5 * side_m, 0.5 * side_m, np.pi], (count, 3))
+    return tuple(Obstacle("box", *row, size_m=BOX_M) for row in rows.tolist())
 
 
 def scaling() -> tuple[float, dict[str, Any]]:
@@ -118,6 +131,13 @@ def air_cost(name: str, repeats: int) -> None:
     costs = [cost(CASES[name]) for _ in range(repeats)]
     factors = [each.realtime_factor for each in costs]
     print_line(name, statistics.median(factors), "x real time", {**costs[0].told, **spread(factors)})
+
+
+def line_of_sight(name: str, repeats: int) -> None:
+    """A tick of the medium on a map of many boxes, each of which may block a link."""
+    costs = [cost(LINE_OF_SIGHT) for _ in range(repeats)]
+    ticks_ms = [1e3 * each.tick_s for each in costs]
+    print_line(name, statistics.median(ticks_ms), "ms per tick", {**costs[0].told, **spread(ticks_ms)})
 
 
 def air_scaling(name: str, repeats: int) -> None:

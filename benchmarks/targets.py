@@ -55,6 +55,9 @@ TARGETS = {
     "radio-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
     "radio-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
     "radio-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
+    "line-of-sight-9500": most(
+        10, "a tick of the medium: 1,000 robots, 7,800 links within range of a unit disk, a map of 9,500 boxes"
+    ),
     "campaign-1000x10": most(
         25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, Coverage, CoverageMap, by_distance, coverage_map
 from swarmwire.comms.radio.config.phy import Antennas
@@ -70,7 +71,7 @@ def probe_coverage(
     key = simulation.world.keys[0]
     if at_m is None:
         radio = _as_sent_by(radio, simulation.scenario, _index(static, robot))
-    coverage = Coverage(radio, key, obstacle_arrays(static.obstacles[:1]), payload_bytes)
+    coverage = Coverage(radio, key, ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0), payload_bytes)
     farthest_m = min(math.hypot(*size_m), BEYOND_RANGE * (static.range_m or math.inf))
     return CoverageProbe(
         static=static,

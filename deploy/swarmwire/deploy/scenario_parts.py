@@ -98,13 +98,14 @@ def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None) -> R
         world.keys,
         static.robots,
         static.arena_size_m,
-        world.obstacles,  # which follow those that are pushed
+        world.obstacles,
         static.rate_hz,
         static.act_every_ticks,
         np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]),
         traces,
         Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
         static.boundary,
+        obstacles_move=static.movable > 0,
     )
 
 

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
-from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndex, obstacles_within
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Walls
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
@@ -23,16 +24,18 @@ HALF_X_M, HALF_Y_M, STEPS = 6.0, 4.5, 110
 CUT_Y_M = 1.0
 
 
-def strength_dbm(obstacles: Obstacles, x: float, y: float) -> float:
+def strength_dbm(obstacles: ObstacleIndex, x: float, y: float) -> float:
     """What a receiver at (x, y) in m has of a sender with 0 dBm."""
     loss = loss_db(CURVE, math.dist(SENDER, (x, y)))
-    walls = wall_loss_db(obstacles, 0, WALLS.crossing_db, WALLS.inside_db_per_m, *SENDER, x, y)
+    entered = np.empty((len(obstacles.shape), 2))
+    walls = wall_loss_db(obstacles, entered, 0, WALLS.crossing_db, WALLS.inside_db_per_m, *SENDER, x, y)
     return rssi_dbm(0.0, 0.0, 0.0, loss + walls)
 
 
 def draw() -> None:
     """Write walls.svg."""
-    placed, none = obstacle_arrays((OBSTACLES,)), obstacle_arrays(((),))
+    size_m = 2.0 * HALF_X_M, 2.0 * HALF_Y_M
+    placed, none = (obstacles_within(obstacle_arrays((of,)), size_m, 0.0, torus=False) for of in (OBSTACLES, ()))
     figure, (left, right) = panels(2, 2.75, (1.25, 1.0))
     x_m, y_m = np.linspace(-HALF_X_M, HALF_X_M, STEPS), np.linspace(-HALF_Y_M, HALF_Y_M, STEPS)
     found = [[strength_dbm(placed, x, y) for x in x_m] for y in y_m]

@@ -13,8 +13,9 @@ from swarmwire.comms.angles import wrap_angle, wrap_angles, wrap_by_atan2, wrap_
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
+from swarmwire.comms.geometry.line_of_sight import is_blocked
 from swarmwire.comms.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
-from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays, ray_to_circle, ray_to_polygon
+from swarmwire.comms.geometry.obstacles import obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import (
     MAX_CELLS_PER_SIDE,
     Grid,
@@ -29,6 +30,7 @@ from swarmwire.comms.geometry.robot_index import (
 )
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.truth import Obstacle
+from tests.support.comms.lines import indexed
 
 SIDES = st.floats(0.1, 50.0)
 SIZE_M = (4.0, 2.0)
@@ -282,15 +284,15 @@ def test_an_obstacle_blocks_lines_of_its_own_arena_only(
     arena: int, line: tuple[float, float, float, float], blocked: bool
 ) -> None:
     x0, y0, x1, y1 = line
-    obstacles = obstacle_arrays(ARENAS)
-    assert is_blocked(obstacles, arena, x0, y0, x1, y1) is blocked
-    assert is_blocked(obstacles, arena, x1, y1, x0, y0) is blocked
+    obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
+    assert is_blocked(obstacles, arena, x0, y0, x1, y1, 0.0, 0.0) is blocked
+    assert is_blocked(obstacles, arena, x1, y1, x0, y0, 0.0, 0.0) is blocked
 
 
 def test_a_line_is_blocked_from_both_ends_alike() -> None:
-    obstacles = obstacle_arrays(ARENAS)
+    obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
     for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
-        assert is_blocked(obstacles, 0, x0, y0, x1, y1) == is_blocked(obstacles, 0, x1, y1, x0, y0)
+        assert is_blocked(obstacles, 0, x0, y0, x1, y1, 0.0, 0.0) == is_blocked(obstacles, 0, x1, y1, x0, y0, 0.0, 0.0)
 
 
 def test_obstacles_of_each_arena_stand_together() -> None:
@@ -338,10 +340,10 @@ def test_a_box_is_a_polygon_with_its_corners() -> None:
 
 def test_a_polygon_blocks_the_line_through_it() -> None:
     triangle = Obstacle("polygon", 0.0, 0.0, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
-    obstacles = obstacle_arrays(((triangle,),))
-    assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2)
-    assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1)
-    assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0)
+    obstacles = indexed(((triangle,),), OBSTACLE_ARENA_M)
+    assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2, 0.0, 0.0)
+    assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1, 0.0, 0.0)
+    assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0, 0.0, 0.0)
     assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
 
 

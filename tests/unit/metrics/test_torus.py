@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays
+from swarmwire.comms.geometry.line_of_sight import is_blocked
 from swarmwire.metrics.drawing.swarm import in_range
 from swarmwire.metrics.run_folder.distances import Places
 from swarmwire.metrics.torus import link_lines, shortest, whole_path
+from tests.support.comms.lines import indexed
 from tests.support.metrics.films import OBSTACLES
 from tests.support.metrics.truths import static
 
@@ -51,12 +52,12 @@ def test_a_path_over_the_seam_has_no_jumps_and_ends_where_it_did():
 def test_pictures_join_robots_across_the_seam_as_the_air_does():
     at = np.random.default_rng(5).uniform(-0.5, 0.5, (70, 2)) * SIZE_M
     at[0] = -4.0, -3.0
-    arrays = obstacle_arrays((OBSTACLES,))
+    index = indexed((OBSTACLES,), SIZE_M)
     joined = {
         (i, j)
         for i in range(70)
         for j in range(i + 1, 70)
-        if apart(at[i], at[j]) <= 2.0 and not is_blocked_on(arrays, 0, *at[i], *at[j], *SIZE_M)
+        if apart(at[i], at[j]) <= 2.0 and not is_blocked(index, 0, *at[i], *at[j], *SIZE_M)
     }
     found = in_range(at, np.ones(70, np.bool_), 2.0, OBSTACLES, SIZE_M)
     assert {(min(pair), max(pair)) for pair in found.tolist()} == joined

@@ -16,6 +16,7 @@ from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, r
 from swarmwire.comms.kernels import kernel, njit
 
 CELLS_PER_OBSTACLE = 4
+FEW = 8  # obstacles per arena: lines test them all, which is faster than a walk through cells
 MARGIN_M = 1e-9  # added to the reach against rounding
 
 
@@ -25,6 +26,7 @@ class ObstacleIndex(NamedTuple):
     shape: FloatArray  # (things, 4) x, y, radius of a circle around it, height of its top in m
     side_start: IntArray  # (things + 1,) thing k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `geometry.sides_of` has them
+    extent: FloatArray  # (arenas, 4) left, bottom, right, top in m of what is listed; of nothing: inf, inf, -inf, -inf
     cells: Cells
 
 
@@ -48,7 +50,8 @@ def obstacles_within(
     shape, arena, sides, side = _with_images(shape, arena, sides, obstacles.side, size_m, images_m or reach_m, torus)
     side_start = np.concatenate([[0], np.cumsum(sides)])
     per_obstacle_m = np.sqrt(size_m[0] * size_m[1] * arenas / (CELLS_PER_OBSTACLE * max(len(shape), 1)))
-    cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if len(shape) else max(size_m)
+    many = len(shape) > (FEW * arenas if reach_m == 0.0 else 0)
+    cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if many else max(size_m)
     cells = cells_over(size_m, cell_m, arenas, 0)
     facts = shape, arena, side_start, side, cells, reach_m + MARGIN_M
     count = np.zeros(len(cells.start) - 1, np.int64)
@@ -56,7 +59,44 @@ def obstacles_within(
     start = np.concatenate([[0], np.cumsum(count)])
     item = np.empty(start[-1], np.int64)
     _list(start[:-1].copy(), item, *facts)
-    return ObstacleIndex(shape, side_start, side, cells._replace(start=start, item=item))
+    extent = np.tile([np.inf, np.inf, -np.inf, -np.inf], (arenas, 1))
+    around_m = shape[:, 2:3] + reach_m + MARGIN_M
+    np.minimum.at(extent[:, :2], arena, shape[:, :2] - around_m)
+    np.maximum.at(extent[:, 2:], arena, shape[:, :2] + around_m)
+    return ObstacleIndex(shape, side_start, side, extent, cells._replace(start=start, item=item))
+
+
+class ObstacleIndices:
+    """The obstacle index of some arenas: built when first needed, and anew after an obstacle was pushed."""
+
+    def __init__(
+        self,
+        obstacles: Obstacles,
+        size_m: tuple[float, float],
+        reach_m: float,
+        torus: bool = False,
+        images_m: float | None = None,
+        obstacles_move: bool = False,
+    ) -> None:
+        """As `obstacles_within`; with `obstacles_move` their arrays may change in place."""
+        self._obstacles, self._facts, self._move = obstacles, (size_m, reach_m, torus, images_m), obstacles_move
+        self._index: ObstacleIndex | None = None
+        self._places: tuple[FloatArray, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """The number of obstacles of all arenas."""
+        return len(self._obstacles.circle) + len(self._obstacles.polygon)
+
+    def now(self) -> ObstacleIndex:
+        """The obstacles at their present places; their number never changes."""
+        if self._index is None or (self._move and not all(map(np.array_equal, self._places, self._present()))):
+            self._index = obstacles_within(self._obstacles, *self._facts)
+            self._places = tuple(array.copy() for array in self._present()) if self._move else ()
+        return self._index
+
+    def _present(self) -> tuple[FloatArray, ...]:
+        return self._obstacles.circle, self._obstacles.polygon, self._obstacles.side
 
 
 def _with_images(shape, arena, sides, side, size_m, reach_m, torus):

@@ -113,39 +113,3 @@ def to_nearest(away_m, side_m):
     A side of 0 stands for an axis along which an arena does not go on at its other side.
     """
     return -side_m * np.floor(away_m / side_m + 0.5) if side_m > 0.0 else 0.0
-
-
-@njit()
-def is_blocked_on(obstacles, arena, x0, y0, x1, y1, side_x, side_y):
-    """As `is_blocked`, for the shortest line between two points of a torus with these sides; 0: the arena ends there.
-
-    Obstacles lie within the arena, so that the line is looked at where it leaves it, and where it comes in again.
-    """
-    over_x, over_y = to_nearest(x1 - x0, side_x), to_nearest(y1 - y0, side_y)
-    x1, y1 = x1 + over_x, y1 + over_y
-    if is_blocked(obstacles, arena, x0, y0, x1, y1):
-        return True
-    if over_x != 0.0 and is_blocked(obstacles, arena, x0 - over_x, y0, x1 - over_x, y1):
-        return True
-    if over_y != 0.0 and is_blocked(obstacles, arena, x0, y0 - over_y, x1, y1 - over_y):
-        return True
-    both = over_x != 0.0 and over_y != 0.0
-    return both and is_blocked(obstacles, arena, x0 - over_x, y0 - over_y, x1 - over_x, y1 - over_y)
-
-
-@njit()
-def is_blocked(obstacles, arena, x0, y0, x1, y1):
-    """Whether an obstacle of the arena touches the straight line between two points."""
-    dx, dy = x1 - x0, y1 - y0
-    length = np.sqrt(dx * dx + dy * dy)
-    if length == 0.0:
-        return False
-    dx, dy = dx / length, dy / length
-    for i in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
-        circle = obstacles.circle[i]
-        if ray_to_circle(x0, y0, dx, dy, circle[0], circle[1], circle[2]) <= length:
-            return True
-    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
-        if ray_to_polygon(x0, y0, dx, dy, obstacles, k) <= length:
-            return True
-    return False

@@ -13,6 +13,7 @@ from operator import add
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, SentPackets
@@ -87,13 +88,14 @@ class RadioMedium:
         traces: LinkTraces | None = None,
         antennas: Antennas | None = None,
         boundary: Boundary = "walls",
+        obstacles_move: bool = False,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
         `radius_m` (robots,) are the robots' radii, for bodies between two robots; 0 each if left out. `traces` is the
-        content of the radio's trace file, `antennas` the antennas of a radio with a PHY. ValueError for a unit disk
-        without `range_m`, a trace without its file or the other way round, or a radio that `unfit_for_torus` refuses on
-        a torus.
+        content of the radio's trace file, `antennas` the antennas of a radio with a PHY. With `obstacles_move` the
+        arrays of `obstacles` may change in place. ValueError for a unit disk without `range_m`, a trace without its
+        file or the other way round, or a radio that `unfit_for_torus` refuses on a torus.
         """
         if not radio.is_phy and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a unit disk has one")
@@ -108,7 +110,8 @@ class RadioMedium:
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
         robot_antennas = antennas or Antennas.alike(robots)
         self._running: BoolArray = np.ones(len(keys), np.bool_)
-        arena_facts = keys, robots, obstacles, size_m, radii_m
+        obstacle_indices = ObstacleIndices(obstacles, size_m, 0.0, obstacles_move=obstacles_move)
+        arena_facts = keys, robots, obstacle_indices, size_m, radii_m
         context = ChannelContext(
             radio, *arena_facts, self._active, robot_antennas, self._running, traces, boundary == "torus"
         )

@@ -9,13 +9,14 @@ import pytest
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.obstacles import is_blocked, obstacle_arrays
+from swarmwire.comms.geometry.line_of_sight import is_blocked
 from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
 from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.scenario import _facts
 from swarmwire.metrics.drawing.swarm import in_range
+from tests.support.comms.lines import indexed
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -239,9 +240,12 @@ def test_pairs_are_of_those_alive_that_are_near_enough():
 def test_obstacles_are_in_the_way_as_they_are_in_the_air(obstacle: Obstacle):
     centre = np.array([obstacle.x_m, obstacle.y_m])
     position_m = centre + np.random.default_rng(4).uniform(-1.0, 1.0, (60, 2))
-    kernel = obstacle_arrays(((obstacle,),))
+    index = indexed(((obstacle,),), (8.0, 8.0))
     expected = {
-        (i, j) for i in range(60) for j in range(i + 1, 60) if not is_blocked(kernel, 0, *position_m[i], *position_m[j])
+        (i, j)
+        for i in range(60)
+        for j in range(i + 1, 60)
+        if not is_blocked(index, 0, *position_m[i], *position_m[j], 0.0, 0.0)
     }
     found = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
     assert {(min(pair), max(pair)) for pair in found.tolist()} == expected

@@ -9,7 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked, obstacle_arrays
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
     ItuIndoor,
@@ -24,6 +25,7 @@ from swarmwire.comms.radio.propagation.obstruction import bodies_between, crosse
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
 from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
 from swarmwire.comms.truth import Obstacle
+from tests.support.comms.lines import indexed
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")
@@ -47,7 +49,8 @@ FREQUENCIES = st.floats(4e8, 6e9)
 CYLINDER = Obstacle("cylinder", 0.0, 0.0, radius_m=1.0)
 BOX = Obstacle("box", 5.0, 0.0, size_m=(2.0, 4.0))
 TURNED = Obstacle("box", -4.0, 3.0, heading_rad=0.6, size_m=(1.0, 3.0))
-ARENAS = obstacle_arrays(((CYLINDER, BOX, TURNED), (), (BOX, BOX)))
+SIZE_M = (16.0, 16.0)
+ARENAS = indexed(((CYLINDER, BOX, TURNED), (), (BOX, BOX)), SIZE_M)
 PLACES = st.floats(-8.0, 8.0)
 
 
@@ -230,8 +233,8 @@ def test_a_disk_has_no_path_loss():
         _ = Radio(2.0).loss_model
 
 
-def through(obstacles: Obstacles, *line: float, arena: int = 0) -> tuple[int, float]:
-    return crossed_and_inside_m(obstacles, arena, *line)
+def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int, float]:
+    return crossed_and_inside_m(obstacles, np.empty((len(obstacles.shape), 2)), arena, *line)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +264,8 @@ def test_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: float
 
 
 def test_loss_counts_obstacles_and_metres():
-    assert wall_loss_db(ARENAS, 0, 5.0, 3.0, -2.0, 0.0, 8.0, 0.0) == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
+    loss = wall_loss_db(ARENAS, np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 8.0, 0.0)
+    assert loss == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
 
 
 def test_an_arena_has_its_own_obstacles_and_overlapping_ones_count_each():
@@ -290,7 +294,7 @@ def test_who_enters_an_obstacle_is_blocked_by_it(ax: float, ay: float, bx: float
     crossed, inside_m = through(ARENAS, ax, ay, bx, by)
     assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
     assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
-    assert not crossed or is_blocked(ARENAS, 0, ax, ay, bx, by)
+    assert not crossed or is_blocked(ARENAS, 0, ax, ay, bx, by, 0.0, 0.0)
 
 
 @given(PLACES, PLACES, PLACES, PLACES, st.floats(-math.pi, math.pi), PLACES, PLACES)
@@ -302,8 +306,8 @@ def test_turning_and_moving_everything_changes_nothing(ax, ay, bx, by, turn, dx,
 
     x, y = moved(BOX.x_m, BOX.y_m)
     box = Obstacle("box", x, y, heading_rad=turn, size_m=BOX.size_m)
-    there = through(obstacle_arrays(((box,),)), *moved(ax, ay), *moved(bx, by))[1]
-    here = through(obstacle_arrays(((BOX,),)), ax, ay, bx, by)[1]
+    there = through(indexed(((box,),), SIZE_M), *moved(ax, ay), *moved(bx, by))[1]
+    here = through(indexed(((BOX,),), SIZE_M), ax, ay, bx, by)[1]
     near_a_side = abs(abs(ax - 5.0) - 1.0) < 1e-6 and abs(ax - bx) < 1e-6
     near_a_side |= abs(abs(ay) - 2.0) < 1e-6 and abs(ay - by) < 1e-6
     assume(not near_a_side)  # along a side, rounding decides which side of it the line is
@@ -336,7 +340,7 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
 
 @given(PLACES, PLACES, PLACES, PLACES, PLACES, PLACES, st.floats(0.05, 2.0))
 def test_a_disc_is_on_the_line_where_the_line_has_a_chord_in_it(ax, ay, bx, by, cx, cy, radius_m):
-    disc = obstacle_arrays(((Obstacle("cylinder", cx, cy, radius_m=radius_m),),))
+    disc = indexed(((Obstacle("cylinder", cx, cy, radius_m=radius_m),),), SIZE_M)
     chord_m = through(disc, ax, ay, bx, by)[1]
     assume(math.hypot(bx - ax, by - ay) > 1e-3)
     assume(chord_m == 0.0 or chord_m > 1e-4)  # between, the two have other roundings

@@ -10,6 +10,7 @@ import pytest
 
 from swarmwire.comms.config import bounds_of, fault_of
 from swarmwire.comms.draws import derive_key
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, coverage_map
@@ -201,7 +202,8 @@ def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
 def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_bytes: int = 10) -> Coverage:
     """Of the arena with seed 1."""
     key = derive_key(1, "air")
-    return Coverage(radio, np.uint64(key), obstacle_arrays((tuple(obstacles or ()),)), payload_bytes)
+    placed = ObstacleIndices(obstacle_arrays((tuple(obstacles or ()),)), SIZE_M, 0.0)
+    return Coverage(radio, np.uint64(key), placed, payload_bytes)
 
 
 @pytest.mark.parametrize(

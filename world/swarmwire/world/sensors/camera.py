@@ -19,7 +19,7 @@ from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.sensors.camera import CameraSpec
 from swarmwire.comms.sensors.sensor import Field
-from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
+from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
 NEVER = (np.inf, -np.inf)
@@ -108,7 +108,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
-        self._obstacles = ObstacleIndices(scene, reach_m)
+        self._obstacles = obstacle_indices_of(scene, reach_m)
         nearby = np.empty(len(self._obstacles.now().shape), np.int64)
         self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, nearby)
 

@@ -1,6 +1,6 @@
 """The light sensor, and the line of sight over the floor that it needs. Compiled.
 
-`obstacle_between` and `robot_between` test a straight line against the obstacles and robots in the cells along it.
+`robot_between` tests a straight line against the robots in the cells along it.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -8,36 +8,16 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacle_index import ray_to_obstacle
+from swarmwire.comms.geometry.line_of_sight import cell_at, cell_number, obstacle_between, rows_along
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.sensors.light import LightSpec
-from swarmwire.world.sensors.rays import ObstacleIndices, nearest, robot_index_of
+from swarmwire.world.sensors.rays import nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
-MARGIN_M = 1e-9  # a line along the border of two cells passes through both
 RANGE_INTENSITIES = 2.5  # the range of a light, in multiples of its intensity
 TURN_RAD = 2.0 * np.pi
-
-
-@kernel()
-def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
-    """Whether an obstacle higher than `low_m` touches the line from x, y to another place."""
-    cells = obstacles.cells
-    distance_m = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
-    if distance_m == 0.0 or len(obstacles.shape) == 0:
-        return False
-    dx, dy = (to_x - x) / distance_m, (to_y - y) / distance_m
-    for column in range(_cell(min(x, to_x), cells.per_x, cells.nx), _cell(max(x, to_x), cells.per_x, cells.nx) + 1):
-        low, high = _rows(cells, column, MARGIN_M, x, y, to_x, to_y)
-        for row in range(low, high + 1):
-            c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
-            for at in range(cells.start[c], cells.start[c + 1]):
-                k = cells.item[at]
-                if obstacles.shape[k, 3] > low_m and ray_to_obstacle(x, y, dx, dy, obstacles, k) <= distance_m:
-                    return True
-    return False
 
 
 @kernel()
@@ -49,12 +29,12 @@ def robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
         return False
     dx, dy = (to_x - x) / distance_m, (to_y - y) / distance_m
     middle_x, middle_y = 0.5 * (x + to_x), 0.5 * (y + to_y)
-    first = _cell(min(x, to_x) - widest_m, cells.per_x, cells.nx)
-    last = _cell(max(x, to_x) + widest_m, cells.per_x, cells.nx)
+    first = cell_at(min(x, to_x) - widest_m, cells.per_x, cells.nx)
+    last = cell_at(max(x, to_x) + widest_m, cells.per_x, cells.nx)
     for column in range(first, last + 1):
-        low, high = _rows(cells, column, widest_m, x, y, to_x, to_y)
+        low, high = rows_along(cells, column, widest_m, x, y, to_x, to_y)
         for row in range(low, high + 1):
-            c = (arena * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
+            c = cell_number(cells, arena, column, row)
             for at in range(cells.start[c], cells.start[c + 1]):
                 other = cells.item[at]
                 beside = robots.bottom_m[other] < robots.top_m[own] and robots.bottom_m[own] < robots.top_m[other]
@@ -65,26 +45,6 @@ def robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
                 if ray_to_circle(x, y, dx, dy, cx, cy, robots.radius_m[other]) <= distance_m:
                     return True
     return False
-
-
-@kernel()
-def _cell(at, per, cells):
-    """The column or row of a coordinate, not wrapped."""
-    return int(np.floor(at * per + 0.5 * cells))
-
-
-@kernel()
-def _rows(cells, column, margin_m, x, y, to_x, to_y):
-    """First and last row of a column, not wrapped, where a thing of this width may touch the line."""
-    low, high = min(y, to_y), max(y, to_y)
-    if to_x != x:
-        left = (column - 0.5 * cells.nx) / cells.per_x - margin_m
-        right = (column + 1.0 - 0.5 * cells.nx) / cells.per_x + margin_m
-        slope = (to_y - y) / (to_x - x)
-        one = y + slope * (max(left, min(x, to_x)) - x)
-        other = y + slope * (min(right, max(x, to_x)) - x)
-        low, high = max(low, min(one, other)), min(high, max(one, other))
-    return _cell(low - margin_m, cells.per_y, cells.ny), _cell(high + margin_m, cells.per_y, cells.ny)
 
 
 class LightSensor(BuiltInSensor[LightSpec]):
@@ -109,7 +69,7 @@ class LightSensor(BuiltInSensor[LightSpec]):
         )
         self._widest_m = float(scene.radius_m.max())
         self._robots = robot_index_of(scene, 2.0 * self._widest_m)
-        self._obstacles = ObstacleIndices(
+        self._obstacles = obstacle_indices_of(
             scene, 0.0, images_m=0.5 * max(scene.size_m)
         )  # no light is farther on a torus
 

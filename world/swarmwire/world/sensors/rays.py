@@ -1,6 +1,6 @@
 """Sensors that cast a few rays from the rim of the body: proximity (active) and infrared (passive). Compiled.
 
-`RobotIndex` and `ObstacleIndices` find robots and obstacles near a place; the scan, light and camera sensors use them,
+`RobotIndex` and the obstacle index find robots and obstacles near a place; the scan, light and camera sensors use them,
 too. `RayArraySight` finds the nearest thing on each ray of a group's robots and applies the response of the sensor.
 """
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndex, obstacles_near, obstacles_within, ray_to_obstacle
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices, obstacles_near, ray_to_obstacle
 from swarmwire.comms.geometry.obstacles import ray_to_circle
 from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
 from swarmwire.comms.kernels import kernel
@@ -96,24 +96,10 @@ def near_robots(robots, arena, own, x, y, reach_m, low_m, high_m):
     return count
 
 
-class ObstacleIndices:
-    """The obstacle index of a scene: built once, or in each tick where an obstacle can be pushed."""
-
-    def __init__(self, scene: Scene, reach_m: float, images_m: float | None = None) -> None:
-        """For queries within `reach_m`; `images_m` as in `obstacles_within`."""
-        self._scene, self._reach_m, self._images_m = scene, reach_m, images_m
-        self._index = self._sorted()
-
-    def now(self) -> ObstacleIndex:
-        """The obstacles at their places in this tick; their number never changes."""
-        if self._scene.obstacles_move:
-            self._index = self._sorted()
-        return self._index
-
-    def _sorted(self) -> ObstacleIndex:
-        scene = self._scene
-        torus = scene.boundary == "torus"
-        return obstacles_within(scene.obstacles, scene.size_m, self._reach_m, torus, self._images_m)
+def obstacle_indices_of(scene: Scene, reach_m: float, images_m: float | None = None) -> ObstacleIndices:
+    """The obstacle index of a scene, for queries within `reach_m`; `images_m` as in `obstacles_within`."""
+    torus = scene.boundary == "torus"
+    return ObstacleIndices(scene.obstacles, scene.size_m, reach_m, torus, images_m, scene.obstacles_move)
 
 
 class RayArray(NamedTuple):
@@ -145,7 +131,7 @@ class RayArraySight:
         self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
         self._active, self._alive, curve = active, scene.alive, spec.response
         self._robots = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
-        self._obstacles = ObstacleIndices(scene, reach_m)
+        self._obstacles = obstacle_indices_of(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._rays = RayArray(
             group.start,

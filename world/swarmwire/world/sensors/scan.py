@@ -12,7 +12,7 @@ from swarmwire.comms.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.geometry.robot_index import sort
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.world.sensors.rays import ObstacleIndices, near_robots, nearest, robot_index_of
+from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
 TURN_RAD = 2.0 * np.pi
@@ -44,7 +44,7 @@ class ScanSensor(BuiltInSensor[ScanSpec]):
         scene, group, spec = self.scene, self.group, self.spec
         self._shape = len(scene.keys), group.stop - group.start, spec.rays
         self._robots = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
-        self._obstacles = ObstacleIndices(scene, spec.range_m)
+        self._obstacles = obstacle_indices_of(scene, spec.range_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._laser = Laser(
             group.start,

@@ -13,7 +13,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.phy import Antennas, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
@@ -40,9 +41,9 @@ class Coverage:
         sensitivity_dbm: the least mean power that counts as in range; None for a unit disk.
     """
 
-    def __init__(self, radio: Radio, key: np.uint64, obstacles: Obstacles, payload_bytes: int) -> None:
+    def __init__(self, radio: Radio, key: np.uint64, obstacles: ObstacleIndices, payload_bytes: int) -> None:
         """`key` is that of the arena, `obstacles` are those of this arena alone; packets have so many bytes."""
-        self._radio, self._obstacles = radio, obstacles
+        self._radio, self._obstacles = radio, obstacles.now()
         self._losses = LossChain.of(_context_of(radio, key, obstacles))
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
@@ -115,7 +116,7 @@ class Coverage:
         return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
 
 
-def _context_of(radio: Radio, key: np.uint64, obstacles: Obstacles) -> ChannelContext:
+def _context_of(radio: Radio, key: np.uint64, obstacles: ObstacleIndices) -> ChannelContext:
     """The context of two robots without bodies."""
     keys, none, antennas = np.array([key], np.uint64), Disruption.none(2), Antennas.alike(2)
     return ChannelContext(
@@ -125,13 +126,13 @@ def _context_of(radio: Radio, key: np.uint64, obstacles: Obstacles) -> ChannelCo
 
 @njit()
 def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_db, inside_db_per_m, start, end):
-    out_dbm = np.empty(len(start))
+    out_dbm, entered = np.empty(len(start)), np.empty((len(obstacles.shape), 2))
     for i in range(len(start)):
         ax, ay = start[i]
         bx, by = end[i]
         apart_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         loss = loss_between_db(
-            curve, waves, amplitude, obstacles, 0, crossing_db, inside_db_per_m, apart_m, ax, ay, bx, by
+            curve, waves, amplitude, obstacles, entered, 0, crossing_db, inside_db_per_m, apart_m, ax, ay, bx, by
         )
         out_dbm[i] = rssi_dbm(power_dbm, gain_dbi, gain_dbi, loss)
     return out_dbm
@@ -141,7 +142,7 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
 def _blocked(obstacles, start, end):
     found = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
-        found[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1])
+        found[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1], 0.0, 0.0)
     return found
 
 

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacles import Obstacles, is_blocked
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
@@ -41,7 +42,9 @@ class JammerTable:
         if not self.anything:
             self._power_mw = np.empty((0, self._context.robots))
             return
-        self._power_mw = powers_of(self._jammers, pose, self._context.robots, self._context.obstacles, propagation)
+        self._power_mw = powers_of(
+            self._jammers, pose, self._context.robots, self._context.obstacles.now(), propagation
+        )
 
     def between(self, from_ns: int, until_ns: int) -> JammerSchedule:
         """The state of jammers just before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""
@@ -67,7 +70,7 @@ class JammerTable:
 
 
 def powers_of(
-    jammers: Jammers, pose: FloatArray, robots: int, obstacles: Obstacles, propagation: PropagationParams
+    jammers: Jammers, pose: FloatArray, robots: int, obstacles: ObstacleIndex, propagation: PropagationParams
 ) -> FloatArray:
     """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
@@ -76,7 +79,7 @@ def powers_of(
 
 @njit()
 def _powers(jammers, place, x, y, robots, obstacles, propagation):
-    power_mw = np.zeros((len(place), robots))
+    power_mw, entered = np.zeros((len(place), robots)), np.empty((len(obstacles.shape), 2))
     amplitude_db = propagation.amplitude_db if propagation.shadows else 0.0
     crossing_db, inside_db_per_m = (
         (propagation.crossing_db, propagation.inside_db_per_m) if propagation.walls else (0.0, 0.0)
@@ -88,12 +91,11 @@ def _powers(jammers, place, x, y, robots, obstacles, propagation):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
-            if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r]):
+            if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r], 0.0, 0.0):
                 continue
-            rx, ry = x[r], y[r]
-            apart_m = math.hypot(rx - jx, ry - jy)
+            line = math.hypot(x[r] - jx, y[r] - jy), jx, jy, x[r], y[r]
             loss = loss_between_db(
-                curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, apart_m, jx, jy, rx, ry
+                curve, waves, amplitude_db, obstacles, entered, arena, crossing_db, inside_db_per_m, *line
             )
             power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw

@@ -15,7 +15,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
@@ -44,7 +44,7 @@ def pairs_of(
     size_m: tuple[float, float],
     keys,
     running: BoolArray,
-    obstacles: Obstacles,
+    obstacles: ObstacleIndices,
     propagation: PropagationParams,
     line_of_sight: LineOfSight | None = None,
     measured: "MeasuredLinks | None" = None,
@@ -60,7 +60,7 @@ def pairs_of(
     if propagation.shadows:
         _add_shadows(loss, x, y, robots, cells.order, propagation.field, propagation.amplitude_db, a, b)
     if propagation.walls:
-        _add_walls(loss, x, y, robots, obstacles, propagation.crossing_db, propagation.inside_db_per_m, a, b)
+        _add_walls(loss, x, y, robots, obstacles.now(), propagation.crossing_db, propagation.inside_db_per_m, a, b)
     if propagation.bodies:
         loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, cells, robots, a, b)
     kept = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
@@ -160,9 +160,10 @@ def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
 
 @njit()
 def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b):
+    entered = np.empty((len(obstacles.shape), 2))
     for i in range(len(a)):
         s, r = a[i], b[i]
-        loss[i] += wall_loss_db(obstacles, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
+        loss[i] += wall_loss_db(obstacles, entered, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
 
 
 @kernel(from_python=True)

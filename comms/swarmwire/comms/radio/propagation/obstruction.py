@@ -11,44 +11,73 @@ import math
 import numpy as np
 
 from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
+from swarmwire.comms.kernels import kernel, njit
 
 PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
 
 
-@njit()
-def wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
-    """Loss in dB in walls between two points in m; equal both ways to the last bit."""
-    crossed, inside_m = crossed_and_inside_m(obstacles, arena, ax, ay, bx, by)
+@kernel(from_python=True)
+def wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
+    """Loss in dB in walls between two points in m; equal both ways to the last bit. See `crossed_and_inside_m`."""
+    crossed, inside_m = crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by)
     return crossed * crossing_db + inside_m * inside_db_per_m
 
 
-@njit()
-def crossed_and_inside_m(obstacles, arena, ax, ay, bx, by):
+@kernel(from_python=True)
+def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
     """Number of obstacles of the arena that the line between two points enters, and its length inside them in m.
 
-    A line that only touches an obstacle does not enter it; where two overlap, both count.
+    `obstacles` is an obstacle index, `entered` a buffer (obstacles, 2). A line that only touches an obstacle does not
+    enter it; where two overlap, both count.
     """
     if (bx, by) < (ax, ay):  # always from the same end, so that both directions agree to the last bit
         ax, ay, bx, by = bx, by, ax, ay
     dx, dy = bx - ax, by - ay
     length = math.sqrt(dx * dx + dy * dy)
-    crossed, inside_m = 0, 0.0
+    crossed, inside_m, cells = 0, 0.0, obstacles.cells
     if length == 0.0:
         return crossed, inside_m
     dx, dy = dx / length, dy / length
-    for i in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
-        circle = obstacles.circle[i]
-        chord_m = chord_in_circle(ax, ay, dx, dy, length, circle[0], circle[1], circle[2])
-        crossed += chord_m > 0.0
-        inside_m += chord_m
-    for k in range(obstacles.polygon_start[arena], obstacles.polygon_start[arena + 1]):
-        around = obstacles.polygon[k]
-        if chord_in_circle(ax, ay, dx, dy, length, around[0], around[1], around[2]) > 0.0:
-            chord_m = chord_in_polygon(ax, ay, dx, dy, length, obstacles, k)
-            crossed += chord_m > 0.0
-            inside_m += chord_m
+    first, last = columns_to_obstacles(obstacles, arena, ax, ay, bx, by)
+    for column in range(first, last + 1):
+        low, high = rows_to_obstacles(obstacles, arena, column, ax, ay, bx, by)
+        for row in range(low, high + 1):
+            c = cell_number(cells, arena, column, row)
+            for at in range(cells.start[c], cells.start[c + 1]):
+                k = cells.item[at]
+                chord_m = chord_in_obstacle(ax, ay, dx, dy, length, obstacles, k)
+                if chord_m > 0.0:
+                    crossed = _insert(entered, crossed, k, chord_m)
+    for i in range(
+        crossed
+    ):  # in the order of obstacles, whatever their cells, since the last bit of a sum depends on it
+        inside_m += entered[i, 1]
     return crossed, inside_m
+
+
+@kernel()
+def _insert(entered, count, k, chord_m):
+    """Insert an obstacle and the length inside it by rising number, unless it is there; returns the number of rows."""
+    place = count
+    while place > 0 and entered[place - 1, 0] > k:
+        place -= 1
+    if place > 0 and entered[place - 1, 0] == k:
+        return count
+    for i in range(count, place, -1):
+        entered[i, 0], entered[i, 1] = entered[i - 1, 0], entered[i - 1, 1]
+    entered[place, 0], entered[place, 1] = k, chord_m
+    return count + 1
+
+
+@kernel()
+def chord_in_obstacle(px, py, dx, dy, length, obstacles, k):
+    """As `chord_in_circle`, in obstacle k of an obstacle index."""
+    around = obstacles.shape[k]
+    chord_m = chord_in_circle(px, py, dx, dy, length, around[0], around[1], around[2])
+    if chord_m > 0.0 and obstacles.side_start[k] < obstacles.side_start[k + 1]:
+        return chord_in_polygon(px, py, dx, dy, length, obstacles, k)
+    return chord_m
 
 
 @njit()

@@ -59,20 +59,21 @@ def _reach_of_lines_m(curve, most_loss_db):
 
 @njit()
 def loss_between_db(
-    curve, waves, amplitude_db, obstacles, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
+    curve, waves, amplitude_db, obstacles, entered, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
 ):
     """The loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
 
     Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field; an
     `amplitude_db` of 0 means no shadowing. Walls are the arena's obstacles; `crossing_db` and `inside_db_per_m` of 0
-    mean none. Callers pass the distance, since the last bit of a run depends on its rounding. `phy/pairs.py` applies
-    the same three steps over all pairs, since it drops distant pairs after the first.
+    mean none. `obstacles` and `entered` are as in `wall_loss_db`. Callers pass the distance, since the last bit of a
+    run depends on its rounding. `phy/pairs.py` applies the same three steps over all pairs, since it drops distant
+    pairs after the first.
     """
     loss = loss_db(curve, distance_m)
     if amplitude_db > 0.0:
         loss += shadowing_db(waves, amplitude_db, ax, ay, bx, by)
     if crossing_db > 0.0 or inside_db_per_m > 0.0:
-        loss += wall_loss_db(obstacles, arena, crossing_db, inside_db_per_m, ax, ay, bx, by)
+        loss += wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by)
     return loss
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacles import is_blocked, is_blocked_on
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
@@ -26,8 +26,7 @@ class LineOfSight(Stage):
     @classmethod
     def of(cls, context: ChannelContext) -> "LineOfSight | None":
         """The stage, where the radio needs a line of sight and there are obstacles."""
-        any_obstacle = len(context.obstacles.circle) or len(context.obstacles.polygon)
-        return LineOfSight(context) if context.radio.needs_line_of_sight and any_obstacle else None
+        return LineOfSight(context) if context.radio.needs_line_of_sight and context.obstacles.count else None
 
     def __init__(self, context: ChannelContext) -> None:
         self._obstacles, self._robots, self._wrap_m = context.obstacles, context.robots, context.wrap_m
@@ -44,22 +43,18 @@ class LineOfSight(Stage):
 
     def blocked(self, pose: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
         """Whether an obstacle blocks the line between robot rows, (k,)."""
-        return _blocked(self._obstacles, self._robots, self._wrap_m, pose, a, b)
+        blocked = np.empty(len(a), np.bool_)
+        _block(blocked, self._obstacles.now(), self._robots, *self._wrap_m, pose, a, b)
+        return blocked
 
 
-@njit()
-def _blocked(obstacles, robots, wrap_m, pose, sender, receiver):
-    ends = np.zeros(len(sender), np.bool_)
-    wraps = wrap_m[0] > 0.0
-    for i in range(len(ends)):
+@kernel(from_python=True)
+def _block(blocked, obstacles, robots, wrap_x, wrap_y, pose, sender, receiver):
+    for i in range(len(blocked)):
         # From the lower row to the higher: both directions of a link then agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
-        if wraps:
-            ends[i] = is_blocked_on(obstacles, a // robots, ax, ay, bx, by, *wrap_m)
-        else:
-            ends[i] = is_blocked(obstacles, a // robots, ax, ay, bx, by)
-    return ends
+        ends = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
+        blocked[i] = is_blocked(obstacles, a // robots, *ends, wrap_x, wrap_y)
 
 
 class BodiesBlock(Stage):

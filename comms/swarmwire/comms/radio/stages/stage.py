@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
@@ -20,7 +20,7 @@ class ChannelContext:
     radio: Radio
     keys: KeyArray  # (arenas,) for draws
     robots: int  # in each arena
-    obstacles: Obstacles
+    obstacles: ObstacleIndices  # without images
     size_m: tuple[float, float]  # of each arena
     radius_m: FloatArray  # (rows,) of the robots
     disruption: Disruption  # kept up to date by the medium

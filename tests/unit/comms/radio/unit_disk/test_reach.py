@@ -7,12 +7,14 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import is_blocked_on, obstacle_arrays, to_nearest
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.geometry.obstacles import obstacle_arrays, to_nearest
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.truth import Obstacle
+from tests.support.comms.lines import indexed
 from tests.support.comms.radio import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
 
 MEASURES = Measures(RangeMeasure(), BearingMeasure())
@@ -227,7 +229,7 @@ def test_obstacles_block_across_the_seam() -> None:
         Obstacle("cylinder", -2.6, -1.6, radius_m=0.3),
         Obstacle("box", 0.0, 1.8, size_m=(2.0, 0.2)),
     )
-    arrays, pose, blocked = obstacle_arrays((obstacles,)), scattered_torus(60), 0
+    index, pose, blocked = indexed((obstacles,), SIZE_M), scattered_torus(60), 0
     shortest, shares = away(pose), np.linspace(0.0, 1.0, 4001)[:, None]
     for a in range(60):
         for b in range(a):
@@ -235,7 +237,7 @@ def test_obstacles_block_across_the_seam() -> None:
             line -= np.array(SIZE_M) * np.round(line / SIZE_M)
             nearest = min(depth(obstacle, line) for obstacle in obstacles)
             if abs(nearest) > 0.002:  # within that of a rim the points might miss it
-                assert is_blocked_on(arrays, 0, *pose[a, :2], *pose[b, :2], *SIZE_M) == (nearest < 0.0)
+                assert is_blocked(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M) == (nearest < 0.0)
                 crosses = bool(np.any(np.abs(pose[b, :2] - pose[a, :2] - shortest[a, b]) > 1.0))
                 blocked += crosses and nearest < 0.0
     assert blocked > 100
@@ -244,7 +246,7 @@ def test_obstacles_block_across_the_seam() -> None:
     clear = {
         (a, b)
         for a, b in expected_pairs(pose, 60, 5.0)
-        if a < b and not is_blocked_on(arrays, 0, *pose[a, :2], *pose[b, :2], *SIZE_M)
+        if a < b and not is_blocked(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M)
     }
     assert pairs(*edges.T) == clear
 

@@ -1,0 +1,117 @@
+"""Lines of sight and lengths inside walls, found by cells: bit for bit those of a look at every obstacle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.radio.propagation.obstruction import crossed_and_inside_m
+from swarmwire.comms.truth import Obstacle
+from tests.support.comms.lines import (
+    Arenas,
+    crossed_and_inside,
+    indexed,
+    touches_any,
+    touches_any_on_torus,
+)
+
+SIZE_M = (6.0, 4.0)
+LINES = 60
+ON_GRID = st.integers(-12, 12).map(lambda quarters: quarters / 4.0)  # on the borders of cells and sides of boxes
+
+
+@st.composite
+def obstacles(draw: st.DrawFn) -> Obstacle:
+    """A cylinder, a box, a long wall or a triangle; half of them on a grid, some beyond the arena's edge."""
+    anywhere = st.floats(-4.0, 4.0)
+    x, y = draw(st.tuples(ON_GRID, ON_GRID) | st.tuples(anywhere, anywhere))
+    turn = draw(st.sampled_from([0.0, np.pi / 2]) | st.floats(-np.pi, np.pi))
+    return draw(
+        st.sampled_from(
+            [
+                Obstacle("cylinder", x, y, radius_m=0.25, height_m=0.1),
+                Obstacle("cylinder", x, y, radius_m=1.1),
+                Obstacle("box", x, y, turn, size_m=(0.5, 0.5)),
+                Obstacle("box", x, y, turn, size_m=(5.0, 0.05), height_m=0.2),
+                Obstacle("polygon", x, y, turn, points_m=((0.4, 0.0), (-0.2, 0.3), (-0.3, -0.3))),
+            ]
+        )
+    )
+
+
+MAPS = st.lists(st.lists(obstacles(), max_size=25).map(tuple), min_size=1, max_size=3).map(tuple)
+
+
+def lines(seed: int, reach: float) -> FloatArray:
+    """Lines x0, y0, x1, y1 (LINES, 4) in m over `reach` arenas: anywhere, along the axes, on a grid, and points."""
+    rng, half = np.random.default_rng(seed), 0.5 * reach * np.array([*SIZE_M, *SIZE_M])
+    line = rng.uniform(-half, half, (LINES, 4))
+    line[::4] = np.rint(4.0 * line[::4]) / 4.0
+    line[1::8, 2], line[5::8, 3] = line[1::8, 0], line[5::8, 1]
+    line[9, 2:] = line[9, :2]
+    return line
+
+
+@given(MAPS, st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 8.0]))
+def test_what_blocks_a_line_is_found_in_its_cells(arenas: Arenas, seed: int, reach: float) -> None:
+    """Also far outside the arena, where robots get when it is open."""
+    arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
+    for arena in range(len(arenas)):
+        for line in lines(seed, reach).tolist():
+            assert is_blocked(index, arena, *line, 0.0, 0.0) == touches_any(arrays, arena, *line)
+
+
+@given(MAPS, st.integers(0, 2**32 - 1))
+def test_on_a_torus_a_line_is_looked_for_on_both_sides_of_the_seam(arenas: Arenas, seed: int) -> None:
+    arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
+    for arena in range(len(arenas)):
+        for line in lines(seed, 1.0).tolist():
+            assert is_blocked(index, arena, *line, *SIZE_M) == touches_any_on_torus(arrays, arena, *line, SIZE_M)
+
+
+@given(MAPS, st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 8.0]))
+def test_lengths_inside_walls_add_up_in_the_order_of_obstacles(arenas: Arenas, seed: int, reach: float) -> None:
+    arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
+    entered = np.full((len(index.shape), 2), np.nan)  # whatever an earlier line left
+    for arena in range(len(arenas)):
+        for line in lines(seed, reach).tolist():
+            assert crossed_and_inside_m(index, entered, arena, *line) == crossed_and_inside(arrays, arena, *line)
+
+
+def test_in_a_large_map_a_line_is_blocked_as_if_every_box_were_tested() -> None:
+    rng = np.random.default_rng(27)
+    places, turns = rng.uniform(-20.0, 20.0, (2000, 2)).tolist(), rng.uniform(-3.0, 3.0, 2000).tolist()
+    boxes = tuple(Obstacle("box", x, y, turn, size_m=(0.3, 0.1)) for (x, y), turn in zip(places, turns, strict=True))
+    arrays, index = obstacle_arrays((boxes,)), indexed((boxes,), (40.0, 40.0))
+    entered, blocked, inside_m = np.empty((2000, 2)), 0, 0.0
+    for x, y, dx, dy in rng.uniform([-20.0, -20.0, -5.0, -5.0], [20.0, 20.0, 5.0, 5.0], (40, 4)).tolist():
+        line = x, y, x + dx, y + dy
+        is_shut, walls = is_blocked(index, 0, *line, 0.0, 0.0), crossed_and_inside_m(index, entered, 0, *line)
+        assert is_shut == touches_any(arrays, 0, *line)
+        assert walls == crossed_and_inside(arrays, 0, *line)
+        blocked, inside_m = blocked + is_shut, inside_m + walls[1]
+    assert 5 < blocked < 35
+    assert inside_m > 5.0
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_an_index_follows_obstacles_that_are_pushed_and_no_others(moves: bool) -> None:
+    arrays = obstacle_arrays(((Obstacle("cylinder", 0.0, 0.0, radius_m=0.5),),))
+    indices = ObstacleIndices(arrays, SIZE_M, 0.0, obstacles_move=moves)
+    line = 2.0, -1.0, 2.0, 1.0
+    before = indices.now()
+    assert not is_blocked(before, 0, *line, 0.0, 0.0)
+    assert indices.now() is before
+    arrays.circle[0, 0] = 2.0
+    assert is_blocked(indices.now(), 0, *line, 0.0, 0.0) is moves
+
+
+def test_obstacles_of_any_height_block_a_radio() -> None:
+    flat = replace(Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), height_m=0.0)
+    assert is_blocked(indexed(((flat,),), SIZE_M), 0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
