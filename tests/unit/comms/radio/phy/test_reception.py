@@ -188,7 +188,8 @@ def test_stations_of_80211_collide_whose_backoffs_end_within_the_cca_time(
 def test_full_queues_of_80211_collide_as_often_as_in_ns3(nodes: int, on_air_delivery: float):
     """Broadcasts of 164 octets at 6 Mbit/s from full queues: ns-3's recorded ratios, with 0.002 of standard error.
 
-    Of 20 nodes a sixth of the successes have a backoff of no slots after a collision. Ours are 0.6 s: standard errors up to 0.007.
+    Of 20 nodes a sixth of the successes have a backoff of no slots after a collision. Ours are 0.6 s, with standard
+    errors of 0.007 at most.
     """
     radio = replace(
         WIFI_B,
