@@ -20,7 +20,6 @@ class TrajectoryHash:
         self._robots = robots
         self._hashes = [hashlib.sha256() for _ in range(arenas)]
         self._open = list(range(arenas))
-        self._first_row = [arena * robots for arena in range(arenas + 1)]
         self._waiting: list[
             AnyArray
         ] = []  # of the ticks since anything was received, a row per robot of the open arenas
@@ -36,10 +35,8 @@ class TrajectoryHash:
         if len(received) or len(self._waiting) * moved.nbytes >= WAITING_BYTES:
             self._hash_waiting()
         if len(received):
-            first = np.searchsorted(received.receiver, self._first_row)
-            packets = _packets(
-                received.receiver, received.sender, received.sequence, received.received_at_ns, first, self._robots
-            )
+            columns = received.receiver, received.sender, received.sequence, received.received_at_ns
+            packets, first = _packets(*columns, self._robots, len(self._hashes))
             self._add(packets, [*first[self._open].tolist(), len(packets)])
 
     def close(self, arenas: BoolArray) -> None:
@@ -51,9 +48,9 @@ class TrajectoryHash:
         """Hash the ticks that wait, all of an arena at once: a call for each would cost more than the hashing."""
         if self._waiting:
             arenas = len(self._open)
-            ticks = np.stack([moved.reshape(arenas, -1) for moved in self._waiting], axis=1)
+            parts = [moved.reshape(arenas, -1) for moved in self._waiting]
             self._waiting.clear()
-            self._add(ticks.reshape(arenas, -1), list(range(arenas + 1)))
+            self._add(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1), list(range(arenas + 1)))
 
     def _add(self, table: AnyArray, first: list[int]) -> None:
         """The rows first[k] to first[k + 1] - 1 of a table go into the hash of the k-th open arena."""
@@ -68,11 +65,14 @@ class TrajectoryHash:
 
 
 @njit()
-def _packets(receiver, sender, sequence, received_at_ns, first, robots):
-    """What was received, (k, 4), receivers as indices in their arenas, which begin at the rows `first`."""
-    table = np.empty((len(receiver), 4), np.int64)
-    for arena in range(len(first) - 1):
-        for k in range(first[arena], first[arena + 1]):
-            table[k, 0], table[k, 1] = receiver[k] - arena * robots, sender[k]
-            table[k, 2], table[k, 3] = sequence[k], received_at_ns[k]
-    return table
+def _packets(receiver, sender, sequence, received_at_ns, robots, arenas):
+    """What was received, (k, 4), receivers as indices in their arenas; and the first row of each arena, (arenas,)."""
+    table, first = np.empty((len(receiver), 4), np.int64), np.zeros(arenas + 1, np.int64)
+    for k in range(len(receiver)):
+        arena = receiver[k] // robots
+        first[arena + 1] = k + 1
+        table[k, 0], table[k, 1] = receiver[k] - arena * robots, sender[k]
+        table[k, 2], table[k, 3] = sequence[k], received_at_ns[k]
+    for arena in range(arenas):  # those that received nothing
+        first[arena + 1] = max(first[arena + 1], first[arena])
+    return table, first[:-1]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import kernel, njit
 
 MAX_CELLS_PER_SIDE = 512  # in each arena
@@ -35,16 +35,16 @@ class Grid(NamedTuple):
     order: IntArray  # robot rows, rising within a cell
 
 
-def build(x, y, arenas: int, size_m: tuple[float, float], reach_m: float, running: BoolArray | None = None) -> Grid:
+@njit()
+def build(x: FloatArray, y: FloatArray, size_m: tuple[float, float], reach_m: float, running: BoolArray) -> Grid:
     """The grid of robots at x, y (rows,); all robots within `reach_m` of a robot lie in the 3 x 3 cells around it.
 
-    Where `running` (arenas,) is False, the cells of the arena are empty; None: no arena is left out.
+    Where `running` (arenas,) is False, the cells of the arena are empty.
     """
-    cell_m = max(reach_m, max(size_m) / MAX_CELLS_PER_SIDE)
+    cell_m = max(reach_m, max(size_m[0], size_m[1]) / MAX_CELLS_PER_SIDE)
     nx, ny = max(int(np.ceil(size_m[0] / cell_m)), 1), max(int(np.ceil(size_m[1] / cell_m)), 1)
     left_m, bottom_m = -0.5 * size_m[0], -0.5 * size_m[1]
-    present = np.ones(arenas, np.bool_) if running is None else running
-    start, order = _sort(x, y, present, cell_m, nx, ny, left_m, bottom_m)
+    start, order = _sort(x, y, running, cell_m, nx, ny, left_m, bottom_m)
     return Grid(cell_m, nx, ny, left_m, bottom_m, start, order)
 
 

@@ -27,14 +27,12 @@ class PacketCounters:
 
     def count_sent(self, packets: Transmissions) -> None:
         """Count packets that were sent."""
-        arena = packets.sender // self._robots
-        np.add.at(self._sent, arena, 1)
-        np.add.at(self._intended, arena, packets.intended)
+        _count_sent(packets.sender, packets.intended, self._robots, self._sent, self._intended)
 
-    def count_final(self, links: Links, until_ns: int) -> None:
-        """Count the fates of links that are final by `until_ns`."""
-        columns = links.sender, links.final_at_ns, links.fate, links.receivers, links.in_range
-        _count_final(*columns, until_ns, self._robots, self._fates, self._in_range)
+    @property
+    def final(self) -> tuple[IntArray, IntArray]:
+        """The fates that became final, and their receivers in range, to be added to."""
+        return self._fates, self._in_range
 
     def count_in_flight(self, links: Links, queued: Transmissions) -> None:
         """Count the links under way and the queued packets at the end of the run as IN_FLIGHT."""
@@ -58,22 +56,24 @@ class PacketCounters:
 
 
 @njit()
-def _count_final(sender, final_at_ns, fate, receivers, in_range, until_ns, robots, fates_out, in_range_out):
-    for i in range(len(sender)):
-        if final_at_ns[i] <= until_ns:
-            arena = sender[i] // robots
-            fates_out[arena, fate[i]] += receivers[i]
-            in_range_out[arena] += in_range[i]
+def _count_sent(sender, intended, robots, sent_out, intended_out):
+    for p in range(len(sender)):
+        sent_out[sender[p] // robots] += 1
+        intended_out[sender[p] // robots] += intended[p]
 
 
 class LivenessHistory:
     """Robots alive by epoch; an epoch begins whenever a robot dies or is revived.
 
     A broadcast intends the robots that were alive when it was sent.
+
+    Attributes:
+        epoch: the present one.
+        any_dead: whether any robot was dead in a kept epoch.
     """
 
     def __init__(self, rows: int) -> None:
-        self.epoch = 0
+        self.epoch, self.any_dead = 0, False
         self._alive: dict[int, BoolArray] = {0: np.ones(rows, np.bool_)}
 
     def now(self, alive: BoolArray) -> None:
@@ -81,11 +81,7 @@ class LivenessHistory:
         if not np.array_equal(alive, self._alive[self.epoch]):
             self.epoch += 1
             self._alive[self.epoch] = alive.copy()
-
-    @property
-    def any_dead(self) -> bool:
-        """Whether any robot was dead in a kept epoch."""
-        return not all(alive.all() for alive in self._alive.values())
+            self._look()
 
     def intended(self, epoch: IntArray, receiver: IntArray) -> BoolArray:
         """Whether each robot row `receiver` was alive in its `epoch`, (k,)."""
@@ -101,3 +97,7 @@ class LivenessHistory:
         if len(self._alive) > 1:
             needed = {self.epoch, *np.unique(queued).tolist()}
             self._alive = {number: alive for number, alive in self._alive.items() if number in needed}
+            self._look()
+
+    def _look(self) -> None:
+        self.any_dead = not all(alive.all() for alive in self._alive.values())

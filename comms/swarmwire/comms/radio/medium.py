@@ -6,7 +6,6 @@ is final, and counts the fates.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from dataclasses import replace
 from functools import reduce
 from operator import add
 
@@ -121,14 +120,14 @@ class RadioMedium:
         self._counters = PacketCounters(len(keys), robots)
         self._liveness = LivenessHistory(rows)
         self._left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left the run
+        self._present: BoolArray = np.ones(rows, np.bool_)  # alive, in arenas that have not
+        self._is_new = True  # the disruption, or an arena has left, since poses were held last
+        self._anyone_out = False  # in either disruption
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._parts: list[Results] = []  # results within the current tick
         self._on_air = Transmissions.none()  # the packets of `_links`
         self._links = self._no_links = Links.none(len(radio.measures.columns))
-        self._nothing = Results.nothing(
-            self._links, self._on_air, radio.measures.columns, self._counters.close(), radio.is_phy
-        )
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None = None, radio: Radio | None = None
@@ -149,15 +148,18 @@ class RadioMedium:
             All results since the last step, those of `advance` included, and the radio graph at `pose`.
         """
         self._pass_time(start_ns)
-        disruption = disruption or self._disruption
-        if disruption.anyone_out or self._active.anyone_out:
-            self._keep_new(*self._model.disrupt(start_ns, disruption, self._liveness))
-            self._cut_off(start_ns, disruption)
-        self._disruption = disruption
+        if disruption is not None:
+            self._disruption, self._is_new = disruption, True
+            self._present = disruption.alive & ~self._left
+        now = self._disruption
+        if (self._is_new or self._anyone_out) and (now.anyone_out or self._active.anyone_out):
+            self._keep_new(*self._model.disrupt(start_ns, now, self._liveness))
+            self._cut_off(start_ns, now)
         final = Results.joined([*self._parts, self._final(start_ns)])
         self._parts = []
         self._hold(pose, radio or self.radio)
-        return replace(final, edges=self._model.edges(pose, disruption.alive & ~self._left))
+        edges = self._model.edges(pose, self._present)
+        return Results(final.received, final.finished, final.departed, final.tx_status, final.tally, edges)
 
     def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
@@ -218,20 +220,27 @@ class RadioMedium:
             counts, self._parts = counts + final.tally.of(over), [final.of(~over, self._robots)]
         self._left |= leaving
         self._running &= ~over
+        self._present, self._is_new = self._present & ~leaving, True
         return counts
 
     def _hold(self, pose: FloatArray, radio: Radio) -> None:
         """Hold these poses and parameters, and the disruption, from now on."""
-        alive = self._disruption.alive | self._left  # no packets are for those that left, so they may count as alive
-        self._liveness.now(alive)
-        self._active.become(self._disruption)
-        self._active.alive = alive
+        if self._is_new:
+            self._disrupt()
         if radio is not self.radio:
             self.radio = radio
             self._model.tune(self._now_ns, radio)
         self._model.hold(pose)
+
+    def _disrupt(self) -> None:
+        """The last disruption, in the arenas that have not left, is the active one from now on."""
+        alive = self._disruption.alive | self._left  # no packets are for those that left, so they may count as alive
+        self._liveness.now(alive)
+        self._active.become(self._disruption)
+        self._active.alive = alive
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
+        self._anyone_out, self._is_new = self._disruption.anyone_out, False
 
     def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         packets = self._model.accept(sent_at_ns, sent, self._others_alive, self._liveness.epoch)
@@ -246,28 +255,20 @@ class RadioMedium:
     def _final(self, until_ns: int) -> Results:
         """Results of links that are final by `until_ns`; the others are kept."""
         self._liveness.forget(self._model.queued.epoch)
-        tx_status = self._model.tx_status(self._disruption.alive & ~self._left)
-        links, packets = self._links, self._on_air
-        received, finished, departed, still_open = results.parted(
-            links.fate, links.receiver, links.final_at_ns, until_ns
+        tx_status = self._model.tx_status(self._present)
+        links, packets, counts = self._links, self._on_air, self._counters.final
+        received, finished, departed, still_open = results.final_by(
+            until_ns, links, packets, self.radio, self._robots, counts
         )
-        if len(still_open) == len(links.fate):
-            return replace(self._nothing, tally=self._counters.close(), tx_status=tx_status)
-        self._counters.count_final(links, until_ns)
-        rows, robots = len(self._others_alive), self._robots
-        final = Results(
-            results.received(received, links, packets, self.radio.measures.columns, robots, rows),
-            results.finished(finished, links, packets, robots, self.radio.is_phy),
-            results.departed(departed, links, packets, robots),
-            tx_status,
-            self._counters.close(),
-        )
-        self._keep(still_open)
-        return final
+        if len(still_open) < len(links.fate):
+            self._keep(still_open)
+        return Results(received, finished, departed, tx_status, self._counters.close())
 
     def _check(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
+        if (sent.to == BROADCAST).all():
+            return
         addressed = (sent.to != BROADCAST) & (sent.to != NOWHERE)
         is_invalid = addressed & ((sent.to < 0) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots))
         if is_invalid.any():
@@ -286,9 +287,10 @@ class RadioMedium:
 
     def _keep_new(self, packets: Transmissions, links: Links) -> None:
         """Keep links until they are final, and their packets; none of arenas that have left."""
-        if packets:
-            first_new, rows = len(self._links.packet), len(self._others_alive)
-            self._links = self._links.followed_by(links._replace(packet=links.packet + len(self._on_air.sender)))
+        if len(packets):
+            first_new, rows = len(self._links), len(self._others_alive)
+            links.packet[:] += len(self._on_air)
+            self._links = self._links.followed_by(links)
             self._on_air = self._on_air.followed_by(packets)
             if self.radio.delays is not None and self.radio.delays.keep_order:
                 wait_for_earlier(self._links, first_new, rows)
@@ -300,6 +302,6 @@ class RadioMedium:
         if not len(index):
             self._links, self._on_air = self._no_links, Transmissions.none()
             return
-        kept, packet = results.compacted(self._links.packet[index], len(self._on_air.sender))
-        self._links = self._links.select(index)._replace(packet=packet)
+        self._links = self._links.select(index)
+        kept, self._links.packet[:] = results.compacted(self._links.packet, len(self._on_air))
         self._on_air = self._on_air.select(kept)

@@ -14,9 +14,12 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
+from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
+from swarmwire.comms.radio import links as L  # noqa: N812 - columns of its table
+from swarmwire.comms.radio import transmissions as T  # noqa: N812
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
-from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.radio.transmissions import Transmissions, payload_rows
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRecords
 
 NO_EDGES = np.empty((0, 2), np.int64)
@@ -112,35 +115,47 @@ class Results:
             reduce(add, [part.tally for part in parts]),
         )
 
-    @classmethod
-    def nothing(
-        cls, links: Links, packets: Transmissions, measures: tuple[str, ...], tally: PacketCounts, has_strength: bool
-    ) -> "Results":
-        """No results, for a medium with these kinds of links and packets."""
-        none = np.empty(0, np.int64)
-        return cls(
-            ReceivedPackets.none(measures),
-            finished(none, links, packets, 1, has_strength),
-            departed(none, links, packets, 1),
-            NO_TX_STATUSES,
-            tally,
-        )
+
+def final_by(
+    until_ns: int, links: Links, packets: Transmissions, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
+) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords, IntArray]:
+    """What is final by `until_ns`, and the rows of the links that are still open.
+
+    Received packets are sorted by (receiver, received_at, sender, sequence). Each arena has `robots` robots. Adds to
+    `counts`: fates (arenas, fates) and receivers in range (arenas,).
+    """
+    payloads = packets.payloads
+    found = _final(until_ns, links.table, packets.table, payloads.data, payloads.offset, robots, *counts)
+    received, (index, data, offset), finished, finished_index, departed, still_open = found
+    *numbers, payload = received
+    given = {name: links.given[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
+    rssi_dbm = links.rssi_dbm.take(finished_index) if radio.is_phy else None
+    *records, of_payload = finished
+    return (
+        ReceivedPackets(*numbers, given=given, payload=payload, payloads=Payloads(data, offset)),
+        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=of_payload, payloads=payloads),
+        TransmissionRecords(*departed),
+        still_open,
+    )
 
 
 @njit()
-def parted(
-    fate: IntArray, receiver: IntArray, final_at_ns: IntArray, until_ns: int
-) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """The rows of links by kind of result, rising: received, finished, departed, open; a row may have several kinds.
+def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
+    """As `final_by`, in tables whose rows are the columns of its results, in their order.
 
-    Finished links are final by `until_ns`, without receivers out of range. Departed ones are final rows for the rest:
-    one for each packet that left its sender's radio. Open ones are not final yet.
+    A link may have several kinds of results: received; finished, without receivers out of range; and departed, those
+    for the rest, one for each packet that left its sender's radio.
     """
-    k = len(fate)
-    received, finished = np.empty(k, np.int64), np.empty(k, np.int64)
-    departed, still_open = np.empty(k, np.int64), np.empty(k, np.int64)
+    sender, receiver, fate, final_at_ns = links[L.SENDER], links[L.RECEIVER], links[L.FATE], links[L.FINAL_AT]
+    receivers, reachable = links[L.RECEIVERS], links[L.IN_RANGE]
+    received, finished, departed, still_open = (
+        np.empty(len(fate), np.int64),
+        np.empty(len(fate), np.int64),
+        np.empty(len(fate), np.int64),
+        np.empty(len(fate), np.int64),
+    )
     h, f, d, o = 0, 0, 0, 0
-    for row in range(k):
+    for row in range(len(fate)):
         # Branchless: write first, then advance if it counts.
         received[h], finished[f], departed[d], still_open[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
@@ -148,79 +163,74 @@ def parted(
         f += final & (fate[row] != OUT_OF_RANGE)
         d += final & (receiver[row] == THE_REST)
         o += not final
-    return received[:h], finished[:f], departed[:d], still_open[:o]
-
-
-def received(
-    index: IntArray, links: Links, packets: Transmissions, measures: tuple[str, ...], robots: int, rows: int
-) -> ReceivedPackets:
-    """Received packets of the links `index`, sorted by (receiver, received_at, sender, sequence)."""
-    if not len(index):
-        return ReceivedPackets.none(measures)
-    index = by_receiver(index, links.receiver, links.final_at_ns, links.sender, rows)
-    kept, payload = compacted(links.packet.take(index), len(packets.sender))
-    return ReceivedPackets(
-        receiver=links.receiver.take(index),
-        sender=in_arena(links.sender.take(index), robots),
-        sequence=links.sequence.take(index),
-        received_at_ns=links.final_at_ns.take(index),
-        given={name: links.given[:, column].take(index) for column, name in enumerate(measures)},
-        payload=payload,
-        payloads=packets.payloads.rows(kept),
+        arena = sender[row] // robots
+        fates[arena, fate[row]] += final * receivers[row]
+        in_range[arena] += final * reachable[row]
+    index = received[:h]
+    if h > 0:
+        index = by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
+    kept, place = compacted(links[L.PACKET][index], packets.shape[1])
+    return (
+        _received(index, place, links, robots),
+        (index, *payload_rows(data, offset, kept)),
+        _finished(finished[:f], links, packets, offset, robots),
+        finished[:f],
+        _departed(departed[:d], links, packets, robots),
+        still_open[:o],
     )
-
-
-def finished(
-    index: IntArray, links: Links, packets: Transmissions, robots: int, has_strength: bool
-) -> ReceptionRecords:
-    """Reception records of the links `index`, with those of packets that never went on air."""
-    arena, size_bytes = packets.sender // robots, packets.payloads.sizes
-    link_columns = links.packet, links.receiver, links.receivers, links.final_at_ns, links.fate
-    times = packets.sent_at_ns, packets.on_air_at_ns
-    packet_columns = arena, packets.sender, packets.to, packets.sequence, *times, size_bytes, packets.tag
-    *columns, payload = _finished(index, link_columns, packet_columns, robots)
-    rssi_dbm = links.rssi_dbm.take(index) if has_strength else None
-    return ReceptionRecords(*columns, rssi_dbm=rssi_dbm, payload=payload, payloads=packets.payloads)
 
 
 @njit()
-def _finished(index, link_columns, packet_columns, robots):
-    """The integer columns of `ReceptionRecords` in their order, then that of payloads, (13, k)."""
-    packet, receiver, receivers, final_at_ns, fate = link_columns
-    arena, sender, to, sequence, sent_at_ns, on_air_at_ns, size_bytes, tag = packet_columns
-    columns = np.empty((13, len(index)), np.int64)
+def _received(index, payload, links, robots):
+    """Receiver, sender in its arena, sequence, time of reception and payload, (5, k)."""
+    sender, receiver, sequence, final_at_ns = links[L.SENDER], links[L.RECEIVER], links[L.SEQUENCE], links[L.FINAL_AT]
+    columns = np.empty((5, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
-        p = np.uint64(packet[row])
-        first_row = arena[p] * robots
-        columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
-        columns[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
-        columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
-        columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
-        columns[9, k], columns[10, k], columns[11, k], columns[12, k] = fate[row], size_bytes[p], tag[p], packet[row]
+        columns[0, k], columns[1, k], columns[2, k] = receiver[row], sender[row] % robots, sequence[row]
+        columns[3, k], columns[4, k] = final_at_ns[row], payload[k]
     return columns
 
 
-def in_arena(row: IntArray, robots: int) -> IntArray:
-    """Indices of robot rows in their arena; numpy vectorizes division, but not the remainder."""
-    return row - row // robots * robots
+@njit()
+def _finished(index, links, packets, offset, robots):
+    """The integer columns of `ReceptionRecords`, then that of payloads, (13, k)."""
+    packet_of, receiver, receivers = links[L.PACKET], links[L.RECEIVER], links[L.RECEIVERS]
+    fate, final_at_ns = links[L.FATE], links[L.FINAL_AT]
+    sender, to, sequence, tag = packets[T.SENDER], packets[T.TO], packets[T.SEQUENCE], packets[T.TAG]
+    sent_at_ns, on_air_at_ns = packets[T.SENT_AT], packets[T.ON_AIR_AT]
+    columns = np.empty((13, len(index)), np.int64)
+    for k in range(len(index)):
+        row = np.uint64(index[k])
+        p = np.uint64(packet_of[row])
+        arena = sender[p] // robots
+        first_row = arena * robots
+        columns[0, k], columns[1, k] = arena, sender[p] - first_row
+        columns[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
+        columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
+        columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
+        columns[9, k], columns[10, k] = fate[row], offset[p + np.uint64(1)] - offset[p]
+        columns[11, k], columns[12, k] = tag[p], packet_of[row]
+    return columns
 
 
-def departed(index: IntArray, links: Links, packets: Transmissions, robots: int) -> TransmissionRecords:
-    """Transmission records of the packets of the links `index`, which left their sender's radio."""
-    packet, row = links.packet.take(index), links.sender.take(index)
-    arena = row // robots
-    return TransmissionRecords(
-        arena=arena,
-        sender=row - arena * robots,
-        to=packets.to.take(packet),
-        sequence=links.sequence.take(index),
-        intended=packets.intended.take(packet),
-        out_of_range=np.where(links.fate.take(index) == OUT_OF_RANGE, links.receivers.take(index), 0),
-        fate=packets.fate.take(packet),
-        on_air_at_ns=packets.on_air_at_ns.take(packet),
-        off_air_at_ns=packets.off_air_at_ns.take(packet),
-    )
+@njit()
+def _departed(index, links, packets, robots):
+    """The columns of `TransmissionRecords`, (9, k)."""
+    packet_of, row_of_sender, sequence = links[L.PACKET], links[L.SENDER], links[L.SEQUENCE]
+    receivers, fate = links[L.RECEIVERS], links[L.FATE]
+    to, intended, fate_at_sender = packets[T.TO], packets[T.INTENDED], packets[T.FATE]
+    on_air_at_ns, off_air_at_ns = packets[T.ON_AIR_AT], packets[T.OFF_AIR_AT]
+    columns = np.empty((9, len(index)), np.int64)
+    for k in range(len(index)):
+        row = np.uint64(index[k])
+        p = np.uint64(packet_of[row])
+        arena = row_of_sender[row] // robots
+        columns[0, k], columns[1, k], columns[2, k] = arena, row_of_sender[row] - arena * robots, to[p]
+        columns[3, k], columns[4, k] = sequence[row], intended[p]
+        columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
+        columns[6, k], columns[7, k], columns[8, k] = fate_at_sender[p], on_air_at_ns[p], off_air_at_ns[p]
+    return columns
 
 
 @njit()

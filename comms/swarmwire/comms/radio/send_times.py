@@ -29,6 +29,7 @@ class SendTimes:
         self._period_ns = act_every_ticks * NS_PER_S // rate_hz
         self._uniform = send_offset == "uniform"
         if self._uniform:
+            self._jitter_ns = self._period_ns // JITTER_SHARE
             self._phase_ns = keyed_ns(keys, 0, PHASE, self._period_ns)
             return
         offset_s = 0.0 if send_offset == "tick" else send_offset
@@ -40,7 +41,7 @@ class SendTimes:
         """Send time of each robot in this tick, in ns, (rows,)."""
         sent_at_ns = self._phase_ns + tick_start_ns
         if self._uniform:
-            sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._period_ns // JITTER_SHARE)
+            sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._jitter_ns)
         return sent_at_ns
 
 

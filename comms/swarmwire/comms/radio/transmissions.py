@@ -2,47 +2,59 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from typing import NamedTuple
-
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, Payloads, SentPackets
+from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
+from swarmwire.comms.radio.columns import Column
+
+RECEIVED = int(Fate.RECEIVED)
 
 
-class Transmissions(NamedTuple):
+SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(11)
+
+
+class Transmissions:
     """A row per packet, those of one sender in the order in which it sent them.
 
     A packet refused by its sender's radio never goes on air: all three of its times are `sent_at_ns`.
     """
 
-    sender: IntArray  # (k,) robot row
-    to: IntArray  # (k,) index in the arena of the one receiver, or BROADCAST
-    sequence: IntArray  # (k,) number of packets that the sender sent before, refused ones included
-    intended: IntArray  # (k,) number of intended receivers
-    epoch: IntArray  # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots alive then
-    tag: IntArray  # (k,) the message's class, as a tag on the wire
-    sent_at_ns: IntArray  # (k,) arrival at the sender's radio
-    on_air_at_ns: IntArray  # (k,) start of the first bit
-    off_air_at_ns: IntArray  # (k,) end of the last bit
-    fate: IntArray  # (k,) RECEIVED: accepted, fate decided per receiver; else the fate at all of them
-    tx_status_id: IntArray  # (k,) ID of the transmit status for the sender, or NOT_MEASURED
-    payloads: Payloads  # (k,)
+    __slots__ = ("payloads", "table")
+
+    sender = Column(SENDER)  # (k,) robot row
+    to = Column(TO)  # (k,) index in the arena of the one receiver, or BROADCAST
+    sequence = Column(SEQUENCE)  # (k,) number of packets that the sender sent before, refused ones included
+    intended = Column(INTENDED)  # (k,) number of intended receivers
+    # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots alive then
+    epoch = Column(EPOCH)
+    tag = Column(TAG)  # (k,) the message's class, as a tag on the wire
+    sent_at_ns = Column(SENT_AT)  # (k,) arrival at the sender's radio
+    on_air_at_ns = Column(ON_AIR_AT)  # (k,) start of the first bit
+    off_air_at_ns = Column(OFF_AIR_AT)  # (k,) end of the last bit
+    fate = Column(FATE)  # (k,) RECEIVED: accepted, fate decided per receiver; else the fate at all of them
+    tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of the transmit status for the sender, or NOT_MEASURED
+
+    def __init__(self, table: IntArray, payloads: Payloads) -> None:
+        """`table` (11, k) holds the columns in their order, `payloads` has k rows."""
+        self.table, self.payloads = table, payloads
 
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
-        return cls._make([*[np.empty(0, np.int64)] * 11, Payloads.joined([])])
+        # Payloads that may be written to, as those of kernels.
+        return cls(np.empty((11, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
 
-    def __bool__(self) -> bool:
-        return len(self.sender) > 0
+    def __len__(self) -> int:
+        return self.table.shape[1]
 
     def select(self, index: IntArray) -> "Transmissions":
         """The packets of `index`, in its order."""
-        if len(index) == len(self.sender) and (index[1:] > index[:-1]).all():  # all of them, in order
+        if len(index) == len(self) and (index[1:] > index[:-1]).all():  # all of them, in order
             return self
-        return Transmissions._make([*_take(self[:-1], index), self.payloads.rows(index)])
+        payloads = Payloads(*payload_rows(self.payloads.data, self.payloads.offset, index))
+        return Transmissions(self.table.take(index, axis=1), payloads)
 
     def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
         """The packets `which` (k,), and the others."""
@@ -50,25 +62,66 @@ class Transmissions(NamedTuple):
             return self, Transmissions.none()
         if not which.any():
             return Transmissions.none(), self
-        return self.select(np.flatnonzero(which)), self.select(np.flatnonzero(~which))
+        parts = _part(self.table, self.payloads.data, self.payloads.offset, which)
+        rows, data, offset, others, data_of_others, offset_of_others = parts
+        return Transmissions(rows, Payloads(data, offset)), Transmissions(
+            others, Payloads(data_of_others, offset_of_others)
+        )
 
     def followed_by(self, later: "Transmissions") -> "Transmissions":
         """These packets and then the later ones."""
-        if not (self and later):
-            return self or later
-        columns = [np.concatenate(pair) for pair in zip(self[:-1], later[:-1], strict=True)]
-        return Transmissions._make([*columns, Payloads.joined([self.payloads, later.payloads])])
+        if not (len(self) and len(later)):
+            return self if len(self) else later
+        first, second = self.payloads, later.payloads
+        parts = self.table, first.data, first.offset, later.table, second.data, second.offset
+        table, data, offset = _append(*parts)
+        return Transmissions(table, Payloads(data, offset))
+
+    def replaced(self, **columns: IntArray) -> "Transmissions":
+        """The packets with other values in some columns."""
+        changed = Transmissions(self.table.copy(), self.payloads)
+        for name, values in columns.items():
+            getattr(changed, name)[:] = values
+        return changed
 
 
 @njit()
-def _take(columns, index):
-    """The rows of `index` of all columns, (columns, k)."""
-    out = np.empty((len(columns), len(index)), np.int64)
-    for c in range(len(columns)):
-        column = columns[c]
-        for k in range(len(index)):
-            out[c, k] = column[index[k]]
-    return out
+def payload_rows(data: ByteArray, offset: IntArray, index: IntArray) -> tuple[ByteArray, IntArray]:
+    """`data` and `offset` of a table of the payloads of `index`, in its order."""
+    starts = np.zeros(len(index) + 1, np.int64)
+    for k in range(len(index)):
+        starts[k + 1] = starts[k] + offset[index[k] + 1] - offset[index[k]]
+    selected = np.empty(starts[-1], np.uint8)
+    for k in range(len(index)):
+        selected[starts[k] : starts[k + 1]] = data[offset[index[k]] : offset[index[k] + 1]]
+    return selected, starts
+
+
+@njit()
+def _part(table, data, offset, which):
+    """Columns and payloads of the packets `which` (k,), and of the others."""
+    rows, others = np.flatnonzero(which), np.flatnonzero(~which)
+    one, other = np.empty((len(table), len(rows)), np.int64), np.empty((len(table), len(others)), np.int64)
+    for column in range(len(table)):
+        for k in range(len(rows)):
+            one[column, k] = table[column, rows[k]]
+        for k in range(len(others)):
+            other[column, k] = table[column, others[k]]
+    data_of_one, offset_of_one = payload_rows(data, offset, rows)
+    data_of_other, offset_of_other = payload_rows(data, offset, others)
+    return one, data_of_one, offset_of_one, other, data_of_other, offset_of_other
+
+
+@njit()
+def _append(table, data, offset, later_table, later_data, later_offset):
+    """Columns and payloads of packets, and then of later ones."""
+    first, size = table.shape[1], len(data)
+    joined = np.empty((len(table), first + later_table.shape[1]), np.int64)
+    joined[:, :first], joined[:, first:] = table, later_table
+    joined_data, joined_offset = np.empty(size + len(later_data), np.uint8), np.empty(joined.shape[1] + 1, np.int64)
+    joined_data[:size], joined_data[size:] = data, later_data
+    joined_offset[:first], joined_offset[first:] = offset[:first], later_offset + offset[first]
+    return joined, joined_data, joined_offset
 
 
 class Admission:
@@ -85,32 +138,30 @@ class Admission:
         """
         if (sent.sender[1:] < sent.sender[:-1]).any():  # results must not depend on how the backend was divided
             sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        sequence = _sequence_numbers(sent.sender.copy(), self._sent_before)
-        somewhere = sent.to != NOWHERE
-        if not somewhere.all():
-            sent, sequence = sent.select(np.flatnonzero(somewhere)), sequence[somewhere]
-        sender, to = sent.sender.copy(), sent.to.copy()
-        return Transmissions(
-            sender=sender,
-            to=to,
-            sequence=sequence,
-            intended=np.where(to == BROADCAST, others_alive[sender], 1),
-            epoch=np.full(len(sender), epoch),
-            tag=sent.payloads.tags(),
-            sent_at_ns=sent_at_ns[sender],
-            on_air_at_ns=sent_at_ns[sender],
-            off_air_at_ns=sent_at_ns[sender],
-            fate=np.full(len(sender), int(Fate.RECEIVED)),
-            tx_status_id=sent.tx_status_ids.copy(),
-            payloads=sent.payloads,
-        )
+        # Copies: arrays from the wire are read-only, and a kernel would be compiled once more for these.
+        columns = sent.sender.copy(), sent.to.copy(), sent.tx_status_ids.copy()
+        data, offset = sent.payloads.data.copy(), sent.payloads.offset.copy()
+        columns = *columns, data, offset, sent_at_ns, others_alive
+        table, data, offset = _admit(*columns, epoch, self._sent_before)
+        return Transmissions(table, Payloads(data, offset))
 
 
 @njit()
-def _sequence_numbers(sender, sent_before):
-    """The sequence number of each packet, (k,); increments `sent_before` (rows,)."""
-    sequence = np.empty(len(sender), np.int64)
+def _admit(sender, to, tx_status_id, data, offset, sent_at_ns, others_alive, epoch, sent_before):
+    """Columns and payloads of the packets that are not to NOWHERE; increments `sent_before` (rows,)."""
+    table, index, count = np.empty((11, len(sender)), np.int64), np.empty(len(sender), np.int64), 0
     for p in range(len(sender)):
-        sequence[p] = sent_before[sender[p]]
-        sent_before[sender[p]] += 1
-    return sequence
+        s = sender[p]
+        index[count] = p
+        at, has_tag = offset[p], offset[p + 1] - offset[p] >= TAG_BYTES
+        tag = np.int64(data[at]) | np.int64(data[at + 1]) << 8 if has_tag else -1
+        intended, at_ns = others_alive[s] if to[p] == BROADCAST else 1, sent_at_ns[s]
+        row = (s, to[p], sent_before[s], intended, epoch, tag, at_ns, at_ns, at_ns, RECEIVED, tx_status_id[p])
+        for column in range(len(row)):
+            table[column, count] = row[column]
+        sent_before[s] += 1
+        count += to[p] != NOWHERE
+    if count == len(sender):
+        return table, data, offset
+    selected, starts = payload_rows(data, offset, index[:count])
+    return table[:, :count].copy(), selected, starts

@@ -71,28 +71,29 @@ class Fragmentation:
         self._was_whole: BoolArray = np.zeros(arenas, np.bool_)
         self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
         self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
+        self._counted: IntArray = np.zeros(arenas, np.int64)  # in the last tick
+        self._lasted_ns: IntArray = np.full(arenas, NEVER, np.int64)  # those that were over in it
 
     def see(self, view: TickView) -> IntArray | None:
         """How many events, 0 or 1, are counted in this tick, (arenas,); None without a radio."""
         self.rejoined_now, found = [], view.components
         if found is None:
             return None
-        counted, lasted_ns = np.zeros_like(self.started), np.full_like(self.started, NEVER)
-        state = self._was_whole, self._since_ns, self._event
-        if _follow(found.pieces, view.truth.time_ns, self._hold_ns, *state, counted, lasted_ns):
-            self.rejoined_now = np.flatnonzero(lasted_ns != NEVER).tolist()
+        state = self._was_whole, self._since_ns, self._event, self.started, self._counted, self._lasted_ns
+        if _follow(found.pieces, view.truth.time_ns, self._hold_ns, *state):
+            self.rejoined_now = np.flatnonzero(self._lasted_ns != NEVER).tolist()
             self.rejoined[self.rejoined_now] += 1
             for arena in self.rejoined_now:
-                self.rejoined_s[arena].append(int(lasted_ns[arena]) / NS_PER_S)
-        self.started += counted
-        return counted
+                self.rejoined_s[arena].append(int(self._lasted_ns[arena]) / NS_PER_S)
+        return self._counted
 
 
 @njit()
-def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted_ns):
+def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, started, counted, lasted_ns):
     """The table above for each arena: sets `counted`, and `lasted_ns` where an event is over; whether any is."""
     any_over = False
     for arena in range(len(pieces)):
+        counted[arena], lasted_ns[arena] = 0, NEVER
         if pieces[arena] == 1:
             if event[arena]:
                 lasted_ns[arena] = now_ns - since_ns[arena]
@@ -103,6 +104,7 @@ def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, counted, lasted
                 since_ns[arena] = now_ns
             if not event[arena] and now_ns - since_ns[arena] >= hold_ns:
                 event[arena], counted[arena] = True, 1
+                started[arena] += 1
     return any_over
 
 

@@ -40,10 +40,8 @@ class Latencies:
 
     def of(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
         """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
-        ended = finished.fate, finished.receiver, finished.sent_at_ns, finished.final_at_ns
-        at_ns = acts_at_ns(tick, self._act_every_ticks, self._rate_hz)
-        received, air_ns, agent_ns = _latencies_ns(*ended, at_ns)
-        return finished.arena.take(received), air_ns, agent_ns
+        ended = finished.fate, finished.arena, finished.receiver, finished.sent_at_ns, finished.final_at_ns
+        return _latencies_ns(*ended, tick, self._act_every_ticks, self._rate_hz)
 
 
 def acts_at_ns(tick: int | IntArray, act_every_ticks: IntArray, rate_hz: int) -> IntArray:
@@ -51,17 +49,20 @@ def acts_at_ns(tick: int | IntArray, act_every_ticks: IntArray, rate_hz: int) ->
     return -(-tick // act_every_ticks) * act_every_ticks * NS_PER_S // rate_hz
 
 
+_acts_at_ns = njit()(acts_at_ns)
+
+
 @njit()
-def _latencies_ns(fate, receiver, sent_at_ns, final_at_ns, acts_at_ns):
-    """Of the links received: their rows, how long until they were, and until their receivers act, (k,)."""
-    received, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
+def _latencies_ns(fate, arena, receiver, sent_at_ns, final_at_ns, tick, act_every_ticks, rate_hz):
+    """Of the links received: their arenas, how long until they were, and until their receivers act, (k,)."""
+    where, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
     found = 0
     for row in range(len(fate)):
         if fate[row] == RECEIVED:
-            received[found], air_ns[found] = row, final_at_ns[row] - sent_at_ns[row]
-            agent_ns[found] = acts_at_ns[receiver[row]] - sent_at_ns[row]
+            where[found], air_ns[found] = arena[row], final_at_ns[row] - sent_at_ns[row]
+            agent_ns[found] = _acts_at_ns(tick, act_every_ticks[receiver[row]], rate_hz) - sent_at_ns[row]
             found += 1
-    return received[:found], air_ns[:found], agent_ns[:found]
+    return where[:found], air_ns[:found], agent_ns[:found]
 
 
 class _Latency(OfWindow):

@@ -316,7 +316,7 @@ def test_turning_and_moving_everything_changes_nothing(ax, ay, bx, by, turn, dx,
 
 def test_bodies_on_the_line_are_counted_but_not_its_ends():
     x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
-    cells = robot_index.build(x, y, 1, (10.0, 10.0), 5.0)
+    cells = robot_index.build(x, y, (10.0, 10.0), 5.0, np.ones(1, np.bool_))
     radius_m = np.full(6, 0.1)
     # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
     a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
@@ -329,7 +329,7 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
     arenas, robots = 2, 60
     x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
     radius_m = places.uniform(0.05, 0.4, arenas * robots)
-    cells = robot_index.build(x, y, arenas, (10.0, 10.0), cell_m)
+    cells = robot_index.build(x, y, (10.0, 10.0), cell_m, np.ones(arenas, np.bool_))
     pairs, expected = places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)), []
     for a, b in pairs:
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]

@@ -65,7 +65,7 @@ class Reporter:
         index, local = np.flatnonzero(used), np.cumsum(used) - 1
         was_on_air, on_air_at_ns = packet["fate"] == RECEIVED, packet["on_air_at_ns"].copy()
         on_air_at_ns[rows.packet] = rows.on_air_at_ns
-        packets = queued.select(index)._replace(
+        packets = queued.select(index).replaced(
             on_air_at_ns=on_air_at_ns[index],
             off_air_at_ns=(on_air_at_ns + np.where(was_on_air, packet["airtime_ns"], 0))[index],
             fate=packet["fate"][index],
@@ -96,7 +96,7 @@ class Reporter:
 
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
-        reachable = np.zeros(len(packets.sender), np.int64)
+        reachable = np.zeros(len(packets), np.int64)
         candidates = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
             return reachable

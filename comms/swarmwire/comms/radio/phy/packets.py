@@ -83,7 +83,7 @@ class PacketTable:
         settled = self.table["is_settled"] > 0
         kept = np.flatnonzero(self.table["is_done"] == 0)
         self.table["is_departed"] |= settled
-        queued = self.queued._replace(intended=np.where(settled, 0, self.queued.intended))
+        queued = self.queued.replaced(intended=np.where(settled, 0, self.queued.intended))
         self.queued, self.table = queued.select(kept), self.table[kept]
 
     def drain(self) -> Transmissions:

@@ -55,7 +55,7 @@ def pairs_of(
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
-    cells = robot_index.build(x, y, len(keys), size_m, propagation.reach_m * robot_index.SLACK, running)
+    cells = robot_index.build(x, y, size_m, propagation.reach_m * robot_index.SLACK, running)
     a, b, loss = _near(x, y, robots, cells, propagation)
     if propagation.shadows:
         _add_shadows(loss, x, y, robots, cells.order, propagation.field, propagation.amplitude_db, a, b)

@@ -88,7 +88,7 @@ class BodiesBlock(Stage):
 
     def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
         x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-        cells = robot_index.build(x, y, len(self._running), self._size_m, self._range_m, self._running)
+        cells = robot_index.build(x, y, self._size_m, self._range_m, self._running)
         return bodies_between(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver) > 0
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, SentPackets
+from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -51,16 +51,14 @@ class Channel:
 
     def decide(self, packets: Transmissions, pose: FloatArray, liveness: LivenessHistory) -> Links:
         """Links with fates of packets that go on air, or are refused, with robots at `pose`."""
-        # No geometry for packets too large; packets refused by a full queue count the receivers in range.
-        candidates = np.flatnonzero(packets.fate != Fate.TOO_LARGE)
-        # Alive or not: the intended receivers are those alive when the packet was sent.
-        robots, sender, to = len(pose) // self._arenas, packets.sender.take(candidates), packets.to.take(candidates)
-        index, receiver = links_in_range(self._in_range(pose), robots, sender, to)
-        packet = candidates.take(index)
+        # Alive or not: the intended receivers are those alive when the packet was sent. Packets refused by a full
+        # queue count the receivers in range.
+        robots = len(pose) // self._arenas
+        packet, receiver = links_in_range(self._in_range(pose), robots, packets.sender, packets.to, packets.fate)
         if liveness.any_dead:
             is_intended = liveness.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[is_intended], receiver[is_intended]
-        refused, in_range = packets.fate != RECEIVED, np.zeros(len(packets.sender), np.int64)
+        refused, in_range = packets.fate != RECEIVED, np.zeros(len(packets), np.int64)
         if refused.any():
             is_refused = refused[packet]
             in_range = self._count_reachable(packets, packet[is_refused], receiver[is_refused], pose)
@@ -75,7 +73,7 @@ class Channel:
         self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray
     ) -> IntArray:
         """Receivers in range of packets that never go on air, (packets,)."""
-        zero = np.zeros(len(packets.sender), np.int64)
+        zero = np.zeros(len(packets), np.int64)
         links = Links.with_the_rest(packets, packet, receiver, zero, self._columns).first(len(packet))
         for stage in self._stages:
             stage.count_in_range(links, pose)
@@ -155,6 +153,6 @@ class UnitDisk(RadioModel):
         return self._channel.edges(pose, alive, self._now_ns)
 
     def _decided(self, packets: Transmissions, liveness: LivenessHistory) -> Decided:
-        if not packets:
+        if not len(packets):
             return packets, Links.none(self._columns)
         return packets, self._channel.decide(packets, self._pose, liveness)

@@ -13,10 +13,11 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import BROADCAST
+from swarmwire.comms.packets import BROADCAST, Fate
 
 # Cells in a row that cover the range on a torus: the last cell at a seam may be cut, so that two cells count as one.
 CELLS = 5
+TOO_LARGE = int(Fate.TOO_LARGE)
 
 
 class Neighbours(NamedTuple):
@@ -32,15 +33,17 @@ def neighbours_of(pose: FloatArray, running: BoolArray, size_m: tuple[float, flo
     Arenas that are not `running` (arenas,) have none.
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
-    return Neighbours(*_within(x, y, len(x) // len(running), cells, range_m))
+    return Neighbours(*_within(x, y, running, size_m, range_m))
 
 
 @njit()
-def links_in_range(neighbours: Neighbours, robots: int, sender: IntArray, to: IntArray) -> tuple[IntArray, IntArray]:
+def links_in_range(
+    neighbours: Neighbours, robots: int, sender: IntArray, to: IntArray, fate: IntArray
+) -> tuple[IntArray, IntArray]:
     """Packet row and robot row for each robot in range of a packet's sender, packet by packet.
 
-    `sender` (k,) holds robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST.
+    `sender` (k,) holds robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST. Packets whose
+    `fate` (k,) is TOO_LARGE have none.
     """
     capacity = 0
     for s in sender:
@@ -51,7 +54,8 @@ def links_in_range(neighbours: Neighbours, robots: int, sender: IntArray, to: In
         s = sender[p]
         for k in range(neighbours.first[s], neighbours.first[s + 1]):
             packet[count], receiver[count] = p, neighbours.other[k]
-            count += to[p] == BROADCAST or neighbours.other[k] == s - s % robots + to[p]
+            is_addressed = to[p] == BROADCAST or neighbours.other[k] == s - s % robots + to[p]
+            count += is_addressed and fate[p] != TOO_LARGE
     return packet[:count], receiver[:count]
 
 
@@ -82,10 +86,11 @@ def _sort(values):
 
 
 @njit()
-def _within(x, y, robots, cells, range_m):
+def _within(x, y, running, size_m, range_m):
+    cells = robot_index.build(x, y, size_m, range_m * robot_index.SLACK, running)
     # In grid order, so that the strips around a robot are read sequentially.
     order, sorted_x, sorted_y = cells.order.view(np.uint64), x[cells.order], y[cells.order]
-    begin, stop = _strips(x, y, robots, cells)
+    begin, stop = _strips(x, y, len(x) // len(running), cells)
     first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.uint64)
     count, square_m2 = 0, range_m * range_m
     for s in range(len(x)):
@@ -122,7 +127,7 @@ def neighbours_on_torus(
 ) -> Neighbours:
     """As `neighbours_of`, where opposite sides of each arena meet: shortest distances count."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = robot_index.build(x, y, len(running), size_m, range_m * robot_index.SLACK, running)
+    cells = robot_index.build(x, y, size_m, range_m * robot_index.SLACK, running)
     return Neighbours(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
 
 

@@ -67,7 +67,7 @@ def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) ->
     """
     held = _hold(queued.sender, queued.fate, queued.on_air_at_ns, queued.off_air_at_ns, which, free_at_ns)
     on_air_at_ns, off_air_at_ns, free_at_ns = held
-    return queued._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
+    return queued.replaced(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
 
 
 def release_queue(
@@ -81,7 +81,7 @@ def release_queue(
         queued.sender, queued.sent_at_ns, queued.on_air_at_ns, queued.off_air_at_ns, which, free_at_ns, at_ns
     )
     on_air_at_ns, off_air_at_ns, free_at_ns = released
-    return queued._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
+    return queued.replaced(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns), free_at_ns
 
 
 def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Transmissions:
@@ -100,7 +100,7 @@ def newest_only(queued: Transmissions, which: BoolArray, at_ns: IntArray) -> Tra
     fate, on_air_at_ns, off_air_at_ns = queued.fate.copy(), queued.on_air_at_ns.copy(), queued.off_air_at_ns.copy()
     fate[old] = Fate.BLACKOUT
     on_air_at_ns[old] = off_air_at_ns[old] = at_ns[queued.sender[old]]
-    return queued._replace(fate=fate, on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns)
+    return queued.replaced(fate=fate, on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns)
 
 
 @njit()
@@ -140,12 +140,14 @@ class TxQueues:
         self._radio = radio
         self._admission = Admission(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
-        self._backlog = np.full(rows, DROP)
+        self._backlog, self._any_held = np.full(rows, DROP), False
+        self._limit = np.full(rows, radio.queue_limit)
         self.queued = Transmissions.none()
 
     def tune(self, radio: Radio) -> None:
         """Use the parameters of `radio` for later packets."""
         self._radio = radio
+        self._limit[:] = radio.queue_limit
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Admit packets to the queues; returns them sorted by sender, also kept in `queued`.
@@ -155,8 +157,10 @@ class TxQueues:
         """
         packets = self._admission.take(sent_at_ns, sent, others_alive, epoch)
         on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
-        packets = packets._replace(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
-        self.queued = newest_only(self.queued.followed_by(packets), self._backlog == NEWEST, sent_at_ns)
+        packets = packets.replaced(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
+        self.queued = self.queued.followed_by(packets)
+        if self._any_held:
+            self.queued = newest_only(self.queued, self._backlog == NEWEST, sent_at_ns)
         return packets
 
     def leave(self, until_ns: int, disruption: Disruption) -> Transmissions:
@@ -172,12 +176,13 @@ class TxQueues:
         off, dead = accepted & ~disruption.radio_on[packets.sender], accepted & ~disruption.alive[packets.sender]
         fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
         off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
-        return packets._replace(fate=fate, off_air_at_ns=off_air_at_ns)
+        return packets.replaced(fate=fate, off_air_at_ns=off_air_at_ns)
 
     def switch(self, at_ns: int, disruption: Disruption) -> None:
         """Apply radios that are off or on from `at_ns` on: hold their queues, or release them."""
         previous, self._backlog = self._backlog, disruption.backlog_now
         held, free = self._backlog != DROP, (previous != DROP) & (self._backlog == DROP)
+        self._any_held = bool(held.any())
         if free.any():
             self.queued, self._free_at_ns = release_queue(self.queued, free, self._free_at_ns, at_ns)
         if (held & (previous == DROP)).any():
@@ -188,9 +193,9 @@ class TxQueues:
         """Take out all packets of robots not `alive` (rows,) as SENDER_DEAD, and free their radios."""
         self._free_at_ns[~alive] = 0
         packets = self._take_out(~alive[self.queued.sender])
-        at = np.full(len(packets.sender), at_ns)
+        at = np.full(len(packets), at_ns)
         fate = np.where(packets.fate == ACCEPTED, Fate.SENDER_DEAD, packets.fate)
-        return packets._replace(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
+        return packets.replaced(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
     def _take_out(self, due: BoolArray) -> Transmissions:
         if not due.any():
@@ -199,18 +204,13 @@ class TxQueues:
         return packets
 
     def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        radio = self._radio
+        radio, free_at_ns, limit, held = self._radio, self._free_at_ns, self._limit, self._backlog != DROP
         duration_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
-        held = self._backlog != DROP
+        if self._any_held:
+            free_at_ns, limit = np.where(held, FAR_NS, free_at_ns), np.where(self._backlog == NEWEST, NO_LIMIT, limit)
+        queued, too_large = self.queued, sizes > radio.max_payload_bytes
         on_air_at_ns, fate, free_at_ns = enter(
-            sent_at_ns,
-            np.where(held, FAR_NS, self._free_at_ns),
-            self.queued.sender,
-            self.queued.on_air_at_ns,
-            sender,
-            duration_ns,
-            sizes > radio.max_payload_bytes,
-            np.where(self._backlog == NEWEST, NO_LIMIT, radio.queue_limit),
+            sent_at_ns, free_at_ns, queued.sender, queued.on_air_at_ns, sender, duration_ns, too_large, limit
         )
-        self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)
-        return on_air_at_ns, on_air_at_ns + np.where(fate == ACCEPTED, duration_ns, 0), fate
+        self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns) if self._any_held else free_at_ns
+        return on_air_at_ns, on_air_at_ns + duration_ns * (fate == ACCEPTED), fate
