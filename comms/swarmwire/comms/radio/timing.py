@@ -96,6 +96,7 @@ class Dcf:
     cw_max: int = 1023  # CWmax, slots
     max_retries: int = 7  # of short unicast frames
     cca_time_ns: int = 4 * US  # aCCATime of OFDM; that of DSSS is at most 15 us, and 4 us in ns-3
+    cca_sensitivity_dbm: float = -82.0  # for frames (17.3.10.5)
     cca_ed_dbm: float = -62.0  # CCA-ED threshold, for energy that is no frame
 
     @property

@@ -96,6 +96,24 @@ def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
         assert told.fates() == ({"RECEIVED": 1} if received else {"OUT_OF_RANGE": 1})
 
 
+@pytest.mark.parametrize("bit_rate_bps", [1_000_000, 2_000_000, 11_000_000])
+def test_the_reach_of_80211b_is_that_of_its_preamble(bit_rate_bps: int):
+    """ns-3's -82 dBm: up to 2 Mbit/s and 11 alike, all bits of a frame that is found are right."""
+    radio = preset("wifi-b-1M", send_offset="tick", bit_rate_bps=bit_rate_bps)
+    range_m = range_of(radio)
+    assert range_m is not None
+    assert sensitivity_of(radio) == -82.0
+    for share, fate in ((0.99, "RECEIVED"), (1.01, "OUT_OF_RANGE")):
+        told = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0] * 20, size=4), 1, 1)
+        assert told.fates() == {fate: 20}
+
+
+def test_nothing_is_in_range_whose_preamble_is_lost_in_noise():
+    """A frame of 802.11b at 1 Mbit/s would be right at -93 dBm, but at 4 dB over -93.55 dBm its preamble is found."""
+    radio = preset("wifi-b-1M", reception={"preamble_dbm": -200.0})
+    assert sensitivity_of(radio) == pytest.approx(radio.noise_or_default.power_dbm + 4.0)
+
+
 def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
     radio = preset("ble-1M")
     sinr = 10.0 ** (0.1 * (sensitivity_of(radio) - radio.noise_or_default.power_dbm))

@@ -54,6 +54,7 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "access": {"method": "aloha", "max_retries": 3}}, "radio.access.max_retries"),
     ({**SIGNAL, "access": {"method": "none", "cca_threshold_dbm": -70.0}}, "radio.access.cca_threshold_dbm"),
     ({**SIGNAL, "access": {"method": "csma-802154", "cca_time_s": 1e-6}}, "radio.access.cca_time_s"),
+    ({**SIGNAL, "access": {"method": "aloha", "cca_sensitivity_dbm": -82.0}}, "radio.access.cca_sensitivity_dbm"),
     ({**SIGNAL, "reception": {"min_sinr_db": 3.0}}, "radio.reception.min_sinr_db"),
     ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, "radio.fading.k"),
     ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, "radio.fading.m"),

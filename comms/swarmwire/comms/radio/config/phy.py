@@ -242,6 +242,14 @@ class Access:
         at_least=-200,
         at_most=100,
     )
+    cca_sensitivity_dbm: float | None = parameter(
+        None,
+        help="of dcf: power of frames from which the medium counts as busy, also if none of them is received; without "
+        "it -82 dBm",
+        unit="dBm",
+        at_least=-200,
+        at_most=100,
+    )
     cca_time_s: float | None = parameter(
         None,
         help="of dcf: how long after its start a frame is sensed; who is due until then sends into it; without it 4 us",

@@ -181,8 +181,9 @@ STANDARDS: dict[str, Preset] = {
             "frequency_hz": 2.412e9,
             "bit_rate_bps": 1_000_000,
             "frame": "802.11b",
+            # Error rates take Eb/N0 = SINR x 22 MHz / rate, so the noise is that of 22 MHz; ns-3 has that of 20 MHz.
             "noise": {"bandwidth_hz": 22e6, "figure_db": 7.0},
-            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -94.0, "capture_window_s": 4e-6},
+            "reception": {"model": "802.11b", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "capture_window_s": 4e-6},
         },
     ),
     "wifi-a-6M": Preset(

@@ -283,8 +283,9 @@ def _check_fits(radio: Radio, where: str) -> None:
             raise BadInput(
                 where, f"radio.access.{name}", f'expected method csma-802154 or dcf with it, got "{access.method}"'
             )
-    if access.cca_time_s is not None and access.method != "dcf":
-        raise BadInput(where, "radio.access.cca_time_s", f'expected method dcf with it, got "{access.method}"')
+    for name in ("cca_sensitivity_dbm", "cca_time_s"):
+        if getattr(access, name) is not None and access.method != "dcf":
+            raise BadInput(where, f"radio.access.{name}", f'expected method dcf with it, got "{access.method}"')
     fits = ("threshold", "table", RECEPTIONS.get(radio.frame, reception.model))
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"

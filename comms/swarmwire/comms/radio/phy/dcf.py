@@ -50,7 +50,8 @@ def sense(params, state, events, r, now_ns):
     """Update carrier sense after a change of the power at the robot; does nothing under other access methods."""
     if params.method == DCF:
         rx = state.reception[r]
-        is_busy = rx.is_deaf or rx.locked_to != NO_ROBOT or rx.power_mw + rx.jam_mw >= params.cca_ed_mw
+        is_energy = (rx.power_mw >= params.cca_sensitivity_mw) | (rx.power_mw + rx.jam_mw >= params.cca_ed_mw)
+        is_busy = rx.is_deaf or rx.locked_to != NO_ROBOT or is_energy
         if is_busy != (rx.is_busy != 0):
             _change(params, state, events, r, now_ns)
 

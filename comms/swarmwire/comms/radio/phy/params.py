@@ -48,6 +48,7 @@ class PhyParams(NamedTuple):
     max_be: int
     max_backoffs: int
     # DCF.
+    cca_sensitivity_mw: float  # power of frames from which the medium is busy, received or not
     cca_time_ns: int  # from a change on the medium until carrier sense reports it
     slot_ns: int
     difs_ns: int
@@ -66,6 +67,9 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     cca_threshold_dbm = access.cca_threshold_dbm
     if cca_threshold_dbm is None:
         cca_threshold_dbm = dcf.cca_ed_dbm if is_dcf else sensitivity_of(radio) + csma.cca_ed_above_sensitivity_db
+    cca_sensitivity_dbm = access.cca_sensitivity_dbm
+    if cca_sensitivity_dbm is None:
+        cca_sensitivity_dbm = dcf.cca_sensitivity_dbm
     max_retries = access.max_retries
     if max_retries is None:
         max_retries = dcf.max_retries if is_dcf else csma.max_retries
@@ -98,6 +102,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         min_be=csma.min_be,
         max_be=csma.max_be,
         max_backoffs=csma.max_backoffs,
+        cca_sensitivity_mw=float(from_db(cca_sensitivity_dbm)),
         cca_time_ns=dcf.cca_time_ns if access.cca_time_s is None else to_ns(access.cca_time_s),
         slot_ns=dcf.slot_ns,
         difs_ns=dcf.difs_ns,

@@ -30,15 +30,18 @@ def receiver_for(radio: Radio) -> Receiver:
 
 
 def sensitivity_of(radio: Radio) -> float:
-    """Lowest mean power in dBm of a receiver in range: configured, or derived as in data sheets."""
-    reception = radio.reception_or_default
-    if reception.sensitivity_dbm is not None:
-        return reception.sensitivity_dbm
-    success, frame_bytes = DATA_SHEET_SENSITIVITY.get(
-        reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes)
-    )
-    bits_dbm = sensitivity_dbm(receiver_for(radio), radio.noise_or_default.power_dbm, success, 8 * frame_bytes)
-    return max(bits_dbm, reception.preamble_dbm)  # without a preamble there are no bits
+    """Lowest mean power in dBm of a receiver in range: configured, or derived as in data sheets.
+
+    Never below the thresholds of preamble detection: without a preamble there are no bits.
+    """
+    reception, noise_dbm = radio.reception_or_default, radio.noise_or_default.power_dbm
+    bits_dbm = reception.sensitivity_dbm
+    if bits_dbm is None:
+        success, frame_bytes = DATA_SHEET_SENSITIVITY.get(
+            reception.model, (0.9, radio.max_payload_bytes + radio.overhead_bytes)
+        )
+        bits_dbm = sensitivity_dbm(receiver_for(radio), noise_dbm, success, 8 * frame_bytes)
+    return max(bits_dbm, reception.preamble_dbm, noise_dbm + reception.preamble_sinr_db)
 
 
 def range_of(radio: Radio) -> float | None:

@@ -184,6 +184,23 @@ def test_stations_of_80211_collide_whose_backoffs_end_within_the_cca_time(
     assert sum(len(one.received.receiver) for one in told) == received
 
 
+@pytest.mark.parametrize(("cca_sensitivity_dbm", "waits"), [(None, True), (-70.0, False)])
+def test_the_medium_of_80211_is_busy_while_frames_collide(cca_sensitivity_dbm: float | None, waits: bool):
+    """Two frames at once, of which robot 2 finds neither (both at -77 dBm, far below -62 dBm): as in ns-3 it waits."""
+    radio = replace(with_access("dcf"), access=Access("dcf", cca_sensitivity_dbm=cca_sensitivity_dbm))
+    medium, pose = make_medium(radio, 3), at((-10.2, 0), (10.2, 0), (0, 0))
+    told = Run(medium)
+    told.news.append(medium.step(0, pose))
+    medium.send(0, 0, packets([0, 1], size=60))
+    told.news.append(medium.step(200_000, pose))
+    medium.send(200_000, 1, packets([2], size=60))
+    told.news.append(medium.step(TICK_NS, pose))
+    medium.end()
+    on_air_at_ns = told.finished("on_air_at_ns")[told.finished("sender") == 2]
+    assert len(on_air_at_ns)
+    assert (on_air_at_ns > 50_000 + 1_000_000).all() == waits
+
+
 @pytest.mark.parametrize(("nodes", "on_air_delivery"), [(2, 0.883), (10, 0.3375), (20, 0.1268)])
 def test_full_queues_of_80211_collide_as_often_as_in_ns3(nodes: int, on_air_delivery: float):
     """Broadcasts of 164 octets at 6 Mbit/s from full queues: ns-3's recorded ratios, with 0.002 of standard error.
