@@ -103,7 +103,7 @@ def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path):
     text = agent.read_text()
     head = text[: text.index("        heading_rad = robot")]
     agent.write_text(f"{head}        return\n")
-    ended = own_tests(folder, "-k", "hear or move")
+    ended = own_tests(folder, "-k", "received or move")
     assert ended.returncode == 1
     assert "2 failed" in ended.stdout
 

@@ -1,4 +1,4 @@
-"""What one robot of this swarm tells the others, and what it does in each step."""
+"""The code of one robot: its message and its step."""
 
 import math
 
@@ -6,16 +6,16 @@ from swarmwire.agent import Agent, Message, Robot, f4
 
 
 class Hello(Message):
-    """What a robot broadcasts in every step: 2 bytes for its kind and 4 for the heading go on air."""
+    """The broadcast of every step: on air, 2 bytes for its kind and 4 for the heading."""
 
     heading_rad: f4  # of its compass
 
 
 class Companion(Agent):
-    """Goes where its neighbours go, and keeps away from whoever or whatever is near.
+    """Steers by the headings of its neighbours, and away from near robots and obstacles.
 
-    It knows only what its robot senses and hears. Annotated attributes are its parameters: a scenario sets them, and
-    `swarmwire describe agent.py:Companion` lists them.
+    It can read its own sensors and the packets that it received. Annotated attributes are parameters: a scenario sets
+    them, and `swarmwire describe agent.py:Companion` lists them.
     """
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
@@ -25,10 +25,10 @@ class Companion(Agent):
     turn_gain_per_s: float = 2.0  # turn rate per angle to the wanted direction
 
     def step(self, robot: Robot) -> None:
-        """Called once a tick: listen, look, drive, and tell the others."""
+        """Called once a tick: read packets and sensors, drive, and broadcast."""
         heading_rad = robot.compass.heading_rad
         x, y = 0.5, 0.0  # the wanted direction, seen from the robot: x is ahead, y to the left
-        for packet in robot.radio.received(Hello):  # what got through since the last step, and no more
+        for packet in robot.radio.received(Hello):  # received since the last step
             turn_rad = packet.message.heading_rad - heading_rad
             x += math.cos(turn_rad)
             y += math.sin(turn_rad)

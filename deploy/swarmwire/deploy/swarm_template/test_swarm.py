@@ -1,4 +1,4 @@
-"""The swarm moves, hears one another through the loss, and does the same in whatever processes its agents run."""
+"""The swarm moves, receives packets despite the loss, and runs alike in one process and in several."""
 
 from functools import cache
 from pathlib import Path
@@ -15,8 +15,8 @@ def short_run() -> Result:
     return run(SCENARIO, overrides=SHORT)
 
 
-def test_robots_hear_one_another_but_not_every_packet() -> None:
-    """The agent sends and hears, over a radio that loses."""
+def test_some_packets_are_received_and_some_are_lost() -> None:
+    """The agent sends and receives over a lossy radio."""
     radio = short_run().radio
     assert radio is not None
     assert radio.fates["received"] > 0
@@ -30,6 +30,6 @@ def test_robots_move() -> None:
     assert order.max > 0.0  # it is 0 while all stand still
 
 
-def test_a_process_of_their_own_changes_nothing() -> None:
-    """The agent knows what its robot knows, and nothing else: so it is all the same where it runs."""
+def test_a_run_in_another_process_is_the_same() -> None:
+    """The agent uses the inputs of its own robot alone, so its process does not matter."""
     assert run(SCENARIO, overrides=SHORT, runners=1).trajectory_sha256 == short_run().trajectory_sha256
