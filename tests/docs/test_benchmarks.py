@@ -1,8 +1,13 @@
 """What benchmarks print, and what they make up to measure."""
 
+import numpy as np
+import pytest
+
+from benchmarks.held_positions import edge_of, received
 from benchmarks.report_cost import write_campaign
 from benchmarks.table import rows
 from benchmarks.targets import Target, most
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.campaign.folder import CampaignFolder
 
 
@@ -26,3 +31,15 @@ def test_the_campaign_that_is_made_up_is_one(tmp_path):
     campaign = CampaignFolder(tmp_path)
     assert (campaign.finished, len(campaign.points), len(campaign.responses)) == (True, 50, 10)
     assert campaign.sample("stop_time_s", 45).censored > 0.0
+
+
+@pytest.mark.parametrize(("rate_hz", "arrives"), [(10, [True, False]), (1000, [False, True])])
+def test_a_frame_sees_positions_at_the_start_of_its_tick(rate_hz: int, arrives: list[bool]):
+    """One pair leaves the range half a metre before the packet is sent, another one enters it."""
+    start_m, speeds_mps = np.array([49.9, 50.1]), np.array([10.0, -10.0])
+    found = received(Radio(range_m=50.0), start_m, np.full((2, 1), 0.05), speeds_mps, rate_hz)
+    assert found[:, 0].tolist() == arrives
+
+
+def test_the_edge_of_a_disk_is_its_range():
+    assert edge_of(Radio(range_m=50.0)) == pytest.approx((50.0, 50.0, 50.0), abs=0.02)
