@@ -25,7 +25,7 @@ class Fate(ExplainedEnum):
     OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
     BLOCKED = 2, "an obstacle stood in the line of sight"
     LOST = 3, "within reach, but lost by the medium's fixed loss, or a trace's delivery ratio"
-    QUEUE_FULL = 4, "the sender's queue was full: never on air"
+    QUEUE_FULL = 4, "the sender's queue was full, or it waited there too long: never on air"
     TOO_LARGE = 5, "above the medium's largest payload: never on air"
     IN_FLIGHT = 6, "queued or on its way when the run ended"
     SENDER_DEAD = 7, "the sender died before the packet went on air"
@@ -232,7 +232,7 @@ class TxResult(ExplainedEnum):
     ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
     NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not received, or the answer was not"
     CHANNEL_BUSY = 2, "the radio found the medium busy each time it listened, and gave up"
-    QUEUE_FULL = 3, "the radio's queue was full: never on air"
+    QUEUE_FULL = 3, "the radio's queue was full, or it waited there too long: never on air"
     TOO_LARGE = 4, "above the medium's largest payload: never on air"
 
 

@@ -16,11 +16,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import polars as pl
 
 from swarmwire.comms.packets import FATE_NAMES
-from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
 from swarmwire.metrics.atomic import output_file
 
@@ -155,8 +154,7 @@ def _answer_us(radio: Radio) -> int:
     if not (radio.access_or_default.acknowledged and radio.access_or_default.method == "dcf"):
         return 0
     dcf = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}[radio.frame]
-    answer_ns = int(airtime_ns(radio, np.array([acknowledgement_bytes(radio)]))[0])
-    return -(-(dcf.sifs_ns + answer_ns) // 1000)
+    return -(-(dcf.sifs_ns + acknowledgement_ns(radio)) // 1000)
 
 
 def _ipv4(frame: Frame, data_bytes: int) -> bytes:

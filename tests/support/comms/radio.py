@@ -255,6 +255,7 @@ def signal_radios(draw: st.DrawFn) -> Radio:
         bit_rate_bps=draw(st.sampled_from([900, 30_000])) if slow else radio.bit_rate_bps,
         max_payload_bytes=draw(st.integers(10, 60)),
         queue_limit=draw(st.integers(0, 4)),
+        queue_lifetime_s=draw(st.sampled_from([None, 0.05])),
         send_offset=draw(st.sampled_from(["uniform", "tick", 0.03, 0.25])),
         loss=draw(st.sampled_from([0.0, 0.3])),
         jitter_s=draw(st.sampled_from([0.0, 0.3])),

@@ -16,6 +16,7 @@ Octets = TypeVar("Octets", int, IntArray)
 
 US = 1_000  # ns
 DSSS_RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
+OFDM_MANDATORY_BPS = (6_000_000, 12_000_000, 24_000_000)  # of DSSS all are (17.3.1, 18.1.1)
 OFDM_BITS_PER_SYMBOL = {
     6_000_000: 24,
     9_000_000: 36,
@@ -108,4 +109,4 @@ class Dcf:
 IEEE_802_15_4 = UnslottedCsma()
 IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # of frames by DSSS and CCK
 IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # of frames by OFDM at 5 GHz
-IEEE_802_11G = Dcf(10 * US, 9 * US, 15)  # where no station of 802.11b is near: short slots, CWmin of OFDM
+IEEE_802_11G = Dcf(10 * US, 20 * US, 15)  # in an ad hoc network (IBSS), which has no short slots (7.3.1.4)

@@ -17,7 +17,7 @@ from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, cover
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.presets import PRESETS
-from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns, airtime_ns
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, range_of, receiver_for, sensitivity_of
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.reception.receiver import chunk_success
@@ -59,10 +59,30 @@ def airtime_us(radio: Radio, payload_bytes: int) -> float:
     return float(airtime_ns(radio, np.array([payload_bytes + radio.overhead_bytes]))[0]) / 1e3
 
 
-@pytest.mark.parametrize(("name", "us"), [("ieee802154", 352), ("wifi-b-1M", 304), ("wifi-a-6M", 44)])
-def test_an_acknowledgement_takes_as_long_as_the_standard_says(name: str, us: int):
-    radio = preset(name)
-    assert airtime_ns(radio, np.array([acknowledgement_bytes(radio)])).tolist() == [us * 1000]
+@pytest.mark.parametrize(
+    ("name", "others", "us"),
+    [
+        ("ieee802154", {}, 352),
+        ("wifi-b-1M", {}, 304),
+        ("wifi-b-1M", {"bit_rate_bps": 11_000_000}, 203),
+        ("wifi-a-6M", {}, 44),
+        ("wifi-a-6M", {"bit_rate_bps": 9_000_000}, 44),
+        ("wifi-a-6M", {"bit_rate_bps": 54_000_000}, 28),
+    ],
+)
+def test_an_acknowledgement_takes_as_long_as_the_standard_says(name: str, others: dict[str, Any], us: int):
+    """At the highest mandatory rate that is no higher than that of the frame: 6, 12 or 24 Mbit/s of OFDM."""
+    assert acknowledgement_ns(preset(name, **others)) == us * 1000
+
+
+@pytest.mark.parametrize(("lifetime_s", "received"), [(None, 40), (0.5, 13), (0.02, 1)])
+def test_what_waits_longer_than_the_lifetime_of_its_queue_is_dropped(lifetime_s: float | None, received: int):
+    """Frames of 40.6 ms at once, with access 40.7 to 41.3 ms: after 0.5 s the 13th is the last that begins."""
+    radio = preset("wifi-b-1M", queue_limit=100, send_offset="tick", max_payload_bytes=6000, overhead_bytes=0)
+    radio = replace(radio, queue_lifetime_s=lifetime_s)
+    told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 40, size=5050), 1, 20)
+    dropped = {"QUEUE_FULL": 40 - received} if received < 40 else {}
+    assert told.fates() == {"RECEIVED": received, **dropped}
 
 
 def in_one_spot(radio: Radio, nodes: int, payload_bytes: int, interval_s: float, runs: int) -> Contention:

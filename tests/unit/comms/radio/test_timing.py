@@ -257,7 +257,7 @@ def test_802_15_4_counts_its_waits_in_symbols():
 
 
 @pytest.mark.parametrize(
-    ("dcf", "difs_us", "window"), [(IEEE_802_11B, 50, 31), (IEEE_802_11A, 34, 15), (IEEE_802_11G, 28, 15)]
+    ("dcf", "difs_us", "window"), [(IEEE_802_11B, 50, 31), (IEEE_802_11A, 34, 15), (IEEE_802_11G, 50, 15)]
 )
 def test_802_11_waits_for_difs_and_its_window(dcf, difs_us: int, window: int):
     assert dcf.difs_ns == difs_us * US

@@ -53,6 +53,7 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}}, "radio.bursts.loss_bad"),
     ({**SIGNAL, "access": {"method": "aloha", "max_retries": 3}}, "radio.access.max_retries"),
     ({**SIGNAL, "access": {"method": "none", "cca_threshold_dbm": -70.0}}, "radio.access.cca_threshold_dbm"),
+    ({"range_m": 2.0, "queue_lifetime_s": 0.5}, "radio.queue_lifetime_s"),
     ({**SIGNAL, "access": {"method": "csma-802154", "cca_time_s": 1e-6}}, "radio.access.cca_time_s"),
     ({**SIGNAL, "access": {"method": "aloha", "cca_sensitivity_dbm": -82.0}}, "radio.access.cca_sensitivity_dbm"),
     ({**SIGNAL, "reception": {"min_sinr_db": 3.0}}, "radio.reception.min_sinr_db"),

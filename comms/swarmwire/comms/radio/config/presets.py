@@ -163,6 +163,7 @@ _WIFI: dict[str, Any] = {
     "overhead_bytes": 64,
     "max_payload_bytes": 1472,
     "queue_limit": 500,
+    "queue_lifetime_s": 0.5,
     "log_distance": {"exponent": 3.0},
     "antenna": {"power_dbm": 16.0},
     "access": {"method": "dcf"},
@@ -175,7 +176,7 @@ STANDARDS: dict[str, Preset] = {
     ),
     "wifi-b-1M": Preset(
         "IEEE 802.11b ad hoc at 1 Mbit/s in channel 1, UDP over IPv4",
-        "IEEE 802.11-2007; power, noise figure and preamble as in ns-3",
+        "IEEE 802.11-2007; power, noise figure, preamble and queue as in ns-3",
         {
             **_WIFI,
             "frequency_hz": 2.412e9,
@@ -188,7 +189,7 @@ STANDARDS: dict[str, Preset] = {
     ),
     "wifi-a-6M": Preset(
         "IEEE 802.11a ad hoc at 6 Mbit/s in channel 36, UDP over IPv4",
-        "IEEE 802.11-2007; power, noise figure and preamble as in ns-3",
+        "IEEE 802.11-2007; power, noise figure, preamble and queue as in ns-3",
         {
             **_WIFI,
             "frequency_hz": 5.18e9,

@@ -3,7 +3,9 @@
 No kernels here: a scenario is read without a compiler.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.config import parameter
@@ -25,6 +27,7 @@ from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
     OFDM_BITS_PER_SYMBOL,
+    OFDM_MANDATORY_BPS,
     at_bit_rate_ns,
     ieee80211a_ns,
     ieee80211b_ns,
@@ -91,6 +94,14 @@ class Radio:
     )
     queue_limit: int = parameter(
         20, help="packets that may wait at a sender for its radio to become free", at_least=0, at_most=10**6
+    )
+    queue_lifetime_s: float | None = parameter(
+        None,
+        help="of signals: a packet that has waited longer at its sender is dropped when its turn comes, as from a full "
+        "queue; without it none is",
+        unit="s",
+        above=0,
+        at_most=3600,
     )
     send_offset: str | float = parameter(
         "uniform",
@@ -209,6 +220,23 @@ def acknowledgement_bytes(radio: Radio) -> int:
     return SHORT_ACKNOWLEDGEMENT if radio.frame == "plain" else LONG_ACKNOWLEDGEMENT
 
 
+def acknowledgement_ns(radio: Radio) -> int:
+    """How long an acknowledgement occupies the medium, in ns.
+
+    IEEE 802.11 sends it at the highest mandatory bit rate that is no higher than that of the frame (2007: 9.6).
+    """
+    if radio.frame in ("802.11a", "802.11g"):
+        radio = replace(radio, bit_rate_bps=max(rate for rate in OFDM_MANDATORY_BPS if rate <= radio.bit_rate_bps))
+    return int(airtime_ns(radio, np.array([acknowledgement_bytes(radio)]))[0])
+
+
+def eifs_acknowledgement_ns(radio: Radio) -> int:
+    """The acknowledgement that EIFS leaves room for, in ns: at the lowest mandatory bit rate, that of 802.11b for g."""
+    if radio.frame == "802.11a":
+        return int(ieee80211a_ns(LONG_ACKNOWLEDGEMENT, OFDM_MANDATORY_BPS[0]))
+    return int(ieee80211b_ns(LONG_ACKNOWLEDGEMENT, DSSS_RATES_BPS[0], short_preamble=False))
+
+
 # Checks that need more than one key: errors name the key that contradicts another.
 
 
@@ -261,6 +289,8 @@ def _check_disk(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.measures.rssi", "expected a model with signals: a unit disk knows no strength")
     if radio.cut_off_db != Radio.cut_off_db:
         raise BadInput(where, "radio.cut_off_db", "expected a model with signals: a unit disk knows no strength")
+    if radio.queue_lifetime_s is not None:
+        raise BadInput(where, "radio.queue_lifetime_s", "expected a model with signals: a unit disk keeps what waits")
 
 
 def _check_signal(radio: Radio, where: str) -> None:

@@ -63,6 +63,9 @@ def send(params, state, events, buffer, r, now_ns):
     if radio.on_air != SILENT:  # the radio still sends an acknowledgement
         tx_queue.begin(params, state, events, r, now_ns)
         return
+    if not tx_queue.drop_expired(params, state, buffer, r, now_ns):
+        state.reception[r].is_deaf = 0
+        return
     packet = state.packet[radio.packet]
     if radio.attempt > 0 and state.off[r] != RECEIVED:  # the last attempt decides the fate
         state.reception[r].is_deaf = 0
@@ -120,6 +123,7 @@ def ack_timed_out(params, state, events, buffer, r, now_ns):
     if params.method == dcf.DCF:
         radio.exponent += 1
         dcf.draw_backoff(params, state, r)
+        radio.free_from_ns = max(radio.free_from_ns, now_ns)  # DIFS and slots begin with the timeout
     tx_queue.begin(params, state, events, r, now_ns)
     tx_queue.keep_newest(params, state, events, buffer, r, now_ns)
 

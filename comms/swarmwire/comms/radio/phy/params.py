@@ -9,7 +9,12 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.radio.config.phy import METHODS
-from swarmwire.comms.radio.config.radio import Radio, acknowledgement_bytes, airtime_ns
+from swarmwire.comms.radio.config.radio import (
+    Radio,
+    acknowledgement_bytes,
+    acknowledgement_ns,
+    eifs_acknowledgement_ns,
+)
 from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sensitivity_of
 from swarmwire.comms.radio.phy.reception import log_success_table
@@ -18,6 +23,7 @@ from swarmwire.comms.radio.reception.receiver import Receiver, sinr_for_db
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
 
 CERTAIN = 1.0 - 1e-12
+FOREVER_NS = 2**62
 DCF_TIMING = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}
 
 
@@ -28,6 +34,7 @@ class PhyParams(NamedTuple):
     method: int  # index in METHODS
     acknowledged: bool
     queue_limit: int
+    queue_lifetime_ns: int  # waiting time from which packets are dropped
     noise_mw: float
     min_preamble_sinr: float  # lowest SINR of a detected preamble
     min_preamble_mw: float  # lowest power of a detected preamble
@@ -74,7 +81,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     if max_retries is None:
         max_retries = dcf.max_retries if is_dcf else csma.max_retries
     ack_bytes = acknowledgement_bytes(radio)
-    ack_ns = int(airtime_ns(radio, np.array([ack_bytes]))[0])
+    ack_ns = acknowledgement_ns(radio)
     sifs_ns = dcf.sifs_ns if is_dcf else csma.turnaround_ns
     dcf_timeout_ns = sifs_ns + ack_ns + dcf.slot_ns
     # The standard's value at its bit rate; longer where an acknowledgement at a lower bit rate takes longer.
@@ -85,6 +92,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         method=METHODS.index(access.method),
         acknowledged=access.acknowledges,
         queue_limit=radio.queue_limit,
+        queue_lifetime_ns=FOREVER_NS if radio.queue_lifetime_s is None else to_ns(radio.queue_lifetime_s),
         noise_mw=float(from_db(radio.noise_or_default.power_dbm)),
         min_preamble_sinr=float(from_db(reception.preamble_sinr_db)),
         min_preamble_mw=float(from_db(reception.preamble_dbm)),
@@ -106,7 +114,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         cca_time_ns=dcf.cca_time_ns if access.cca_time_s is None else to_ns(access.cca_time_s),
         slot_ns=dcf.slot_ns,
         difs_ns=dcf.difs_ns,
-        eifs_extra_ns=dcf.sifs_ns + ack_ns,  # EIFS - DIFS: SIFS and an acknowledgement
+        eifs_extra_ns=dcf.sifs_ns + eifs_acknowledgement_ns(radio),  # EIFS - DIFS: SIFS and an acknowledgement
         cw_min=dcf.cw_min,
         cw_max=dcf.cw_max,
         receiver=receiver,

@@ -70,18 +70,37 @@ def _is_full(params, state, r):
 @kernel()
 def serve(params, state, events, r, now_ns):
     """The robot's radio is free: serve the next packet, if there is one."""
+    if _take_next(state, r):
+        begin(params, state, events, r, now_ns)
+
+
+@kernel()
+def _take_next(state, r):
+    """Take the next packet out of the queue; False if it is empty, and the radio idle."""
     radio = state.robot[r]
     radio.stage, radio.packet = IDLE, NO_ROBOT
     while radio.next < radio.entry and state.packet[state.order[radio.next]].is_done:
         radio.next += 1
     if radio.next == radio.entry:
-        return
+        return False
     radio.packet = state.order[radio.next]
     radio.next += 1
     radio.waiting -= 1
     radio.attempt = radio.exponent = 0
     radio.last_fate = NO_ROBOT
-    begin(params, state, events, r, now_ns)
+    return True
+
+
+@kernel()
+def drop_expired(params, state, buffer, r, now_ns):
+    """The radio may send: end packets that waited too long, up to one that did not; False if there is none."""
+    radio = state.robot[r]
+    while radio.attempt == 0 and now_ns - state.packet[radio.packet].sent_at_ns > params.queue_lifetime_ns:
+        state.packet[radio.packet].result = QUEUE_FULL_RESULT
+        results.record_at_sender(state, buffer, radio.packet, QUEUE_FULL, now_ns)
+        if not _take_next(state, r):
+            return False
+    return True
 
 
 @kernel()
