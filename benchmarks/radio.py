@@ -1,7 +1,7 @@
 """The medium alone, in times real time: everybody broadcasts in each tick of 0.1 s, moves a little, and hears.
 
 What is timed is all that a run asks of the medium in a tick: time passes, poses are held, packets are sent, and the
-radio graph is drawn. One thread.
+radio graph is drawn.
 """
 
 import statistics
@@ -20,6 +20,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.truth import Obstacle
+from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.scenario_parts import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10
@@ -38,6 +39,8 @@ class Case:
     in_range: float  # other robots within the nominal reach of one far from the border
     payload_bytes: int
     keys: tuple[str, ...] = ()
+    moves: bool = True
+    threads: int = 1
     boxes: int = 0  # of BOX_M, at random places and turned at random
 
     @property
@@ -49,8 +52,12 @@ class Case:
 CASES = {
     # Shadowing brings more into range than path loss alone would: 25 by path loss are 30 on average, border included.
     "radio-802154-1000": Case("ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED)),
+    "radio-802154-1000-threads": Case(
+        "ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED), threads=2
+    ),
     "radio-disk-1000": Case("unit-disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
     "radio-wifi-80": Case("wifi-a-6M", 80, 600, 128),
+    "radio-wifi-80-standing": Case("wifi-a-6M", 80, 600, 128, moves=False),
 }
 LINE_OF_SIGHT = Case("unit-disk", 1000, 7.8, 20, ("radio.range_m=5.0", "radio.line_of_sight=true"), boxes=9500)
 SCALING = CASES["radio-802154-1000"]
@@ -72,13 +79,14 @@ class Cost:
 
 def cost(case: Case, ticks: int = TICKS) -> Cost:
     """The mean over ticks."""
+    keep_memory()  # as a run does
     clock, rng, radio, robots = WallClock(), np.random.default_rng(PLACES_KEY), case.radio, case.robots
     reach_m = range_of(radio)
     assert reach_m is not None
     side_m = float(np.sqrt(robots * np.pi * reach_m**2 / case.in_range))
     keys = np.array([derive_key("arena", 1)], np.uint64)
     obstacles = obstacle_arrays((boxes(case.boxes, side_m),))
-    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacles, RATE_HZ)
+    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacles, RATE_HZ, threads=case.threads)
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
@@ -93,7 +101,9 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
             spent_ns += clock.now_ns() - start_ns
             in_range += int(news.tally.in_range.sum())
             fates += news.tally.fates.sum(axis=0)
-        pose[:, :2] += rng.normal(0.0, STEP_M, (robots, 2))
+        if case.moves:
+            pose = pose.copy()  # the medium keeps the one that it was given
+            pose[:, :2] += rng.normal(0.0, STEP_M, (robots, 2))
     packets = ticks * robots
     told = {
         "robots": robots,
@@ -101,6 +111,8 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
         "payload_bytes": case.payload_bytes,
         "preset": case.preset,
         "keys": list(case.keys),
+        "moves": case.moves,
+        "threads": case.threads,
         "side_m": round(side_m, 1),
         "boxes": case.boxes,
         "in_range": round(in_range / packets, 1),

@@ -36,6 +36,7 @@ TARGETS = {
     "inprocess-100000-d1": Target(1, "100,000 foot-bots at 10 Hz"),
     "laser-1000": Target(1, "1,000 TurtleBots, 360 rays of 3.5 m at 5 Hz with noise"),
     "single-10": Target(800, "one run of 10 foot-bots"),
+    "single-10-radio": Target(500, "the same with a broadcast of each robot and tick"),
     "replicas-100x10": Target(500_000, "100 arenas of 10 foot-bots side by side"),
     "wire-1000x2": Target(60_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
     "start-1000": most(2, "from the call to the first tick of a world with a radio, kernels cached, imports left out"),
@@ -52,14 +53,16 @@ TARGETS = {
     "radio-802154-1000": Target(
         20, "1,000 robots, 20 bytes, 29 in range, 802.15.4: shadowing, fading, CSMA, SINR to 10 dB below noise"
     ),
-    "radio-disk-1000": Target(100, "1,000 robots over a disk, 9 in range"),
-    "radio-wifi-80": Target(80, "80 robots in one spot over `wifi-a-6M`, 128 bytes"),
+    "radio-802154-1000-threads": Target(32, "the same with two threads"),
+    "radio-disk-1000": Target(250, "1,000 robots over a disk, 9 in range"),
+    "radio-wifi-80": Target(105, "80 robots in one spot over `wifi-a-6M`, 128 bytes: 100 times ns-3's wheel"),
+    "radio-wifi-80-standing": Target(105, "the same, of robots that stand"),
     "radio-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
     "line-of-sight-9500": most(
         10, "a tick of the medium: 1,000 robots, 7,800 links within range of a unit disk, a map of 9,500 boxes"
     ),
     "campaign-1000x10": most(
-        25, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
+        8, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),
     "processes-100": Target(8, "100 e-pucks that flock, each an `Agent` in plain Python in its own process"),
     "processes-100-start": most(6, "from the call to the first tick, imports left out"),

@@ -123,6 +123,7 @@ class RunConfig:
     _: KW_ONLY
     seed: int | None = None  # of the only arena; None: the scenario's
     seeds: SeedsGiven | None = None  # one arena per seed, side by side: how many (9: 1 to 9), a list, or "4:10"
+    threads: int = 1  # of this process for one tick; more change nothing but the speed
     runners: Runners = None  # None: all agents in this process; a number of runner processes; or "per-robot"
     overrides: Sequence[str] = ()  # of the scenario: "path=value", as for `--set`
     out: Path | str | None = None  # the run folder, new or empty; None: nothing is written

@@ -88,7 +88,7 @@ def _item(place: int, item: str | MetricTable, beside: Path) -> MetricEntry:
     return MetricEntry(f"metrics.{place}", resolve(item, beside), {})
 
 
-def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None) -> RadioMedium | None:
+def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None, threads: int = 1) -> RadioMedium | None:
     """A new medium of the scenario's radio, if it has one; `traces` are those of its file."""
     static, radio = world.static, scenario.radio
     if radio is None:
@@ -106,6 +106,7 @@ def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None) -> R
         Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
         static.boundary,
         obstacles_move=static.movable > 0,
+        threads=threads,
     )
 
 

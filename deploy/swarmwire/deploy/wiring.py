@@ -197,7 +197,7 @@ class RunParts:
         self.backend = backend
         self.loop = Loop(
             self.world,
-            new_medium(self.scenario, self.world, self._traces),
+            new_medium(self.scenario, self.world, self._traces, self.config.threads),
             acting,
             observers,
             self.scenario.events,
@@ -247,6 +247,8 @@ class RunParts:
         """BadInput for options that do not go together, and for a machine that is too small."""
         config, static = self.config, self.world.static
         robots = static.arenas * static.robots
+        if config.threads < 1:
+            raise BadInput("--threads", "", f"expected at least 1, got {config.threads}")
         if config.listening is not None:
             config.listening.check(self.scenario, robots)
         need_open_files(self.runners if config.listening is None else robots)

@@ -116,11 +116,12 @@ def make_medium(
     seeds: Sequence[int] = (1,),
     obstacles: Sequence[Sequence[Obstacle]] | None = None,
     traces: LinkTraces | None = None,
+    threads: int = 1,
 ) -> RadioMedium:
     """a medium over arenas of SIZE_M at RATE_HZ, an arena per seed."""
     keys = np.array([derive_key(seed, "air") for seed in seeds], np.uint64)
     placed = obstacle_arrays(tuple(map(tuple, obstacles or [()] * len(seeds))))
-    return RadioMedium(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces)
+    return RadioMedium(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces, threads=threads)
 
 
 def run(

@@ -6,7 +6,8 @@ is final, and counts the fates.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from functools import reduce
+from collections.abc import Callable
+from functools import partial, reduce
 from operator import add
 
 import numpy as np
@@ -15,7 +16,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, SentPackets
+from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -30,6 +31,7 @@ from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
+from swarmwire.comms.threads import Threads
 from swarmwire.comms.truth import Boundary, PacketCounts
 
 MAX_PARTS = 8  # parts of a tick's results that are kept before they are joined
@@ -88,13 +90,15 @@ class RadioMedium:
         antennas: Antennas | None = None,
         boundary: Boundary = "walls",
         obstacles_move: bool = False,
+        threads: int = 1,
     ) -> None:
         """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
 
         `radius_m` (robots,) are the robots' radii, for bodies between two robots; 0 each if left out. `traces` is the
         content of the radio's trace file, `antennas` the antennas of a radio with a PHY. With `obstacles_move` the
-        arrays of `obstacles` may change in place. ValueError for a unit disk without `range_m`, a trace without its
-        file or the other way round, or a radio that `unfit_for_torus` refuses on a torus.
+        arrays of `obstacles` may change in place. `threads` change nothing but the speed. ValueError for a unit disk
+        without `range_m`, a trace without its file or the other way round, or a radio that `unfit_for_torus` refuses on
+        a torus.
         """
         if not radio.is_phy and radio.range_m is None:
             raise ValueError("range_m: expected a range, as a unit disk has one")
@@ -112,8 +116,16 @@ class RadioMedium:
         obstacle_indices = ObstacleIndices(obstacles, size_m, 0.0, obstacles_move=obstacles_move)
         arena_facts = keys, robots, obstacle_indices, size_m, radii_m
         context = ChannelContext(
-            radio, *arena_facts, self._active, robot_antennas, self._running, traces, boundary == "torus"
+            radio,
+            *arena_facts,
+            self._active,
+            robot_antennas,
+            self._running,
+            traces,
+            boundary == "torus",
+            Threads(threads),
         )
+        self._threads = context.threads
         period_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, keys, period_ticks, rate_hz)
         self._model: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
@@ -147,6 +159,7 @@ class RadioMedium:
         Returns:
             All results since the last step, those of `advance` included, and the radio graph at `pose`.
         """
+        self._model.expect(pose)
         self._pass_time(start_ns)
         if disruption is not None:
             self._disruption, self._is_new = disruption, True
@@ -155,10 +168,11 @@ class RadioMedium:
         if (self._is_new or self._anyone_out) and (now.anyone_out or self._active.anyone_out):
             self._keep_new(*self._model.disrupt(start_ns, now, self._liveness))
             self._cut_off(start_ns, now)
-        final = Results.joined([*self._parts, self._final(start_ns)])
-        self._parts = []
+        told = self._threads.start(self._final(start_ns), len(self._links))
         self._hold(pose, radio or self.radio)
         edges = self._model.edges(pose, self._present)
+        final = Results.joined([*self._parts, told()])
+        self._parts = []
         return Results(final.received, final.finished, final.departed, final.tx_status, final.tally, edges)
 
     def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
@@ -189,7 +203,7 @@ class RadioMedium:
         Returns the results since the last call, which the next `step` returns again; they have no edges.
         """
         self._pass_time(until_ns)
-        final = self._final(until_ns)
+        final = self._final(until_ns)()
         self._parts.append(final)
         if len(self._parts) == MAX_PARTS:  # joined early, since the next tick waits for the last part
             self._parts = [Results.joined(self._parts)]
@@ -252,15 +266,20 @@ class RadioMedium:
         self._now_ns = until_ns
         self._keep_new(*self._model.pass_time(until_ns, self._liveness))
 
-    def _final(self, until_ns: int) -> Results:
-        """Results of links that are final by `until_ns`; the others are kept."""
+    def _final(self, until_ns: int) -> Callable[[], Results]:
+        """Returns what takes the results of links that are final by `until_ns`; the others are kept.
+
+        It may be called in another thread while poses are held.
+        """
         self._liveness.forget(self._model.queued.epoch)
-        tx_status = self._model.tx_status(self._present)
+        return partial(self._take_final, until_ns, self.radio, self._model.tx_status(self._present))
+
+    def _take_final(self, until_ns: int, radio: Radio, tx_status: TxStatuses) -> Results:
         links, packets, counts = self._links, self._on_air, self._counters.final
         received, finished, departed, still_open = results.final_by(
-            until_ns, links, packets, self.radio, self._robots, counts
+            until_ns, links, packets, radio, self._robots, counts
         )
-        if len(still_open) < len(links.fate):
+        if len(still_open) < len(links):
             self._keep(still_open)
         return Results(received, finished, departed, tx_status, self._counters.close())
 

@@ -29,6 +29,9 @@ class RadioModel(ABC):
     def hold(self, pose: FloatArray) -> None:
         """Robots are at `pose` (rows, 3) from now on, under the active disruption; the array must not change."""
 
+    def expect(self, pose: FloatArray) -> None:  # noqa: B027 - a model may have nothing to do
+        """Robots will be at `pose` (rows, 3) once the time that passes next has passed, as `hold` will tell."""
+
     @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:
         """Use the parameters of `radio` from `at_ns` on; packets that wait or are on air stay."""

@@ -139,14 +139,16 @@ def final_by(
     )
 
 
-@njit()
+@njit(nogil=True)
 def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
     """As `final_by`, in tables whose rows are the columns of its results, in their order.
 
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, those
     for the rest, one for each packet that left its sender's radio.
     """
-    sender, receiver, fate, final_at_ns = links[L.SENDER], links[L.RECEIVER], links[L.FATE], links[L.FINAL_AT]
+    packet_of, sender, receiver = links[L.PACKET], links[L.SENDER], links[L.RECEIVER]
+    fate, final_at_ns = links[L.FATE], links[L.FINAL_AT]
+    arena = packets[T.SENDER] // robots  # of each packet: a division for each link would cost as much as all the rest
     receivers, reachable = links[L.RECEIVERS], links[L.IN_RANGE]
     received, finished, departed, still_open = (
         np.empty(len(fate), np.int64),
@@ -163,37 +165,45 @@ def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
         f += final & (fate[row] != OUT_OF_RANGE)
         d += final & (receiver[row] == THE_REST)
         o += not final
-        arena = sender[row] // robots
-        fates[arena, fate[row]] += final * receivers[row]
-        in_range[arena] += final * reachable[row]
+        here = arena[packet_of[row]]
+        fates[here, fate[row]] += final * receivers[row]
+        in_range[here] += final * reachable[row]
     index = received[:h]
     if h > 0:
         index = by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
-    kept, place = compacted(links[L.PACKET][index], packets.shape[1])
+    kept, place = compacted(packet_of[index], packets.shape[1])
     return (
-        _received(index, place, links, robots),
+        _received(index, place, links, arena * robots),
         (index, *payload_rows(data, offset, kept)),
-        _finished(finished[:f], links, packets, offset, robots),
+        _finished(finished[:f], links, packets, offset, arena, robots),
         finished[:f],
-        _departed(departed[:d], links, packets, robots),
+        _departed(departed[:d], links, packets, arena, robots),
         still_open[:o],
     )
 
 
 @njit()
-def _received(index, payload, links, robots):
-    """Receiver, sender in its arena, sequence, time of reception and payload, (5, k)."""
-    sender, receiver, sequence, final_at_ns = links[L.SENDER], links[L.RECEIVER], links[L.SEQUENCE], links[L.FINAL_AT]
+def _received(index, payload, links, first_row):
+    """Receiver, sender in its arena, sequence, time of reception and payload, (5, k).
+
+    `first_row` is that of each packet's arena.
+    """
+    packet_of, sender, receiver = links[L.PACKET], links[L.SENDER], links[L.RECEIVER]
+    sequence, final_at_ns = links[L.SEQUENCE], links[L.FINAL_AT]
     columns = np.empty((5, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
-        columns[0, k], columns[1, k], columns[2, k] = receiver[row], sender[row] % robots, sequence[row]
+        columns[0, k], columns[1, k], columns[2, k] = (
+            receiver[row],
+            sender[row] - first_row[packet_of[row]],
+            sequence[row],
+        )
         columns[3, k], columns[4, k] = final_at_ns[row], payload[k]
     return columns
 
 
 @njit()
-def _finished(index, links, packets, offset, robots):
+def _finished(index, links, packets, offset, arena, robots):
     """The integer columns of `ReceptionRecords`, then that of payloads, (13, k)."""
     packet_of, receiver, receivers = links[L.PACKET], links[L.RECEIVER], links[L.RECEIVERS]
     fate, final_at_ns = links[L.FATE], links[L.FINAL_AT]
@@ -203,9 +213,8 @@ def _finished(index, links, packets, offset, robots):
     for k in range(len(index)):
         row = np.uint64(index[k])
         p = np.uint64(packet_of[row])
-        arena = sender[p] // robots
-        first_row = arena * robots
-        columns[0, k], columns[1, k] = arena, sender[p] - first_row
+        first_row = arena[p] * robots
+        columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
         columns[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
         columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
         columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
@@ -215,7 +224,7 @@ def _finished(index, links, packets, offset, robots):
 
 
 @njit()
-def _departed(index, links, packets, robots):
+def _departed(index, links, packets, arena, robots):
     """The columns of `TransmissionRecords`, (9, k)."""
     packet_of, row_of_sender, sequence = links[L.PACKET], links[L.SENDER], links[L.SEQUENCE]
     receivers, fate = links[L.RECEIVERS], links[L.FATE]
@@ -225,8 +234,7 @@ def _departed(index, links, packets, robots):
     for k in range(len(index)):
         row = np.uint64(index[k])
         p = np.uint64(packet_of[row])
-        arena = row_of_sender[row] // robots
-        columns[0, k], columns[1, k], columns[2, k] = arena, row_of_sender[row] - arena * robots, to[p]
+        columns[0, k], columns[1, k], columns[2, k] = arena[p], row_of_sender[row] - arena[p] * robots, to[p]
         columns[3, k], columns[4, k] = sequence[row], intended[p]
         columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
         columns[6, k], columns[7, k], columns[8, k] = fate_at_sender[p], on_air_at_ns[p], off_air_at_ns[p]

@@ -42,6 +42,13 @@ Seeds = Annotated[
 Runners = Annotated[
     str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
 ]
+Threads = Annotated[
+    int,
+    typer.Option(
+        help="Threads of this process for one tick: more change nothing but the speed, of large swarms with signals.",
+        metavar="NUMBER",
+    ),
+]
 RealTime = Annotated[
     str | None,
     typer.Option(help="Run at this many simulated seconds per second, and wait for no runner.", metavar="FACTOR"),

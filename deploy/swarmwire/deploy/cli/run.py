@@ -34,6 +34,7 @@ from swarmwire.deploy.cli.options import (
     Socket,
     Subtick,
     Swarm,
+    Threads,
     Ui,
     View,
     leaving_when_hung_up,
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 def run_command(
     scenario: ScenarioFile,
     runners: Runners = "none",
+    threads: Threads = 1,
     out: Out = None,
     seed: Seed = None,
     seeds: Seeds = None,
@@ -78,7 +80,7 @@ def run_command(
 ) -> None:
     """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
-    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners says.
+    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners and --threads say.
 
     With --gateway robots answer as real ones would, in real time, to programs that drive them: swarmwire-agent, whose
     settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
@@ -102,6 +104,7 @@ def run_command(
         checked,
         seeds=chosen,
         runners=runners,
+        threads=threads,
         out=out or default_folder(scenario.stem, chosen),
         socket=socket,
         realtime=realtime,

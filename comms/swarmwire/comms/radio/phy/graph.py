@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.graph import edges, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable
@@ -50,20 +51,21 @@ class RadioGraph:
 
         Measured values are those at `hold_ns`.
         """
-        links, rows = self._links, len(pose)
+        links, rows, disruption = self._links, len(pose), self._disruption
         pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
-        candidates = alive[pairs.a] & alive[pairs.b] & ~pairs.blocked
-        if self._disruption.anything:
-            candidates &= self._disruption.joined(pairs.a, pairs.b)
         by_power = not (self._jam.anything or self._losses.varies)
+        send_dbm, receive_dbi = links.propagation.send_dbm, links.propagation.receive_dbi
+        min_dbm = self._min_dbm if by_power else -math.inf
+        candidates = _above(pairs, alive, send_dbm, receive_dbi, min_dbm)
+        if disruption.anything:
+            candidates = candidates[disruption.joined(pairs.a[candidates], pairs.b[candidates])]
+        key = pairs.a[candidates] * rows + pairs.b[candidates]
         if by_power:
-            candidates &= np.minimum(*links.mean_dbm(pairs)) >= self._min_dbm
-        key = (pairs.a * rows + pairs.b)[candidates]
-        if by_power:
-            return np.stack(np.divmod(np.sort(key), rows), axis=1)
+            key.sort()
+            return _ends(key, rows)
         order = np.argsort(key)
         delivery = self._delivery(pairs, pose, hold_ns)[candidates][order]
-        return edges(np.stack(np.divmod(key[order], rows), axis=1), delivery, self._min_delivery)
+        return edges(_ends(key[order], rows), delivery, self._min_delivery)
 
     def _delivery(self, pairs: Pairs, pose: FloatArray, at_ns: int) -> FloatArray:
         """Delivery of each pair in the worse direction, without the losses that are the same on every link, (k,).
@@ -81,6 +83,30 @@ class RadioGraph:
             delivery = clear[receiver] * lone + (1.0 - clear[receiver]) * jammed
             worse = np.minimum(worse, delivery * self._losses.delivery(sender, receiver, pose, at_ns))
         return worse
+
+
+@njit(nogil=True)
+def _above(pairs, alive, send_dbm, receive_dbi, min_dbm):
+    """The pairs of robots `alive` (rows,) that nothing blocks, with at least `min_dbm` in both directions, (k,)."""
+    found, count = np.empty(len(pairs.a), np.int64), 0
+    for i in range(len(found)):
+        a, b = np.uint64(pairs.a[i]), np.uint64(pairs.b[i])
+        forward_dbm = send_dbm[a] + receive_dbi[b] - pairs.loss_db[i]
+        reverse_dbm = send_dbm[b] + receive_dbi[a] - pairs.reverse_db[i]
+        # Branchless: write first, then advance if it counts.
+        found[count] = i
+        count += alive[a] & alive[b] & (not pairs.blocked[i]) & (min(forward_dbm, reverse_dbm) >= min_dbm)
+    return found[:count]
+
+
+@njit()
+def _ends(key, rows):
+    """The robot rows (k, 2) of keys a x rows + b."""
+    ends = np.empty((len(key), 2), np.int64)
+    for i in range(len(key)):
+        ends[i, 0] = key[i] // rows
+        ends[i, 1] = key[i] - ends[i, 0] * rows
+    return ends
 
 
 def min_power_where(is_enough: Callable[[float], bool]) -> float:

@@ -6,14 +6,15 @@ only). Links of frames that went on air under earlier poses are kept in front un
 
 # pyright: basic, reportUnknownMemberType=false
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
@@ -58,7 +59,7 @@ def links_by_sender(
     return link[:links], LinkPlaces(first, weak, stop)
 
 
-@kernel(from_python=True)
+@kernel(from_python=True, nogil=True)
 def _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send_dbm, receive_dbi, fate, thresholds):
     """Kind of each link (+ 4 where mean power reaches the sensitivity), its power, and counts by robot and kind."""
     a, b, forward_db, reverse_db, gain, _ = pairs
@@ -87,7 +88,7 @@ def _kind(mean_dbm, power_mw, is_open, thresholds):
     return STRONG * is_strong + WEAK * is_weak + 4 * above_sensitivity
 
 
-@kernel(from_python=True)
+@kernel(from_python=True, nogil=True)
 def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
     """Fill in the links of one direction; advances `next_place` (rows, 3), the next free row by robot and kind."""
     for i in range(len(kind)):
@@ -102,6 +103,14 @@ def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
             fate[i],
             RECEIVED,
         )
+
+
+class _Coming(NamedTuple):
+    """Pairs that another thread computes."""
+
+    pose: FloatArray
+    propagation: PropagationParams
+    pairs: Callable[[], Pairs]  # waits for them
 
 
 class LinkTable:
@@ -126,14 +135,38 @@ class LinkTable:
         self.propagation, self._thresholds = propagation, thresholds
         rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 3))
+        # Obstacles may be pushed, and measured strengths change by themselves.
+        self._follows_poses = measured is None and self._line_of_sight is None and not propagation.walls
+        self._is_new, self._running = True, context.running.copy()
+        self._coming: _Coming | None = None
         self.pairs = self.pairs_at(self.pose)
         self.link, self.places = self._links(np.empty(0, LINK))
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """Pairs of robots at `pose` (rows, 3)."""
+        return self._pairs_at(pose, self.propagation)
+
+    def _pairs_at(self, pose: FloatArray, propagation: PropagationParams) -> Pairs:
         context = self._context
         arenas = context.size_m, context.keys, context.running, context.obstacles
-        return pairs_of(pose, *arenas, self.propagation, self._line_of_sight, self._measured)
+        return pairs_of(pose, *arenas, propagation, self._line_of_sight, self._measured)
+
+    def expect(self, pose: FloatArray) -> None:
+        """Begin to compute the pairs for a `move` to `pose`, where another thread is free for it."""
+        threads, propagation, rows = self._context.threads, self.propagation, len(self.pairs.a)
+        if threads.are_worth(rows) and self._follows_poses and not self._stays(pose):
+            pairs = threads.start(partial(self._pairs_at, pose, propagation), rows)
+            self._coming = _Coming(pose, propagation, pairs)
+
+    def _stays(self, pose: FloatArray) -> bool:
+        """Whether the links are those of robots at `pose`: nothing on which they depend has changed."""
+        return (
+            self._follows_poses
+            and not self._is_new
+            and not self._context.disruption.anything
+            and np.array_equal(pose, self.pose)
+            and np.array_equal(self._context.running, self._running)
+        )
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """Mean power in dBm of each pair, from a to b and from b to a, (k,) each."""
@@ -143,13 +176,22 @@ class LinkTable:
 
     def tune(self, propagation: PropagationParams, thresholds: Thresholds) -> None:
         """Use these parameters from the next `move` on."""
-        self.propagation, self._thresholds = propagation, thresholds
+        self.propagation, self._thresholds, self._is_new = propagation, thresholds, True
 
     def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
-        """Rebuild the links for robots at `pose`; updates the link rows in tables of dtype ROBOT and RECEPTION."""
+        """Rebuild the links for robots at `pose`; updates the link rows in tables of dtype ROBOT and RECEPTION.
+
+        Where nothing has changed the links stay as they are.
+        """
+        coming, self._coming = self._coming, None
+        pairs = coming.pairs() if coming else None
+        if self._stays(pose):
+            return
         kept = self._keep_on_air(robot, reception)
-        self.pose, self.pairs = pose, self.pairs_at(pose)
+        is_fit = coming is not None and coming.pose is pose and coming.propagation is self.propagation
+        self.pose, self.pairs = pose, pairs if pairs is not None and is_fit else self.pairs_at(pose)
         self.link, self.places = self._links(kept)
+        self._is_new, self._running = self._context.disruption.anything, self._context.running.copy()
 
     def reached(self, sender: IntArray) -> tuple[IntArray, IntArray]:
         """Index of each sender and the unblocked receivers in range of it, under the current poses."""
@@ -161,34 +203,47 @@ class LinkTable:
 
     def _links(self, kept: Table) -> tuple[Table, LinkPlaces]:
         pairs, disruption = self.pairs, self._context.disruption
-        fate = np.stack([_fates(disruption, *ends, pairs.blocked) for ends in ((pairs.a, pairs.b), (pairs.b, pairs.a))])
+        fate = np.full((2, len(pairs.a)), RECEIVED, np.uint8)
+        fate[:, pairs.blocked] = int(Fate.BLOCKED)
+        if disruption.anything:
+            disruption.end(fate[0], pairs.a, pairs.b)
+            disruption.end(fate[1], pairs.b, pairs.a)
         return links_by_sender(
             pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, kept
         )
 
     def _keep_on_air(self, robot: Table, reception: Table) -> Table:
         """The links of frames on air; shifts their rows in `robot` and `reception` to their new places."""
-        on_air = np.flatnonzero(robot["on_air"] != SILENT)
-        first = robot["first_link"][on_air]
-        counts = robot["stop_link"][on_air] - first
-        index = _ranges(first, counts)
-        moved = np.zeros(len(robot), np.int64)
-        moved[on_air] = np.cumsum(counts) - counts - first
-        for place in ("first_link", "weak_link", "stop_link"):
-            robot[place] += moved
-        locked = np.flatnonzero(reception["locked_to"] != NO_ROBOT)
-        reception["link"][locked] += moved[reception["locked_to"][locked]].astype(np.int32)
-        return self.link[index]
+        return self.link[_to_front(robot, reception)]
+
+
+@njit()
+def _to_front(robot, reception):
+    """The link rows of frames on air, in the order of robots: their new places, to which `robot` and `reception` point.
+
+    Few frames are on air between two ticks, so that this is nearly always one look at each robot.
+    """
+    links = 0
+    for r in range(len(robot)):
+        links += (robot[r].stop_link - robot[r].first_link) * (robot[r].on_air != SILENT)
+    index, moved, at = np.empty(links, np.int64), np.zeros(len(robot), np.int64), 0
+    for r in range(len(robot)):
+        radio = robot[r]
+        if radio.on_air != SILENT:
+            moved[r] = at - radio.first_link
+            for row in range(radio.first_link, radio.stop_link):
+                index[at] = row
+                at += 1
+            radio.first_link += moved[r]
+            radio.weak_link += moved[r]
+            radio.stop_link += moved[r]
+    for r in range(len(reception)):
+        if reception[r].locked_to != NO_ROBOT:
+            reception[r].link += moved[reception[r].locked_to]
+    return index
 
 
 def _ranges(first: IntArray, counts: IntArray) -> IntArray:
     """Concatenated ranges first[i] .. first[i] + counts[i] - 1."""
     before = np.cumsum(counts) - counts
     return np.repeat(first - before, counts) + np.arange(counts.sum())
-
-
-def _fates(disruption: Disruption, sender: IntArray, receiver: IntArray, blocked: BoolArray) -> ByteArray:
-    """RECEIVED for open links, else the drop reason of each packet on them, (k,)."""
-    fate = np.where(blocked, np.uint8(Fate.BLOCKED), np.uint8(RECEIVED))
-    disruption.end(fate, sender, receiver)
-    return fate

@@ -192,7 +192,7 @@ def order_queues(state, events, start):
             schedule(events, ENQUEUE, r, state.packet[state.order[at]].sent_at_ns)
 
 
-@kernel(from_python=True)
+@kernel(from_python=True, nogil=True)
 def run_until(params, losses, state, events, buffer, max_links, until_ns):
     """Handle the events due before `until_ns`; False if `buffer` is full: take out its rows and call again.
 

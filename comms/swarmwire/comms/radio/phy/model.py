@@ -161,6 +161,10 @@ class SinrPhy(RadioModel):
             self._refresh()
         self._was_jammed = self._jam.anything
 
+    def expect(self, pose: FloatArray) -> None:
+        """Begin to compute the links of robots that will be at `pose` (rows, 3)."""
+        self._links.expect(pose)
+
     def tune(self, at_ns: int, radio: Radio) -> None:
         """Use the parameters of `radio` from `at_ns` on; chunks received until then count by the old ones."""
         self._refresh()
@@ -189,11 +193,10 @@ class SinrPhy(RadioModel):
             losses = self._losses.losses(pose, self._hold_ns, self._now_ns, links)
             mac.order_queues(state, self._events, start)
             max_links = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
-            buffer = result_buffer(
-                max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
-            )
+            capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
             done = False
             while not done:
+                buffer = result_buffer(capacity)
                 done = mac.run_until(self._params, losses, state, self._events, buffer, max_links, until_ns)
                 parts.append(take_rows(buffer))
             self._last_rows = sum(len(part.packet) for part in parts)

@@ -8,6 +8,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,
@@ -18,11 +19,15 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
+from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import NO_ROBOT
+
+TOO_LARGE, RESULT_TOO_LARGE = int(Fate.TOO_LARGE), int(TxResult.TOO_LARGE)
+NO_ACKNOWLEDGEMENT = int(TxResult.NO_ACKNOWLEDGEMENT)
 
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
@@ -74,9 +79,7 @@ class PacketTable:
 
     def by_sender(self, rows: int) -> tuple[IntArray, IntArray]:
         """Packet indices sorted by sender, then by order of sending; and each robot's first one, (rows + 1,)."""
-        sender = self.table["sender"]
-        order = np.argsort(sender, kind="stable")
-        return order, np.searchsorted(sender[order], np.arange(rows + 1))
+        return _by_sender(self.queued.sender, rows)
 
     def forget_done(self) -> None:
         """Drop packets that are done; packets with a recorded reception have no intended receivers left."""
@@ -94,14 +97,40 @@ class PacketTable:
 
 def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
     """Rows of dtype PACKET for packets that wait at their radios, (k,); `robots` per arena."""
-    frame_bytes = taken.payloads.sizes + radio.overhead_bytes
-    packet: Table = np.zeros(len(taken.sender), PACKET)
-    packet["sender"], packet["sequence"] = taken.sender, taken.sequence
-    packet["to"] = np.where(taken.to == BROADCAST, NO_ROBOT, taken.sender - taken.sender % robots + taken.to)
-    packet["sent_at_ns"] = packet["on_air_at_ns"] = taken.sent_at_ns
-    packet["airtime_ns"], packet["bits"] = airtime_ns(radio, frame_bytes), 8 * frame_bytes
-    packet["refused"] = np.where(taken.payloads.sizes > radio.max_payload_bytes, int(Fate.TOO_LARGE), 0)
-    packet["result"] = initial_result(taken.payloads.sizes, radio.max_payload_bytes)
+    sizes = taken.payloads.sizes
+    frame_bytes = sizes + radio.overhead_bytes
+    pause_ns = np.zeros(len(taken), np.int64)
     if radio.access_or_default.method == "csma-802154":
-        packet["pause_ns"] = IEEE_802_15_4.ifs_ns(frame_bytes - HEADER_BYTES)
+        pause_ns = IEEE_802_15_4.ifs_ns(frame_bytes - HEADER_BYTES)
+    packet: Table = np.zeros(len(taken), PACKET)
+    _fill(packet, taken.table, robots, sizes, radio.max_payload_bytes, airtime_ns(radio, frame_bytes), pause_ns)
+    packet["bits"] = 8 * frame_bytes
     return packet
+
+
+@kernel(from_python=True)
+def _fill(packet, taken, robots, sizes, max_payload_bytes, airtime_ns, pause_ns):
+    for k in range(len(packet)):
+        row, sender, to = packet[k], taken[transmissions.SENDER, k], taken[transmissions.TO, k]
+        is_too_large = sizes[k] > max_payload_bytes
+        row.sender, row.sequence = sender, taken[transmissions.SEQUENCE, k]
+        row.to = NO_ROBOT if to == BROADCAST else sender - sender % robots + to
+        row.sent_at_ns = row.on_air_at_ns = taken[transmissions.SENT_AT, k]
+        row.airtime_ns, row.pause_ns = airtime_ns[k], pause_ns[k]
+        row.refused = TOO_LARGE if is_too_large else 0
+        row.result = RESULT_TOO_LARGE if is_too_large else NO_ACKNOWLEDGEMENT
+
+
+@njit()
+def _by_sender(sender, rows):
+    """The rows of packets in the order of their senders, stable, and the first one of each, (rows + 1,)."""
+    first, order = np.zeros(rows + 1, np.int64), np.empty(len(sender), np.int64)
+    for s in sender:
+        first[s + 1] += 1
+    for s in range(rows):
+        first[s + 1] += first[s]
+    at = first[:-1].copy()
+    for p in range(len(sender)):
+        order[at[sender[p]]] = p
+        at[sender[p]] += 1
+    return order, first

@@ -86,7 +86,7 @@ def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
     return pairs._replace(loss_db=forward_db, reverse_db=reverse_db, blocked=still_blocked)
 
 
-@njit()
+@njit(nogil=True)
 def _near(x, y, robots, cells, propagation):
     """Pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
     ahead = np.empty((len(cells.order), 2, 2), np.uint64)
@@ -141,7 +141,7 @@ def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2)
     return count
 
 
-@njit()
+@njit(nogil=True)
 def _add_shadows(loss, x, y, robots, rows, field, amplitude_db, a, b):
     single = np.float32
     height = np.empty((len(x), shadowing.WAVES), single)
@@ -166,7 +166,7 @@ def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b
         loss[i] += wall_loss_db(obstacles, entered, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
 
 
-@kernel(from_python=True)
+@kernel(from_python=True, nogil=True)
 def _above(min_dbm, send_dbm, receive_dbi, a, b, loss):
     """Move pairs of at least `min_dbm` in either direction to the front and return their number."""
     kept = np.uint64(0)
@@ -184,7 +184,7 @@ def _max_dbm(send_dbm, receive_dbi, s, r):
     return max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s])
 
 
-@njit()
+@njit(nogil=True)
 def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
     at, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:

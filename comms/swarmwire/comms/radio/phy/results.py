@@ -35,11 +35,9 @@ def result_buffer(capacity: int) -> ResultBuffer:
 
 
 def take_rows(buffer: ResultBuffer) -> ResultBuffer:
-    """Copy the rows out of `buffer` and empty it."""
+    """The rows of `buffer`, as views: nothing may be written to it any more."""
     count = int(buffer.count[0])
-    rows = ResultBuffer._make([*(column[:count].copy() for column in buffer[:-1]), buffer.count.copy()])
-    buffer.count[0] = 0
-    return rows
+    return ResultBuffer._make([*(column[:count] for column in buffer[:-1]), buffer.count])
 
 
 RECEIVED, BLOCKED, BLACKOUT = int(Fate.RECEIVED), int(Fate.BLOCKED), int(Fate.BLACKOUT)

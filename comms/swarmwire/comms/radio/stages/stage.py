@@ -11,6 +11,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.traces import LinkTraces
+from swarmwire.comms.threads import Threads
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,7 @@ class ChannelContext:
     running: BoolArray  # (arenas,) kept up to date by the medium; other arenas have left the run
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
     is_torus: bool = False  # shortest distances count
+    threads: Threads = Threads()  # noqa: RUF009 - one thread has no state
 
     @property
     def wrap_m(self) -> tuple[float, float]:
