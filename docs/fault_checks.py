@@ -1,4 +1,4 @@
-"""The fault tables of docs/reliability.md: every test that the page names exists, and every fault names at least one.
+"""The fault tables of docs/fault-evidence.md: every named test exists, and every fault names at least one.
 
 A section with a fault table has a list "Tests:" below it, with an entry for each row: "- fault: `path::name`, …".
 """
@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGE = Path("docs/reliability.md")
-HEADER = "| fault | what you see |"
+PAGE = Path("docs/fault-evidence.md")
+HEADER = "| fault | symptom |"
 FOLDER = re.compile(r"`(tests/[\w/]+/)`")
 FILE = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+)[^`]*)?`")
 

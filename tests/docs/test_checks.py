@@ -50,7 +50,7 @@ def test_a_fault_without_a_test_and_a_test_that_does_not_exist_are_problems(
     monkeypatch.setattr(fault_checks, "PAGE", Path("docs/page.md"))
     (page.parents[1] / "tests").mkdir()
     (page.parents[1] / "tests" / "test_a.py").write_text("def test_b(): ...")
-    table = "### A world\n| fault | what you see |\n| --- | --- |\n| killed | nothing |\n\nTests:\n"
+    table = "### A world\n| fault | symptom |\n| --- | --- |\n| killed | nothing |\n\nTests:\n"
     page.write_text(f"{table}- killed: `tests/test_a.py::test_b[1]`\n\n## More\n- more: `tests/test_a.py`\n")
     assert list(fault_checks.fault_tables()) == []
     page.write_text(f"{table}- killed: `tests/test_a.py::test_c`\n")

@@ -237,7 +237,7 @@ BESIDE = (
     Prank("an answer to the last tick", first(lambda turn: turn.other(turn.tick - 1)), {"wrong_tick_frames": 1}),
     Prank("an answer to the next tick", first(lambda turn: turn.other(turn.tick + 1)), {"wrong_tick_frames": 1}),
     Prank(
-        "an answer to a tick far away, or before the first",
+        "an answer to a distant tick, or before the first",
         first(lambda turn: turn.other(FAR), lambda turn: turn.other(-2)),
         {"wrong_tick_frames": 2},
     ),
@@ -249,12 +249,12 @@ BESIDE = (
         {"wrong_tick_frames": 5},
     ),
     Prank(
-        "other robots' rows, and none",
+        "rows of other robots, and no rows",
         first(lambda turn: rows(turn, lambda own: [row - len(own) for row in own]), lambda turn: rows(turn, _none)),
         {"malformed_frames": 2},
     ),
     Prank(
-        "rows that no robot has",
+        "rows out of range",
         first(lambda turn: rows(turn, _beyond), lambda turn: rows(turn, lambda own: [-1, *own[1:]])),
         {"malformed_frames": 2},
     ),
@@ -267,29 +267,29 @@ BESIDE = (
         ),
         {"malformed_frames": 3},
     ),
-    Prank("packets of another's robot", first(stolen), {"malformed_frames": 1}),
+    Prank("packets of a robot of another runner", first(stolen), {"malformed_frames": 1}),
     Prank(
-        "packets whose bytes begin behind their end, or to a robot below -1",
+        "packets with offsets beyond their end, or to a robot below -1",
         first(falling, lambda turn: packets(turn, 1, 6, to=-2)),
         {"malformed_frames": 2},
     ),
     Prank(
-        "numbers for onlookers that are none",
+        "notes that are not finite numbers",
         first(lambda turn: told(turn, NAN), lambda turn: told(turn, INF)),
         {"malformed_frames": 2},
     ),
     Prank(
-        "states that are no texts, too long, or too many",
+        "states that are not text, too long, or too many",
         first(*(lambda turn, states=states: noted(turn, states) for states in ([7], ["x" * 65], ["x"] * 257, []))),
         {"malformed_frames": 4},
     ),
     Prank(
-        "colours of a light that there are not",
+        "colours of an LED out of range",
         first(lambda turn: lit(turn, 0, 2**24), lambda turn: lit(turn, -1, 0)),
         {"malformed_frames": 2},
     ),
     Prank(
-        "half of its answer, nothing, or noise",
+        "half of its answer, an empty frame, or random bytes",
         first(lambda turn: turn.honest[: len(turn.honest) // 2], lambda _: b"", lambda _: b"\xc1" * 40),
         {"malformed_frames": 3},
     ),
@@ -299,7 +299,7 @@ BESIDE = (
         {"malformed_frames": 1},
     ),
     Prank(
-        "arrays with fewer bytes, or another type, than they say",
+        "arrays with fewer bytes, or another type, than declared",
         first(
             lambda turn: turn.other(command=["<f8", [4, 2**40], b""]),
             lambda turn: turn.other(rows=["<f8", [1], bytes(8)]),
@@ -307,7 +307,7 @@ BESIDE = (
         {"malformed_frames": 2},
     ),
     Prank(
-        "frames of kinds that runners do not send, and `ready` again",
+        "frames of kinds that runners do not send, and a second `ready`",
         first(
             *(
                 lambda turn, kind=kind: frame(kind, turn.tick, {}, {})
@@ -316,14 +316,14 @@ BESIDE = (
         ),
         {"unexpected_kind_frames": 5},
     ),
-    Prank("answers under a name that nobody has", elsewhere, {"unknown_runner_frames": 1}),
-    Prank("joins again and again while it plays", joins(*[("", REQUEST)] * 20), {"refused_join": 20}),
+    Prank("answers under an unknown name", elsewhere, {"unknown_runner_frames": 1}),
+    Prank("repeated requests to join while it plays", joins(*[("", REQUEST)] * 20), {"refused_join": 20}),
     Prank(
-        "joins under other names where no robot is free",
+        "requests to join under other names when no robot is free",
         joins(("other", REQUEST), ("third", REQUEST)),
         {"refused_join": 2},
     ),
-    Prank("requests to join that are none", joins(("fourth", b"\xc1"), ("fifth", {"v": 9})), {"bad_join": 2}),
+    Prank("malformed requests to join", joins(("fourth", b"\xc1"), ("fifth", {"v": 9})), {"bad_join": 2}),
 )
 """What is dropped and counted; the honest answer, which comes too, counts."""
 
@@ -334,21 +334,21 @@ EARLY = Prank(
 )
 INSTEAD = (
     Prank(
-        "commands that are nan, or infinite", only(lambda turn: commands(turn, 1.0, NAN, INF, 0.0)), {"nan_commands": 3}
+        "commands that are NaN or infinite", only(lambda turn: commands(turn, 1.0, NAN, INF, 0.0)), {"nan_commands": 3}
     ),
     Prank(
-        "commands far beyond what the body can do",
+        "commands far beyond the body's limits",
         only(lambda turn: commands(turn, 1.0, 1e300, -1e300, 0.0)),
         {"clipped_commands": 3},
     ),
-    Prank("packets that are too large for the radio", only(lambda turn: packets(turn, 2, 5000)), fates=("too_large",)),
+    Prank("packets larger than the radio's limit", only(lambda turn: packets(turn, 2, 5000)), fates=("too_large",)),
     Prank(
-        "far more packets than the radio's queue takes",
+        "far more packets than fit into the radio's queue",
         only(lambda turn: packets(turn, 300, 20)),
         fates=("queue_full",),
     ),
     Prank(
-        "packets to robots that there are not", only(lambda turn: packets(turn, 4, 6, to=77)), {"packets_to_nobody": 4}
+        "packets to robots that do not exist", only(lambda turn: packets(turn, 4, 6, to=77)), {"packets_to_nobody": 4}
     ),
 )
 """What counts as the answer of its robots; those of others go on as without it."""

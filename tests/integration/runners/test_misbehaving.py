@@ -1,4 +1,4 @@
-"""Runners that misbehave, and runs that wait for runners."""
+"""Misbehaving runners, and runs that wait for runners."""
 
 import re
 import signal
@@ -27,7 +27,7 @@ from tests.support.deploy.joiners import HERE, Joiners
 from tests.support.deploy.runs import LOSSY
 from tests.support.runners import BESIDE, EARLY, INSTEAD, Played, Prank, Says, Turn
 
-PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"
+PAGE = Path(__file__).parents[3] / "docs" / "fault-evidence.md"
 ROW = re.compile(r"^\| (.+?) \| (.*?`.+?) \|", re.M)
 FIRST, EVERY = 6, 2  # the tick of the first prank, and ticks from one to the next: what comes late counts in the second
 
@@ -131,7 +131,7 @@ def test_the_page_lists_each_of_them_with_its_count() -> None:
 
 
 def section() -> str:
-    return PAGE.read_text(encoding="utf-8").split("\n## Runners that misbehave\n")[1].split("\n## ")[0]
+    return PAGE.read_text(encoding="utf-8").split("\n## Misbehaving runners\n")[1].split("\n## ")[0]
 
 
 @pytest.fixture
