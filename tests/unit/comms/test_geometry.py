@@ -38,6 +38,7 @@ DISC = Patch("disc", 1.0, 0.0, 0.2, radius_m=0.5)
 TRIANGLE = Patch("polygon", 1.0, 0.0, 0.4, points_m=((-0.2, -0.2), (0.2, -0.2), (0.0, 0.3)))
 GREY = np.array([[0, 51, 102, 153], [255, 204, 153, 102]], np.uint8)  # each a square metre
 FAR_M = 20.0
+ONE = np.ones(1, np.bool_)  # an arena that runs
 Depth = Callable[[FloatArray, FloatArray], FloatArray]
 ARENAS = (
     (Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), Obstacle("box", 2.0, 0.0, math.pi / 4, size_m=(1.0, 1.0))),
@@ -117,7 +118,7 @@ def test_of_a_grid_all_within_reach_are_in_the_cells_around_also_outside_the_are
 ) -> None:
     random = np.random.default_rng(seed)
     x, y = (random.uniform(-0.75, 0.75, 60) * side for side in (width_m, height_m))  # a third is outside
-    grid = build(x, y, 1, (width_m, height_m), reach_m)
+    grid = build(x, y, (width_m, height_m), reach_m, ONE)
     i, j = cells_of(grid, x, y)
     near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m
     around = (np.abs(i[:, None] - i) <= 1) & (np.abs(j[:, None] - j) <= 1)
@@ -128,7 +129,7 @@ def test_of_a_grid_all_within_reach_are_in_the_cells_around_also_outside_the_are
 def test_points_on_the_lines_between_cells_find_one_another(reach_m: float) -> None:
     x = np.repeat(np.arange(-8, 9) * reach_m / 2, 17)
     y = np.tile(np.arange(-8, 9) * reach_m / 2, 17)
-    grid = build(x, y, 1, (4.0, 4.0), reach_m)
+    grid = build(x, y, (4.0, 4.0), reach_m, ONE)
     i, j = cells_of(grid, x, y)
     near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m * (1.0 - 1e-12)
     assert not np.any(near & ((np.abs(i[:, None] - i) > 1) | (np.abs(j[:, None] - j) > 1)))
@@ -138,7 +139,7 @@ def test_points_on_the_lines_between_cells_find_one_another(reach_m: float) -> N
 def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, are: list[bool], robots: int) -> None:
     random, arenas, running = np.random.default_rng(seed), len(are), np.array(are)
     x, y = random.uniform(-3.0, 3.0, (2, arenas * robots))
-    grid = build(x, y, arenas, (4.0, 3.0), 0.7, None if running.all() else running)
+    grid = build(x, y, (4.0, 3.0), 0.7, running)
     i, j = cells_of(grid, x, y)
     arena = np.arange(arenas * robots) // max(robots, 1)
     cell = (arena * grid.ny + j) * grid.nx + i
@@ -150,7 +151,7 @@ def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, 
 
 
 def test_a_tiny_reach_does_not_make_a_huge_table() -> None:
-    grid = build(np.zeros(1), np.zeros(1), 1, (100.0, 50.0), 1e-6)
+    grid = build(np.zeros(1), np.zeros(1), (100.0, 50.0), 1e-6, ONE)
     assert max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
 
 
