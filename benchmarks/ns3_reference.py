@@ -11,7 +11,7 @@ REFERENCE = Path(__file__).parents[1] / "tests" / "support" / "comms" / "referen
 PRESETS = {"802.15.4": "ieee802154", "802.11a 6 Mbit/s": "wifi-a-6M", "802.11b 1 Mbit/s": "wifi-b-1M"}
 AS_RUN = {  # ns-3 was run without IP and UDP headers, and its 802.15.4 queue has no end
     "ieee802154": ["radio.queue_limit=1000000"],
-    "wifi-a-6M": ["radio.overhead_bytes=36"],
+    "wifi-a-6M": ["radio.overhead_bytes=36", "radio.reception.model=802.11ag-nist"],
     "wifi-b-1M": ["radio.overhead_bytes=36"],
 }
 FAR = ["radio.log_distance.reference_loss_db=46.6777"]  # where nodes stand apart

@@ -145,7 +145,7 @@ def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
 def test_losses_are_those_of_gazebos_formula(name: str, sinr_db: float):
     sinr = 10.0 ** (0.1 * sinr_db)
     found = chunk_success(receiver_for(preset(name)), sinr, 8 * 100)
-    assert found == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, abs=0.01)
+    assert found == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, rel=1e-9)
 
 
 def test_the_simulators_have_their_noise_path_loss_and_reach():

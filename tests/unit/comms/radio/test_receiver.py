@@ -23,14 +23,17 @@ from swarmwire.comms.radio.propagation.decibels import from_db, to_db
 from swarmwire.comms.radio.reception import error_rates
 from swarmwire.comms.radio.reception.error_rates import (
     OFDM_RATES_BPS,
+    PATHS,
     SPECTRA,
     all_right,
     biorthogonal_errors,
     dbpsk_bit_errors,
     dqpsk_bit_errors,
     dsss_success,
-    ofdm_bit_errors,
-    ofdm_success,
+    gazebo_success,
+    nist_bit_errors,
+    nist_success,
+    ofdm_path_errors,
     oqpsk_bit_errors,
     oqpsk_success,
     raw_bit_errors,
@@ -38,9 +41,11 @@ from swarmwire.comms.radio.reception.error_rates import (
 from swarmwire.comms.radio.reception.receiver import (
     MAX_DB,
     MIN_DB,
+    Model,
     by_table,
     by_threshold,
     chunk_success,
+    gazebo,
     ieee80211ag,
     ieee80211b,
     ieee802154,
@@ -57,6 +62,8 @@ BY_BITS = (
     ieee802154(),
     *(ieee80211b(rate_bps) for rate_bps in DSSS_RATES_BPS),
     *(ieee80211ag(rate_bps) for rate_bps in error_rates.OFDM_RATES_BPS),
+    *(ieee80211ag(rate_bps, Model.NIST) for rate_bps in error_rates.OFDM_RATES_BPS),
+    gazebo(),
 )
 MEASURED = SuccessTable((-94.0, -93.0, -90.0), (0.4, 0.6, 0.86), 800)
 getcontext().prec = 40
@@ -197,6 +204,8 @@ def test_what_always_or_never_succeeds_has_its_sensitivity_at_the_ends():
         (Reception("table", table=TABLE), 1, by_table(TABLE)),
         *((Reception("802.11b"), rate_bps, ieee80211b(rate_bps)) for rate_bps in DSSS_RATES_BPS),
         *((Reception("802.11ag"), rate_bps, ieee80211ag(rate_bps)) for rate_bps in error_rates.OFDM_RATES_BPS),
+        (Reception("802.11ag-nist"), 6_000_000, ieee80211ag(6_000_000, Model.NIST)),
+        (Reception("gazebo"), 1, gazebo()),
     ],
 )
 def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bps: int, expected):
@@ -214,6 +223,7 @@ def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bp
         (Reception("table", table=SuccessTable((1.0, 0.0), (0.0, 1.0), 8)), "radio.reception.table.sinr_db"),
         (Reception("802.11b"), "radio.reception.model"),
         (Reception("802.11ag"), "radio.reception.model"),
+        (Reception("802.11ag-nist"), "radio.reception.model"),
     ],
 )
 def test_what_does_not_go_together_is_refused(reception: Reception, key: str):
@@ -248,7 +258,7 @@ def test_raw_errors_by_modulation_are_exact(points: int, sinr: float):
 
 @pytest.mark.parametrize("rate", range(8))
 @pytest.mark.parametrize("sinr_db", [3.0, 6.0, 10.0, 15.0, 20.0, 24.0])
-def test_the_errors_of_802_11ag_are_the_union_bound(rate: int, sinr_db: float):
+def test_the_hard_decisions_of_802_11ag_have_chernoffs_bound(rate: int, sinr_db: float):
     sinr = from_db(sinr_db)
     points = (2, 2, 4, 4, 16, 16, 64, 64)[rate]
     raw = {
@@ -261,7 +271,7 @@ def test_the_errors_of_802_11ag_are_the_union_bound(rate: int, sinr_db: float):
     d = Fraction(float(np.sqrt(4.0 * raw * (1.0 - raw))))
     bound = Fraction(factor).limit_denominator(6) * sum(w * d ** (first + i * step) for i, w in enumerate(weights))
     # Errors of erfc count up to 26-fold.
-    assert ofdm_bit_errors(rate, sinr) == pytest.approx(min(float(bound), 1.0), rel=EXACT, abs=1e-300)
+    assert nist_bit_errors(rate, sinr) == pytest.approx(min(float(bound), 1.0), rel=EXACT, abs=1e-300)
 
 
 @pytest.mark.parametrize(
@@ -294,13 +304,68 @@ def test_the_errors_of_802_11ag_are_the_union_bound(rate: int, sinr_db: float):
         (54, 23.0, 0.958, 1e-3),
     ],
 )
-def test_frames_of_802_11ag_survive_as_in_ns3(rate_mbps: int, sinr_db: float, stated: float, tolerance: float):
+def test_frames_of_802_11ag_survive_hard_decisions_as_in_ns3(
+    rate_mbps: int, sinr_db: float, stated: float, tolerance: float
+):
     rate = OFDM_RATES_BPS.index(rate_mbps * 1_000_000)
-    assert ofdm_success(rate, from_db(sinr_db), FRAME_BITS) == pytest.approx(stated, abs=tolerance)
+    assert nist_success(rate, from_db(sinr_db), FRAME_BITS) == pytest.approx(stated, abs=tolerance)
 
 
 def test_two_milliseconds_of_the_lowest_ht_rate_survive_as_in_ns3():
-    assert ofdm_success(0, from_db(4.0), 13_000) == pytest.approx(0.905685, abs=1e-6)
+    assert nist_success(0, from_db(4.0), 13_000) == pytest.approx(0.905685, abs=1e-6)
+
+
+KEPT = {1: [(1, 1)], 2: [(1, 1), (1, 0)], 3: [(1, 1), (1, 0), (0, 1)]}  # output bits by bit in, of R = 1/2, 2/3, 3/4
+
+
+@pytest.mark.parametrize("code", range(3))
+def test_the_paths_of_the_punctured_codes_are_those_of_its_trellis(code: int):
+    """Every path that leaves the state 0 and comes back, by the weight of its output; generators 133 and 171."""
+    period, stated = PATHS[code]
+    first, step, _, weights = SPECTRA[code]
+    highest = first + step * (len(stated) - 1)
+    found, bit_weights = np.zeros(highest + 1), np.zeros(highest + 1)
+    for start in range(period):
+        paths, errors = np.zeros((64, highest + 1)), np.zeros((64, highest + 1))
+        phase, paths[0, 0] = start, 1.0
+        while paths.any():
+            next_paths, next_errors = np.zeros_like(paths), np.zeros_like(errors)
+            for state in np.flatnonzero(paths.any(axis=1)):
+                for bit in (0, 1):
+                    if state == 0 and bit == 0:
+                        continue
+                    register = bit << 6 | int(state)
+                    outputs = zip((0o133, 0o171), KEPT[period][phase], strict=True)
+                    weight = sum((register & generator).bit_count() % 2 for generator, kept in outputs if kept)
+                    room = slice(weight, highest + 1), slice(0, highest + 1 - weight)
+                    next_paths[register >> 1, room[0]] += paths[state, room[1]]
+                    next_errors[register >> 1, room[0]] += errors[state, room[1]] + bit * paths[state, room[1]]
+            found, bit_weights = found + next_paths[0], bit_weights + next_errors[0]
+            next_paths[0] = next_errors[0] = 0.0
+            paths, errors, phase = next_paths, next_errors, (phase + 1) % period
+    assert found[first::step].tolist() == list(stated)
+    assert bit_weights[first : first + 5 * step : step].tolist() == list(weights[:5])
+
+
+@pytest.mark.parametrize("sinr_db", [-2.0, 0.0, 1.0, 3.0])
+def test_the_soft_decisions_of_bpsk_have_the_union_bound_of_q_functions(sinr_db: float):
+    """6 Mbit/s: a path of weight d wins with Q(sqrt(2 d SINR))."""
+    weights = 10 + 2 * np.arange(len(PATHS[0][1]))
+    bound = float(np.sum(np.array(PATHS[0][1]) * special.ndtr(-np.sqrt(2.0 * weights * from_db(sinr_db)))))
+    assert ofdm_path_errors(0, from_db(sinr_db)) == pytest.approx(min(bound, 1.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", range(8))
+def test_soft_decisions_gain_three_to_five_decibels_over_hard_ones(rate: int):
+    """At 90 % of 1458 octets; 3 dB of those that the bits lose, and what Chernoff's bound adds."""
+    soft, hard = ieee80211ag(OFDM_RATES_BPS[rate]), ieee80211ag(OFDM_RATES_BPS[rate], Model.NIST)
+    assert 3.0 < sinr_for_db(hard, 0.9, 8 * 1458) - sinr_for_db(soft, 0.9, 8 * 1458) < 4.6
+
+
+@pytest.mark.parametrize("sinr_db", [-20.0, 0.0, 3.25, 7.0])
+def test_gazebos_bytes_are_lost_by_its_formula(sinr_db: float):
+    expected = (1.0 - special.erfc(math.sqrt(from_db(sinr_db)))) ** 100
+    assert gazebo_success(from_db(sinr_db), 800) == pytest.approx(expected, rel=1e-12)
 
 
 @given(st.floats(-20.0, 15.0))

@@ -120,7 +120,11 @@ def _or(own: FloatArray, otherwise: float) -> FloatArray:
     return np.where(np.isnan(own), otherwise, own)
 
 
-RATES_BPS = {"802.11b": DSSS_RATES_BPS, "802.11ag": tuple(OFDM_BITS_PER_SYMBOL)}
+RATES_BPS = {
+    "802.11b": DSSS_RATES_BPS,
+    "802.11ag": tuple(OFDM_BITS_PER_SYMBOL),
+    "802.11ag-nist": tuple(OFDM_BITS_PER_SYMBOL),
+}
 
 
 @dataclass(frozen=True)
@@ -149,7 +153,7 @@ class Reception:
     model: str = parameter(
         "802.15.4",
         help="what turns the ratio of signal to interference and noise into success",
-        choices=("threshold", "table", "802.15.4", "802.11b", "802.11ag"),
+        choices=("threshold", "table", "802.15.4", "802.11b", "802.11ag", "802.11ag-nist", "gazebo"),
     )
     min_sinr_db: float = parameter(
         6.0, help="of threshold: the ratio that a frame needs", unit="dB", at_least=-100, at_most=100

@@ -4,7 +4,7 @@ A preset fills in keys that the scenario leaves out; the scenario wins key by ke
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any, NamedTuple, cast
 
@@ -18,10 +18,10 @@ class Preset(NamedTuple):
     otherwise: str = ""  # where it is other than what it is named after
 
 
-# Success tables of modulations that have no receiver of their own here, as a scenario writes them.
+# The success table of a modulation that has no receiver of its own here, as a scenario writes it.
 
 
-STEP_DB = 0.5
+STEP_DB, MAX_FSK_DB = 0.5, 18.0
 DIGITS = 9  # a bit in a billion more or less is none in a frame
 
 
@@ -30,19 +30,9 @@ def fsk_success() -> dict[str, Any]:
 
     GFSK with Bluetooth's deviation is no better; a bit a symbol in a bandwidth of the bit rate, so that SINR is Eb/N0.
     """
-    return _table(0.0, 18.0, 1, lambda sinr: 1.0 - 0.5 * math.exp(-0.5 * sinr))
-
-
-def qpsk_success_of_bytes() -> dict[str, Any]:
-    """A byte as the simulators gz and SubT have it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
-    return _table(-10.0, 15.0, 8, lambda sinr: 1.0 - math.erfc(math.sqrt(sinr)))
-
-
-def _table(least_db: float, most_db: float, bits: int, success: Callable[[float], float]) -> dict[str, Any]:
-    rows = round((most_db - least_db) / STEP_DB) + 1
-    sinr_db = [least_db + STEP_DB * row for row in range(rows)]
-    found = [round(success(10.0 ** (0.1 * db)), DIGITS) for db in sinr_db]
-    return {"sinr_db": sinr_db, "success": found, "frame_bits": bits}
+    sinr_db = [STEP_DB * row for row in range(round(MAX_FSK_DB / STEP_DB) + 1)]
+    success = [round(1.0 - 0.5 * math.exp(-0.5 * 10.0 ** (0.1 * db)), DIGITS) for db in sinr_db]
+    return {"sinr_db": sinr_db, "success": success, "frame_bits": 1}
 
 
 # Presets that reach to a fixed distance: textbooks' models, and the range and bearing of simulated robots.
@@ -106,7 +96,7 @@ _GAZEBO: dict[str, Any] = {
     "max_payload_bytes": 1500,
     "shadowing": {"deviation_db": 10.0, "correlation_m": 1.0},
     "noise": {"bandwidth_hz": 20e6, "figure_db": 10.965},  # -90 dBm
-    "reception": {"model": "table", "table": qpsk_success_of_bytes(), "preamble_sinr_db": -10.0},
+    "reception": {"model": "gazebo", "preamble_sinr_db": -10.0},
     "access": {"method": "none"},
 }
 _SPREAD_AND_RATE = (

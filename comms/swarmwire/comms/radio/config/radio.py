@@ -242,7 +242,8 @@ def eifs_acknowledgement_ns(radio: Radio) -> int:
 
 OF_SIGNALS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
 OF_MODELS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
-RECEPTIONS = {"802.11a": "802.11ag", "802.11b": "802.11b", "802.11g": "802.11ag"}  # beside threshold and table
+OFDM_MODELS = ("802.11ag", "802.11ag-nist")
+RECEPTIONS = {"802.11a": OFDM_MODELS, "802.11b": ("802.11b",), "802.11g": OFDM_MODELS}  # beside threshold and table
 RATES_BPS = {
     "802.11a": tuple(OFDM_BITS_PER_SYMBOL),
     "802.11b": DSSS_RATES_BPS,
@@ -316,7 +317,7 @@ def _check_fits(radio: Radio, where: str) -> None:
     for name in ("cca_sensitivity_dbm", "cca_time_s"):
         if getattr(access, name) is not None and access.method != "dcf":
             raise BadInput(where, f"radio.access.{name}", f'expected method dcf with it, got "{access.method}"')
-    fits = ("threshold", "table", RECEPTIONS.get(radio.frame, reception.model))
+    fits = ("threshold", "table", *RECEPTIONS.get(radio.frame, (reception.model,)))
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"
         raise BadInput(where, "radio.reception.model", expected)

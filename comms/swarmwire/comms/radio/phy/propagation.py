@@ -21,7 +21,12 @@ from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sens
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
 # Data sheets state the sensitivity at this frame success rate and frame size in bytes (see `sensitivity_dbm`).
-DATA_SHEET_SENSITIVITY = {"802.15.4": (0.99, 26), "802.11b": (0.92, 1024), "802.11ag": (0.9, 1000)}
+DATA_SHEET_SENSITIVITY = {
+    "802.15.4": (0.99, 26),
+    "802.11b": (0.92, 1024),
+    "802.11ag": (0.9, 1000),
+    "802.11ag-nist": (0.9, 1000),
+}
 
 
 def receiver_for(radio: Radio) -> Receiver:

@@ -17,6 +17,8 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import (
     OFDM_RATES_BPS,
     dsss_success,
+    gazebo_success,
+    nist_success,
     ofdm_success,
     oqpsk_success,
     table_success,
@@ -32,7 +34,9 @@ class Model(IntEnum):
     TABLE = 1  # measured
     OQPSK = 2  # IEEE 802.15.4, 2.4 GHz
     DSSS = 3  # IEEE 802.11b
-    OFDM = 4  # IEEE 802.11a/g
+    OFDM = 4  # IEEE 802.11a/g, soft decisions
+    NIST = 5  # IEEE 802.11a/g, hard decisions
+    GAZEBO = 6  # gz-sim's RFComms
 
 
 class Receiver(NamedTuple):
@@ -47,7 +51,8 @@ class Receiver(NamedTuple):
 
 
 _NO_ROWS = np.empty(0)
-_THRESHOLD, _TABLE, _OQPSK, _DSSS = int(Model.THRESHOLD), int(Model.TABLE), int(Model.OQPSK), int(Model.DSSS)
+_THRESHOLD, _TABLE, _OQPSK, _DSSS, _OFDM, _NIST, _GAZEBO = map(int, Model)
+OFDM_MODELS = {"802.11ag": Model.OFDM, "802.11ag-nist": Model.NIST}  # by name in scenarios
 MIN_DB, MAX_DB = -60.0, 100.0  # bounds of `sinr_for_db`
 HALVINGS = 60
 
@@ -73,9 +78,14 @@ def ieee80211b(rate_bps: int) -> Receiver:
     return Receiver(_DSSS, DSSS_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
-def ieee80211ag(rate_bps: int) -> Receiver:
-    """A receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS; ValueError at any other."""
-    return Receiver(int(Model.OFDM), OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+def ieee80211ag(rate_bps: int, model: Model = Model.OFDM) -> Receiver:
+    """A receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS, by OFDM or NIST; ValueError at any other rate."""
+    return Receiver(int(model), OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+
+
+def gazebo() -> Receiver:
+    """A receiver of gz-sim's RFComms."""
+    return Receiver(_GAZEBO, 0, 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
@@ -86,7 +96,9 @@ def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
         return by_table(reception.table)
     if reception.model == "802.11b":
         return ieee80211b(bit_rate_bps)
-    return ieee80211ag(bit_rate_bps) if reception.model == "802.11ag" else ieee802154()
+    if reception.model in OFDM_MODELS:
+        return ieee80211ag(bit_rate_bps, OFDM_MODELS[reception.model])
+    return gazebo() if reception.model == "gazebo" else ieee802154()
 
 
 @njit()
@@ -100,6 +112,10 @@ def chunk_success(receiver, sinr, bits):
         return oqpsk_success(sinr, bits)
     if receiver.model == _DSSS:
         return dsss_success(receiver.rate, sinr, bits)
+    if receiver.model == _GAZEBO:
+        return gazebo_success(sinr, bits)
+    if receiver.model == _NIST:
+        return nist_success(receiver.rate, sinr, bits)
     return ofdm_success(receiver.rate, sinr, bits)
 
 
