@@ -3,8 +3,8 @@
 import json
 import os
 import re
+import shlex
 import shutil
-import subprocess
 import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -16,9 +16,10 @@ from swarmwire.deploy import run
 from tests.docs.pages import ROOT, commands_of
 from tests.docs.test_pages import UV
 from tests.support.deploy.machines import Machine, Started, machines
-from tests.support.deploy.runs import LOSSY
+from tests.support.deploy.runs import LOSSY, called
 
 PAGE = "docs/machines.md"
+CERTIFICATES = "docs/security.md"  # whose commands make the certificates of the machines
 NAMES = ("lab", "gate", "laptop")
 
 
@@ -62,10 +63,11 @@ def page() -> str:
     return (ROOT / PAGE).read_text(encoding="utf-8")
 
 
-def test_the_machines_do_what_the_page_shows(page, tmp_path):
+def test_the_machines_do_what_the_page_shows(page, tmp_path, monkeypatch, capsys):
     with machines(3) as line, ExitStack() as opened:
         on: dict[str, Machine] = dict(zip(NAMES, line, strict=True))
-        certs = certificates(new_folder(tmp_path / "ca"))
+        with monkeypatch.context() as there:
+            certs = certificates(tmp_path, there, capsys)
         folders = {name: new_folder(tmp_path / name) for name in NAMES}
         for name, files in table_of(page).items():
             (folders[name] / "certs").mkdir()
@@ -88,11 +90,13 @@ def test_the_machines_do_what_the_page_shows(page, tmp_path):
     assert told["trajectory_sha256"] == list(run(LOSSY, overrides=["duration_s=20"]).trajectory_sha256)
 
 
-def certificates(folder: Path) -> Path:
-    """The CA that the page's own commands make."""
-    for command in commands_of(PAGE):
-        done = subprocess.run(shell(command.line, folder), capture_output=True, text=True, check=False, timeout=60)
-        assert done.returncode == 0, done.stderr
+def certificates(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
+    """The CA that the commands of the page about security make, in this process: each program would take seconds."""
+    shutil.copytree(ROOT / "examples" / "fleet", folder / "examples" / "fleet")
+    monkeypatch.chdir(folder)
+    for command in commands_of(CERTIFICATES):
+        code, _, errors = called(monkeypatch, capsys, *shlex.split(command.line.removeprefix("uv run "))[1:])
+        assert code == 0, errors
     return folder / "lab-ca"
 
 
