@@ -51,9 +51,11 @@ class Case:
 
 CASES = {
     # Shadowing brings more into range than path loss alone would: 25 by path loss are 30 on average, border included.
-    "radio-802154-1000": Case("ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED)),
+    "radio-802154-1000": Case(
+        "ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", "radio.cut_off_db=10", *SHADOWED)
+    ),
     "radio-802154-1000-threads": Case(
-        "ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", *SHADOWED), threads=2
+        "ieee802154", 1000, 25, 20, ("radio.antenna.power_dbm=-20", "radio.cut_off_db=10", *SHADOWED), threads=2
     ),
     "radio-disk-1000": Case("unit-disk", 1000, 9.5, 20, ("radio.range_m=1.7",)),
     "radio-wifi-80": Case("wifi-a-6M", 80, 600, 128),

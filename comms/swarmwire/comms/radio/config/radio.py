@@ -114,7 +114,7 @@ class Radio:
         at_most=1,
     )
     cut_off_db: float = parameter(
-        10.0,
+        15.0,
         help="of signals: a robot with a mean strength so far below noise and sensitivity neither hears nor disturbs; "
         "less is faster",
         unit="dB",
