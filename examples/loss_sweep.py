@@ -17,7 +17,7 @@ LOSSES = (0.0, 0.3, 0.6, 0.9)
 
 
 def table(scenario: Path, seeds: int, duration_s: float) -> pl.DataFrame:
-    """A row per loss and seed: the delivery ratio and the order at the end."""
+    """A row per loss and seed: the link PDR (received / receivers in range) and the order at the end."""
     rows: list[dict[str, float | int | None]] = []
     for loss in LOSSES:
         overrides = [f"radio.loss={loss}", f"duration_s={duration_s}"]

@@ -108,7 +108,7 @@ def _write_viewer(run: Path, to: Path, options: ExportOptions) -> str:
 ARENA = Exporter(
     "arena", "the arena at one time", PICTURE_SUFFIXES, frozenset({"at_s", "arena", "metrics", "size_px"}), _write_arena
 )
-DELIVERY_HELP = "the share of receivers that received, over distance"
+DELIVERY_HELP = "the PDR (received / intended receivers) over distance"
 DELIVERY = Exporter("delivery", DELIVERY_HELP, PICTURE_SUFFIXES, frozenset({"arena", "size_px"}), _write_delivery)
 VIEWER_HELP = "the recording as rerun's viewer shows it; needs a Vulkan driver"
 VIEWER = Exporter("viewer", VIEWER_HELP, (".png",), frozenset({"at_s"}), _write_viewer)

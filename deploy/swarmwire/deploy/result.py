@@ -47,7 +47,7 @@ class RadioResult:
     in_range: int  # of these, receivers in range
     fates: dict[str, int]  # receivers; they add up to `intended`
     pdr: float | None  # packet delivery ratio: received / intended; None without intended receivers
-    link_pdr: float | None  # delivery ratio of links: received / in_range; None if no receiver was in range
+    link_pdr: float | None  # PDR of links: received / in_range; None if no receiver was in range
     latency_air_s: Percentiles  # from sending to hearing
     latency_agent_s: Percentiles  # from sending to the tick at which the receiver could act
 

@@ -22,7 +22,7 @@ RADIO_HELP = {
     "intended": ("", "receivers that packets were meant for"),
     "in_range": ("", "of these, receivers in range"),
     "pdr": ("", "packet delivery ratio: received / intended"),
-    "link_pdr": ("", "delivery ratio of links: received / in range"),
+    "link_pdr": ("", "PDR of links: received / in range"),
 }
 PERCENTILES = ("p50", "p90", "p99")
 LATENCY_HELP = {

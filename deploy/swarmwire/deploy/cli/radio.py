@@ -168,7 +168,7 @@ def probe_command(
     """Probe a radio without a run: coverage, delivery over distance, contention.
 
     A scenario: the strength over its arena from one place, and the delivery of lone packets over distance, as walls and
-    shadowing make it; without robots in between. A preset: delivery ratio and mean delay among nodes in one spot that
+    shadowing make it; without robots in between. A preset: PDR and mean delay among nodes in one spot that
     all broadcast, as JSON. For example:
 
       swarmwire radio probe scenarios/flocking-802154.toml --to coverage.png

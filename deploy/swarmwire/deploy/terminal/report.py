@@ -143,14 +143,13 @@ def _longer(result: Result, factor: float) -> str:
 def _radio_rows(radio: RadioResult) -> Iterator[tuple[str, str]]:
     # Who has an obstacle in between is not in range, or a rock in the way would look like a bad radio.
     where = "in range and sight" if radio.fates[BLOCKED] else "in range"
-    receivers = f"{radio.intended} intended receivers{_ratio('pdr', radio.pdr)}"
-    yield "packets", f"{radio.sent} sent, {receivers}, {radio.in_range} {where}{_ratio('link_pdr', radio.link_pdr)}"
+    yield "packets", f"{radio.sent} sent, {radio.intended} intended receivers, {radio.in_range} {where}"
+    if radio.pdr is not None:
+        yield "pdr", f"{radio.pdr:.1%} (received / intended)"
+    if radio.link_pdr is not None:
+        yield "link_pdr", f"{radio.link_pdr:.1%} (received / in range)"
     yield "fates", ", ".join(f"{name} {count}" for name, count in radio.fates.items() if count)
     yield "latency", f"on air {_percentiles(radio.latency_air_s)}; to the agent {_percentiles(radio.latency_agent_s)}"
-
-
-def _ratio(name: str, ratio: float | None) -> str:
-    return "" if ratio is None else f" ({name} {ratio:.1%})"
 
 
 def _percentiles(value: Percentiles) -> str:

@@ -61,8 +61,8 @@ class Comparison:
 def compare(first: Selection, second: Selection, responses: Sequence[str] = (), level: float = LEVEL) -> Comparison:
     """Compares the named responses at points that agree in what both vary.
 
-    Unless any is named: times, the last values of metrics and the delivery ratio, where either has a value. BadInput if
-    the two have no such response or no point in common.
+    Unless any is named: times, the last values of metrics and the link PDR, where either has a value. BadInput if the
+    two have no such response or no point in common.
     """
     pairs = point_pairs(first, second)
     rows = [

@@ -27,7 +27,7 @@ FAILED = "failed"  # in the column `ended`
 SERIES = "series"  # what the metrics were in every tick
 SCENARIO_FOLDER = "scenario"  # from what the runs are made
 FINAL = ".final"  # how columns end that hold the last value of a metric, which its bare name means
-LINK_PDR = "radio.link_pdr"  # the column of the delivery ratio of links
+LINK_PDR = "radio.link_pdr"  # the column of received / receivers in range
 ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3
 WRITTEN = "expected what swarmwire writes at the start of a campaign"
 

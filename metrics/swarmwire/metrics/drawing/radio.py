@@ -1,4 +1,4 @@
-"""Pictures of a radio: the delivery ratio of a run over distance, and the coverage of a scenario's radio."""
+"""Pictures of a radio: the PDR of a run over distance, and the coverage of a scenario's radio."""
 
 from pathlib import Path
 from typing import Any

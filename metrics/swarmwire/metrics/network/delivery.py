@@ -1,4 +1,4 @@
-"""Delivery of packets: delivery ratios over a window of ticks, throughput and airtime."""
+"""Delivery of packets: PDR and link PDR over a window of ticks, throughput and airtime."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -106,7 +106,7 @@ class LinkPacketDeliveryRatio(_DeliveryRatio):
     """
 
     name = "link_pdr"
-    help = "delivery ratio of links: received / in range, of the fates that became final in the last window_s"
+    help = "PDR of links: received / receivers in range, of the fates that became final in the last window_s"
     bounds = (0.0, 1.0)
 
     def _receivers(self, tally: PacketCounts) -> IntArray:

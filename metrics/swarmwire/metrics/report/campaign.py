@@ -79,7 +79,7 @@ class ChosenResponses:
 
 
 def choose_responses(samples: Samples, names: Sequence[str]) -> ChosenResponses:
-    """The responses of these names; without names at most MOST: times, then final values and the delivery ratio.
+    """The responses of these names; without names at most MOST: times, then final values and the link PDR.
 
     BadInput for an unknown name.
     """

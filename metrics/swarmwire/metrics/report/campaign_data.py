@@ -26,11 +26,11 @@ _ENDINGS = {
     "max": ", greatest in the run",
 }
 _KNOWN = {
-    "radio.pdr": "delivery ratio (PDR), of intended receivers",
-    "radio.link_pdr": "delivery ratio of links (link PDR)",
+    "radio.pdr": "PDR: received / intended",
+    "radio.link_pdr": "link PDR: received / in range",
     "stop_time_s": "time until it stopped in s",
     "radio.sent": "packets sent",
-    "radio.intended": "receivers meant",
+    "radio.intended": "intended receivers",
     "radio.in_range": "receivers in range",
 }
 _DIGITS = 3  # of a number whose spread is not known

@@ -1,4 +1,4 @@
-"""The delivery ratio of each link: a matrix, or a histogram where there are many."""
+"""The PDR of each link: a matrix, or a histogram where there are many."""
 
 from typing import Any
 
@@ -99,16 +99,14 @@ def links(run: RunData) -> Figure | str:
         return "Delivery by link: nobody was in range of anybody."
     link_pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MAX_SQUARES:
-        caption = (
-            "Delivery ratio of each link: received, of the packets on air while the receiver was in range and sight."
-        )
+        caption = "link_pdr of each link: received / in range (and sight), of packets that went on air."
         return Figure(NAME, as_svg(link_matrix(run.static, link_pdr), NAME), caption)
     busy = link_pdr[in_range >= MIN_PACKETS]
     if not len(busy):
         return f"Delivery by link: no link had {MIN_PACKETS} packets in range."
     caption = (
-        f"Delivery ratios of the {counted(len(busy), 'link')} with at least {MIN_PACKETS} packets in range; "
-        f"the dashed line is their median, {share(float(np.median(busy)))}."
+        f"link_pdr (received / in range) of the {counted(len(busy), 'link')} with at least {MIN_PACKETS} packets in "
+        f"range; the dashed line is their median, {share(float(np.median(busy)))}."
     )
     return Figure(NAME, as_svg(link_histogram(busy), NAME), caption)
 

@@ -76,8 +76,8 @@ def distances(run: RunData) -> Figure | str:
     if not len(shown):
         return "Delivery over distance: no packet went on air."
     caption = (
-        "Delivery ratio over distance: of all robots that packets on air were meant for, however far, the share that "
-        "received. Bars are 95 % intervals (Wilson), receivers taken as independent."
+        "pdr (received / intended) over distance: of all robots that packets on air were meant for, however far, the "
+        "share that received. Bars are 95 % intervals (Wilson), receivers taken as independent."
     )
     every = run.record("radio_distances").get("every", 1)
     if every > 1:
@@ -191,9 +191,11 @@ def _again(run: RunData) -> str:
 def _account(radio: dict[str, Any], arenas: int) -> str:
     sent, intended, in_range = radio["sent"], radio["intended"], radio["in_range"]
     where = "In the first arena " if arenas > 1 else ""
-    reached = f"meant for {intended:,} receivers{_ratio('pdr', radio['pdr'])}, of which {in_range:,} were in range"
-    return f"{where}{sent:,} packets were sent, {reached}{_ratio('link_pdr', radio['link_pdr'])}."
+    pdr = _ratio("pdr = received / intended", radio["pdr"])
+    link_pdr = _ratio("link_pdr = received / in range", radio["link_pdr"])
+    receivers = f"{intended:,} intended receivers{pdr}, of which {in_range:,} were in range{link_pdr}"
+    return f"{where}{sent:,} packets were sent to {receivers}."
 
 
 def _ratio(name: str, ratio: float | None) -> str:
-    return "" if ratio is None else f" ({name} {share(ratio)})"
+    return "" if ratio is None else f" ({name} = {share(ratio)})"

@@ -1,4 +1,4 @@
-"""The table `radio_distances`: the delivery ratio over distance, a row per bin."""
+"""The table `radio_distances`: the PDR (received / intended) over distance, a row per bin."""
 
 import math
 from collections.abc import Mapping

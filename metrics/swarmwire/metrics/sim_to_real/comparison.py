@@ -229,9 +229,9 @@ def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
 
 
 def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> Iterator[RadioValue]:
-    """Traffic, delivery ratio and latencies over this time: to the agent, where logs have no others.
+    """Traffic, PDR and latencies over this time: to the agent, where logs have no others.
 
-    The delivery ratio is of all intended receivers, in range or not. Runs that are longer have what their counts of
+    The PDR is received / intended receivers, in range or not. Runs that are longer have what their counts of
     each tick tell; none has anything if the log is longer.
     """
     fits = duration_s >= WHOLE * log.duration_s
@@ -284,7 +284,7 @@ def _latencies(name: str, kind: str, text: str) -> tuple[_Number, ...]:
 
 _TRAFFIC: tuple[_Number, ...] = (
     ("packets sent", "1/s", "by each robot", _sent),
-    ("total pdr", "", "received / intended receivers, of all packets", _pdr),
+    ("total pdr", "", "received / intended receivers, of all packets that ended", _pdr),
 )
 _ON_AIR = _latencies("latency", "latency_air_s", "from sending to hearing")
 _TO_AGENT = _latencies("latency to agent", "latency_agent_s", "from sending to the agent's next step")

@@ -61,17 +61,20 @@ def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     assert radio is not None
     fates = dict.fromkeys(FATE_NAMES, 0) | {"received": 60, "lost": 20, "out_of_range": 10}
     told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.6, link_pdr=0.75, fates=fates)
-    assert (
-        row(shown(result, radio=told), "packets")
-        == "10 sent, 100 intended receivers (pdr 60.0%), 80 in range (link_pdr 75.0%)"
-    )
+    text = shown(result, radio=told)
+    assert row(text, "packets") == "10 sent, 100 intended receivers, 80 in range"
+    assert row(text, "pdr") == "60.0% (received / intended)"
+    assert row(text, "link_pdr") == "75.0% (received / in range)"
     told = replace(told, fates=fates | {"blocked": 10})
-    assert row(shown(result, radio=told), "packets").endswith("80 in range and sight (link_pdr 75.0%)")
+    assert row(shown(result, radio=told), "packets").endswith("80 in range and sight")
 
 
 def test_where_nobody_was_in_range_there_is_no_share(result):
     told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=0.0, link_pdr=None)
-    assert row(shown(result, radio=told), "packets") == "1 sent, 19 intended receivers (pdr 0.0%), 0 in range"
+    text = shown(result, radio=told)
+    assert row(text, "packets") == "1 sent, 19 intended receivers, 0 in range"
+    assert row(text, "pdr") == "0.0% (received / intended)"
+    assert "link_pdr" not in text
 
 
 def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_not(result):
