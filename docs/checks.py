@@ -152,7 +152,7 @@ def robot_bytes() -> Problems:
     rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
     told: list[tuple[str, int]] = []
     for text, size in zip(
-        _text("docs/epuck2.md").split("## An answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True
+        _text("docs/epuck2.md").split("## Answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True
     ):
         place = 0
         told = [(kind, int(count or 1)) for _, _, count, kind in rows.findall(text)]
