@@ -151,9 +151,7 @@ def robot_bytes() -> Problems:
     """The tables of the bytes that an e-puck2 takes and gives add up to the packets."""
     rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
     told: list[tuple[str, int]] = []
-    for text, size in zip(
-        _text("docs/epuck2.md").split("## Answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True
-    ):
+    for text, size in zip(_text("docs/epuck2.md").split("## Answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True):
         place = 0
         told = [(kind, int(count or 1)) for _, _, count, kind in rows.findall(text)]
         for (first, last, _, _), (kind, count) in zip(rows.findall(text), told, strict=True):
