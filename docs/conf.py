@@ -1,21 +1,28 @@
 """How Sphinx builds the site: `make docs`. The reference is made from the code at each build; none of it is kept."""
 
 import sys
+import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]  # the tables, and the list of what is public
 
 project = "swarmwire"
+release = version = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads
-extensions = ["myst_parser", "sphinx.ext.autodoc", "reference"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design", "reference"]
 exclude_patterns = ["_build", "_ext"]
 
 html_theme = "furo"
-html_title = "swarmwire"
+html_title = f"swarmwire {release}"
+html_static_path = ["_static"]
+html_favicon = "_static/favicon.svg"
 html_show_sphinx = False
 html_copy_source = False
 
+copybutton_prompt_text = "$ "  # of a console block only its commands are copied, without output
+
+myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 myst_disable_syntax = ["html_inline"]  # help texts say <seed> and mean it
 smartquotes = False  # --set and "none" stay as they are typed
