@@ -11,21 +11,24 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 (`digest_of`) and the fields of the tuples that it is given.
 
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
-`_source_stamp`, `_index_key`, `_compile_for_args`, `ensure_blas`. So pyproject.toml pins numba's minor version, and
-`tests/unit/comms/test_draws.py` fails when one of them is not as it was.
+`_cache_path`, `_source_stamp`, `_index_key`, `_compile_for_args`, `ensure_blas`. So pyproject.toml pins numba's minor
+version, and `tests/unit/comms/test_draws.py` fails when one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from enum import Enum
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, NoReturn, TypeVar, cast
 
@@ -109,16 +112,36 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code for a signature; None if there is none, or none that is up to date."""
         self._stamp()
-        try:
-            return super().load_overload(sig, target_context)
-        except (AttributeError, ImportError):  # it names a class that was renamed or moved
-            self.flush()
-            return None
+        with self._locked():
+            try:
+                return super().load_overload(sig, target_context)
+            except (AttributeError, ImportError):  # it names a class that was renamed or moved
+                self.flush()
+                return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the machine code of a signature."""
         self._stamp()
-        super().save_overload(sig, data)
+        with self._locked():
+            super().save_overload(sig, data)
+
+    @contextmanager
+    def _locked(self) -> Generator[None]:
+        """Keep other processes out of the folder.
+
+        numba writes the index before the code that it names: another process would run the code of an earlier version
+        that still has this name, or that of another signature.
+        """
+        folder = Path(self._cache_path)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = (folder / "kernels.lock").open("ab")
+        except OSError:  # nothing can be kept there
+            yield
+            return
+        with lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
 
     def _stamp(self) -> None:
         """Take what the function uses into the stamp: only now, since all of its module is there when it is called."""

@@ -1,5 +1,6 @@
 """Keyed random draws, and kernels."""
 
+import fcntl
 import importlib
 import sys
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba.core.caching import IndexDataCacheFile
 from scipy import stats
 
 from swarmwire.comms import draws, draws_compiled
@@ -248,6 +250,22 @@ def test_a_change_elsewhere_is_noticed(modules, old, new, expected):
     assert modules.imported().plain(1.0) == 113.0
     modules.other = OTHER.replace(old, new)
     assert modules.imported().plain(1.0) == expected
+
+
+@needs_compiler
+def test_other_processes_are_kept_out_between_an_index_and_its_code(modules, monkeypatch, tmp_path):
+    written, write = [], IndexDataCacheFile._save_data
+
+    def kept_out(file, name, data):
+        for lock in tmp_path.rglob("*.lock"):
+            with lock.open("ab") as other, pytest.raises(BlockingIOError):
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            written.append(name)
+        write(file, name, data)
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", kept_out)
+    assert modules.imported().plain(1.0) == 113.0
+    assert written
 
 
 @needs_compiler
