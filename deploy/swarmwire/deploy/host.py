@@ -24,6 +24,7 @@ KERNEL_CACHE = "NUMBA_CACHE_DIR"
 CODE = Path(__file__).parent
 COMPILE = "numba:compile"  # numba's event, which it does not raise for kernels that it finds compiled
 COMPILING_S = 2.0  # of compiling, before people are told of it
+COMPILING_AGAIN_S = 10.0  # from one line to the next
 COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of mallopt, as in glibc's malloc.h
@@ -68,39 +69,51 @@ def keep_kernels() -> None:
 
 
 @contextmanager
-def compiling_told(console: "Console", after_s: float = COMPILING_S) -> Generator[None]:
-    """Print a line, once, if kernels are compiled within the context for so long."""
+def compiling_told(
+    console: "Console", after_s: float = COMPILING_S, again_s: float = COMPILING_AGAIN_S
+) -> Generator[None]:
+    """Print a line if kernels are compiled within the context for so long, then how many so far each `again_s`."""
     from numba.core import event
 
     from swarmwire.comms.clock import WallClock, to_s
 
     class Compiling(event.Listener):
         depth = 0  # compiling one kernel compiles those that it calls
-        left_s = after_s
+        kernels = 0
+        left_s = after_s  # of compiling, before the next line
         told = False
 
         def on_start(self, event: event.Event) -> None:
-            self.depth += 1
-            if self.depth == 1 and not self.told:
-                self.began_ns = clock.now_ns()
-                self.timer = threading.Timer(self.left_s, self.tell)
-                self.timer.start()
+            with lock:
+                self.depth, self.kernels = self.depth + 1, self.kernels + 1
+                if self.depth == 1:
+                    self.wait()
 
         def on_end(self, event: event.Event) -> None:
-            self.depth -= 1
-            if self.depth == 0 and not self.told:
-                self.timer.cancel()
-                self.timer.join()
-                self.left_s -= to_s(clock.now_ns() - self.began_ns)
-                if self.left_s <= 0:
+            with lock:
+                self.depth -= 1
+                if self.depth == 0:
+                    self.timer.cancel()
+                    self.left_s -= to_s(clock.now_ns() - self.began_ns)
+                    if self.left_s <= 0:
+                        self.tell()
+
+        def wait(self) -> None:
+            self.began_ns, self.timer = clock.now_ns(), threading.Timer(self.left_s, self.tell_meanwhile)
+            self.timer.daemon = True
+            self.timer.start()
+
+        def tell_meanwhile(self) -> None:
+            with lock:
+                if self.depth > 0 and self.timer is threading.current_thread():  # else it was too late to cancel it
                     self.tell()
+                    self.wait()
 
         def tell(self) -> None:
-            if not self.told:
-                self.told = True
-                console.print(COMPILING, soft_wrap=True)
+            console.print(f"{self.kernels} kernels so far" if self.told else COMPILING, soft_wrap=True, highlight=False)
+            self.told, self.left_s = True, again_s
 
-    clock, compiling = WallClock(), Compiling()
+    clock, lock, compiling = WallClock(), threading.Lock(), Compiling()
     event.register(COMPILE, compiling)
     try:
         yield

@@ -78,6 +78,18 @@ def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
     assert out.getvalue() == f"{COMPILING}\n"
 
 
+def test_it_is_told_how_far_compiling_has_come():
+    out = StringIO()
+    with compiling_told(Console(file=out, width=200), after_s=0.0, again_s=0.0):
+        for _ in range(3):
+            njit(add)(1, 2)
+    first, *others = out.getvalue().splitlines()
+    counts = [int(line.removesuffix(" kernels so far")) for line in others]
+    assert first == COMPILING
+    assert counts == sorted(counts)
+    assert counts[-1] == 3
+
+
 def test_what_is_compiled_in_a_moment_is_not_told():
     out = StringIO()
     with compiling_told(Console(file=out), after_s=1000.0):
