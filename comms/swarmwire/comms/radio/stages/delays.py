@@ -114,8 +114,9 @@ def delay_ns(keys, robots, sender, receiver, sequence, fate, latency_ns, jitter_
         if fate[i] == RECEIVED:
             delays_ns[i] = latency_ns
             if jitter_ns > 0:
-                key = keys[sender[i] // robots]
-                u = uniform(key, sender[i] % robots, receiver[i] % robots, sequence[i], DELAY)
+                arena = sender[i] // robots
+                first = arena * robots
+                u = uniform(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], DELAY)
                 delays_ns[i] += np.int64(u * jitter_ns)
     return delays_ns
 
@@ -149,10 +150,10 @@ def drawn_ns(params, keys, robots, sender, receiver, sequence, fate):
     delays_ns = np.zeros(len(sender), np.int64)
     for i in range(len(delays_ns)):
         if fate[i] == RECEIVED:
-            s, r = sender[i], receiver[i]
-            delays_ns[i] = varying_delay_ns(
-                params, uniform(keys[s // robots], s % robots, r % robots, sequence[i], DELAYS)
-            )
+            arena = sender[i] // robots
+            first = arena * robots
+            u = uniform(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], DELAYS)
+            delays_ns[i] = varying_delay_ns(params, u)
     return delays_ns
 
 

@@ -154,9 +154,9 @@ def _decide(losses, keys, robots, index, sender, receiver, sequence, at_ns, fate
             i = index[n] if len(index) > 0 else n
             if fate[i] == RECEIVED:
                 a, b, now_ns = sender[i], receiver[i], at_ns[i]
-                frame = ReceivedFrame(
-                    keys[a // robots], a, b, a % robots, b % robots, sequence[i], 0, False, now_ns, now_ns
-                )
+                arena = a // robots
+                first = arena * robots
+                frame = ReceivedFrame(keys[arena], a, b, a - first, b - first, sequence[i], 0, False, now_ns, now_ns)
                 end = _fate_by(place, losses.params, frame)
                 fate[i] = end
                 in_range[i] *= end != OUT_OF_RANGE

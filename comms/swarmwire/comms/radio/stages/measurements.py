@@ -76,7 +76,9 @@ def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_
             dx, dy = to_sender_m(pose, s, r, wrap_m)
             out_m[i] = np.sqrt(dx * dx + dy * dy)
             if noise_m > 0.0:
-                z = normal(keys[s // robots], s % robots, r % robots, sequence[i], RANGE_NOISE)
+                arena = s // robots
+                first = arena * robots
+                z = normal(keys[arena], s - first, r - first, sequence[i], RANGE_NOISE)
                 out_m[i] = max(out_m[i] + noise_m * z, 0.0)
     return out_m
 
@@ -110,7 +112,9 @@ def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, no
             dx, dy = to_sender_m(pose, s, r, wrap_m)
             bearing = np.arctan2(dy, dx) - pose[r, 2]
             if noise_rad > 0.0:
-                bearing += noise_rad * normal(keys[s // robots], s % robots, r % robots, sequence[i], BEARING_NOISE)
+                arena = s // robots
+                first = arena * robots
+                bearing += noise_rad * normal(keys[arena], s - first, r - first, sequence[i], BEARING_NOISE)
             out_rad[i] = wrap(bearing)
     return out_rad
 
@@ -145,6 +149,7 @@ def error_db(keys, robots, sender, receiver, sequence, fate, noise_db):
     out_db = np.zeros(len(sender))
     for i in range(len(out_db)):
         if fate[i] == RECEIVED and noise_db > 0.0:
-            s, r = sender[i], receiver[i]
-            out_db[i] = noise_db * normal(keys[s // robots], s % robots, r % robots, sequence[i], RSSI_NOISE)
+            arena = sender[i] // robots
+            first = arena * robots
+            out_db[i] = noise_db * normal(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], RSSI_NOISE)
     return out_db
