@@ -19,6 +19,7 @@ from docs.experiments.experiment import names as experiments
 from docs.experiments.making import digests, with_numbers
 from docs.fault_checks import fault_tables
 from docs.pictures.radio.__main__ import FIGURES
+from docs.prose_checks import prose
 from docs.protocol_checks import protocol_page
 from swarmwire.agent import behaviours
 from swarmwire.comms.bodies.body import body_from
@@ -176,6 +177,7 @@ CHECKS: tuple[Callable[[], Problems], ...] = (
     robot_bytes,
     fault_tables,
     protocol_page,
+    prose,
 )
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import checks, fault_checks, protocol_checks
+from docs import checks, fault_checks, prose_checks, protocol_checks
 
 
 @pytest.fixture
@@ -64,3 +64,29 @@ def test_a_problem_is_a_line_and_exit_code_1(monkeypatch: pytest.MonkeyPatch, ca
         monkeypatch.setattr(checks, "CHECKS", (lambda problems=found: iter(problems),))
         assert checks.main() == code
         assert capsys.readouterr().out.splitlines()[:-1] == list(found)
+
+
+@pytest.mark.parametrize(
+    ("text", "problems"),
+    [
+        ("Nobody\ntells whom.\n", 3),
+        ("A run that goes\non.\n", 1),
+        ("The frame goes on air.\n", 0),
+        ("`told` is [a name](whatever.md).\n\n```text\nwhoever\n```\n", 0),
+    ],
+)
+def test_a_word_that_pages_do_not_use_is_a_problem(
+    page: Path, monkeypatch: pytest.MonkeyPatch, text: str, problems: int
+):
+    monkeypatch.setattr(prose_checks, "ROOT", page.parents[1])
+    monkeypatch.setattr(prose_checks, "PAGES", ["docs/page.md"])
+    monkeypatch.setattr(prose_checks, "UNWRITTEN", ())
+    page.write_text(text)
+    found = list(prose_checks.prose())
+    assert len(found) == problems
+    assert all(problem.startswith("docs/page.md:") and ": expected " in problem for problem in found)
+
+
+def test_public_docstrings_and_messages_are_prose_and_private_ones_are_not():
+    source = 'def public():\n    "One"\n\n\ndef _private():\n    "Two"\n    return "key", "a message"\n'
+    assert sorted(prose_checks.texts_of(source)) == [(2, "One"), (7, "a message")]

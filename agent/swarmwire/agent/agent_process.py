@@ -2,7 +2,7 @@
 
 The fork server is forked from the host before that opens its network session, so it has no threads; it imports the
 agents' code once, for all processes. An agent process gets one socket to its host and no network. It ends with its host
-and with the fork server, whatever its agent does.
+and with the fork server, for any agent.
 """
 
 import ctypes

@@ -65,7 +65,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the fault, and exit."""
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; {self.prog} --help tells more\n")
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     helps = {
         "run": "run an agent on a robot until it is ended",
-        "check": "say what would run, or what is wrong with it; nothing is connected",
+        "check": "check the settings and print the plan or the errors; connect to nothing",
         "stop-motors": "stop the motors of a robot, and nothing else; it may be given all that `run` was",
     }
     for name, text in helps.items():

@@ -81,7 +81,7 @@ def join_and_report(settings: "JoinSettings", processes: int | None = None) -> i
     from swarmwire.agent.runner import Arrivals
 
     if replace(settings.network, connect=(settings.endpoint,)).warning is not None:
-        _say("warning: insecure: whoever is in the network can take the robots over, and overhear them")
+        _say("warning: insecure: every host in the network can take over the robots and read their packets")
     arrivals = Arrivals()
     with closing(server), _leaving_by_signals(arrivals):
         ended = join(settings, arrivals, _say, server, processes)

@@ -110,7 +110,7 @@ def join(
         reason = str(error).split(" at ")[0]
         why = "" if "Timeout" in reason else f": {reason}"
         raise RunnerLost(
-            runner, NO_ROBOTS, f"nobody answers at {settings.endpoint}{_certificate_hint(settings)}{why}"
+            runner, NO_ROBOTS, f"no world answers at {settings.endpoint}{_certificate_hint(settings)}{why}"
         ) from error
     with closed_after(session):
         run_id = _chosen_run(session, runner, settings)
@@ -173,7 +173,7 @@ def _session_info(session: zenoh.Session, keys: Keys, runner: str) -> SessionInf
                 return SessionInfo.decode(reply.ok.payload.to_bytes())
             except BadFrame as fault:
                 raise RunnerLost(runner, NO_ROBOTS, f"another version of swarmwire: {fault}") from fault
-    raise RunnerLost(runner, NO_ROBOTS, f"the world told nothing of its run: it may not let {runner} in")
+    raise RunnerLost(runner, NO_ROBOTS, f"the world sent no session information: its access rules may exclude {runner}")
 
 
 def _local_agents(

@@ -35,7 +35,7 @@ class NotDeclared(AttributeError):
 
 
 def undeclared(need: str, needs: tuple[str, ...], of: str = "") -> NotDeclared:
-    """The error, with the declaration that mends it; `of` says of what it was read."""
+    """The error, with the declaration that fixes it; `of` says of what it was read."""
     named, mended = ", ".join(needs) or "none", ", ".join(f'"{name}"' for name in (*needs, need))
     return NotDeclared(
         f"reads {need!r}{of}, which its needs do not list ({named}); declare needs = ({mended}{'' if needs else ','})"

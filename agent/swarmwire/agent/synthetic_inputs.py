@@ -1,6 +1,6 @@
 """Synthetic readings, packets and tx statuses for a group of robots, keyed by a seed.
 
-`inputs` yields them tick by tick: readings drawn anew, the packets that the robots sent a tick ago, each received by
+`inputs` yields them tick by tick: new random readings, the packets that the robots sent a tick ago, each received by
 some of the others, tx statuses of unicast packets, and robots that drop out and return.
 """
 
@@ -37,7 +37,7 @@ STATUS_SHARE = 0.6  # share of the outstanding tx statuses that arrive in a tick
 class Trial:
     """A test case for an agent: robots with synthetic readings and packets.
 
-    All readings are drawn anew in each tick. A packet is received a tick later, by each of the others with probability
+    All readings are drawn again in each tick. A packet is received a tick later, by each of the others with probability
     0.4, and an agent that needs tx statuses gets all kinds of them. A tenth of the robots is missing in each tick and
     starts with defaults when it returns.
     """

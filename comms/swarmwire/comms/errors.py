@@ -5,7 +5,7 @@ SwarmwireError
 ├── AgentFailed         the user's agent raised (exit code 1)
 ├── CustomCodeFailed    a custom sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
-├── RecordFailed        a table of the run folder cannot be written: the run goes on without it
+├── RecordFailed        a table of the run folder cannot be written: the run continues without it
 ├── Interrupted         the run was interrupted while it waited for its runners (exit code 130)
 ├── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 ├── in agent

@@ -64,7 +64,7 @@ _load_arrays_without_scipy()
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
-    """`numba.njit` with options of its own; cached on disk unless told otherwise."""
+    """`numba.njit` with options of its own; cached on disk by default."""
 
     def compiled(function: F) -> F:
         made: Any = numba.njit(**options)(function)

@@ -7,7 +7,7 @@
     (6, Beacon(heading_rad=0.5))
 
 A message on air is a 2-byte tag made from its class name and fields, then its fields packed little-endian. To the type
-checker a field is a `float`, in the constructor and when read: a decoded field is widened to float64 whatever its width
+checker a field is a `float`, in the constructor and when read: a decoded field is widened to float64 from any width
 on air, so that both kinds of agent compute with the same numbers.
 """
 

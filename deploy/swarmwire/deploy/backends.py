@@ -53,7 +53,7 @@ class Backends:
 
     @contextmanager
     def backend(self, served: Served | None = None) -> Generator[AgentBackend]:
-        """The backend, ended with the context; it plays no robot that is served, but hands on what programs tell it."""
+        """The backend, ended with the context; it runs no served robot, but passes on programs' commands."""
         whole = assignments.whole(self.scenario, self.static, dict(self.agents))
         if served and self.pace:
             names = {group.name for group in served.groups}

@@ -1,4 +1,4 @@
-"""What people ask of a run while it goes on: pause, step, another speed, the end; and the signals that end it.
+"""Controls of a live run: pause, step, speed and end; and the signals that end it.
 
 The trajectory of the run stays the same.
 """
@@ -18,7 +18,7 @@ LOOK_NS = to_ns(0.02)  # how often a loop that is held looks up what people ask
 
 
 class Controls:
-    """Any thread may ask; the loop calls `hold` before each tick, which costs nothing while nobody asked for anything.
+    """Any thread may ask; the loop calls `hold` before each tick, which costs nothing without a request.
 
     Attributes:
         paused: no tick begins but those that `step` asks for.
@@ -65,7 +65,7 @@ class Controls:
         return self._pace.missed_ticks if self._pace else 0
 
     def toggle_pause(self) -> None:
-        """Pause, or go on."""
+        """Pause or resume."""
         with self._lock:
             self.paused, self._steps, self._asked = not self.paused, 0, True
 
@@ -75,7 +75,7 @@ class Controls:
             self.paused, self._steps, self._asked = True, 0, True
 
     def resume(self) -> None:
-        """Go on."""
+        """Resume."""
         with self._lock:
             self.paused, self._steps, self._asked = False, 0, True
 
@@ -201,7 +201,7 @@ class Interrupt:
 
     Attributes:
         asked: whether one of them came.
-        hung_up: whether SIGHUP did: nobody reads what is printed.
+        hung_up: whether SIGHUP did: the output has no reader.
     """
 
     def __init__(self) -> None:

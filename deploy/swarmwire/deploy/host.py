@@ -133,8 +133,8 @@ def share_heaps() -> None:
 def keep_memory() -> None:
     """Let the C library keep what is freed, up to 256 MB; without effect where it is not glibc.
 
-    Tables of a tick are made anew in the next. By default memory of 128 kB and more goes back to the system at once,
-    which must clear each page before the process may use it again: a third of a tick with a busy radio.
+    Tables of a tick are allocated again in the next. By default memory of 128 kB and more goes back to the system at
+    once, which must clear each page before the process may use it again: a third of a tick with a busy radio.
     """
     _mallopt({M_MMAP_THRESHOLD: LARGEST_KEPT_BYTES, M_TRIM_THRESHOLD: KEPT_BYTES})
 

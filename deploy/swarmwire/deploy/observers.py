@@ -14,7 +14,7 @@ from swarmwire.deploy.host import refusal
 
 
 class Guarded(Observer):
-    """An observer that, once it raises, is reported, counted and left out; the run goes on."""
+    """An observer that, once it raises, is reported, counted and left out; the run continues."""
 
     def __init__(self, observer: Observer, say: Callable[[str], None]) -> None:
         self._observer, self._say = observer, say
@@ -53,7 +53,7 @@ class Guarded(Observer):
 def _why(error: BaseException) -> str:
     """In a line, if the machine or the input is at fault; else with the traceback."""
     told = str(error) if isinstance(error, SwarmwireError) else refusal(error)
-    return f" {told}; the run goes on without it" if told else f"\n{traceback.format_exc()}"
+    return f" {told}; the run continues without it" if told else f"\n{traceback.format_exc()}"
 
 
 class TooLarge(Observer):

@@ -75,7 +75,7 @@ def print_parameters(rows: Sequence[Row], console: Console) -> None:
 
 
 def print_models(losses: LossFit, console: Console) -> None:
-    """The models of loss, and how well they tell the losses."""
+    """The models of loss, and how well they predict the losses."""
     table = titled_table("models of loss (the least AIC fits best)", header=True)
     for name in ("model", "parameters", "AIC", ""):
         table.add_column(name, justify="right" if name in {"parameters", "AIC"} else "left")

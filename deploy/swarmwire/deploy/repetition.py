@@ -34,7 +34,7 @@ class Repetition:
 
     @property
     def same(self) -> bool | None:
-        """Whether it came out the same, bit for bit, as far as can be told; None: there is nothing to compare."""
+        """Whether both runs are identical bit for bit, as far as is recorded; None: there is nothing to compare."""
         if self.before is not None:
             return self.before == tuple(self.result.trajectory_sha256)
         return self.first_difference is None if self.compared else None
@@ -83,7 +83,7 @@ class RepeatedRun:
         self._inputs = _inputs(folder, self.facts, self._summary)
         live_events, self._live_events_sha256 = read_live_events(folder)
         if self._summary and self._summary.live_events_sha256 and not live_events:
-            expected = "expected the record of what people did to this run, on which it depends"
+            expected = "expected the record of live events, on which this run depends"
             raise BadInput(str(folder / LIVE_EVENTS), "", expected)
         if self._inputs is not None and runners not in (None, "none"):
             raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
@@ -130,7 +130,7 @@ class RepeatedRun:
 
     def _why_not_all(self, result: Result) -> str:
         if self._summary is None:
-            return f"the run left no {SUMMARY}: it was killed, or still goes on"
+            return f"the run left no {SUMMARY}: it was killed or is still running"
         if result.ticks < self._summary.ticks:
             return f"this is {result.ticks} of the run's {self._summary.ticks} ticks"
         return ""
@@ -161,7 +161,7 @@ def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> Recorded
     driven = bool(facts.gateways) or (facts.realtime is not None and (facts.runners > 0 or facts.subtick_s))
     from_outside = driven or bool(summary and summary.inputs_sha256)
     if inputs is None and from_outside:
-        expected = "expected the record of what came from outside, on which this run depends"
+        expected = "expected the record of external inputs, on which this run depends"
         raise BadInput(str(folder / INPUTS), "", expected)
     return inputs
 

@@ -40,7 +40,7 @@ class Percentiles:
 
 @dataclass(frozen=True)
 class RadioResult:
-    """What became of every packet of one arena."""
+    """The fates of all packets of one arena."""
 
     sent: int  # packets
     intended: int  # receivers that they were meant for
@@ -54,7 +54,7 @@ class RadioResult:
 
 @dataclass(frozen=True)
 class ArenaResult:
-    """What came of one arena."""
+    """The results of one arena."""
 
     seed: int
     ended: str  # "stopped", if it was over before the run was; else as the run

@@ -23,7 +23,7 @@ MAX_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark
 
 
 def new_run_id() -> str:
-    """A name for one execution, which nobody else has."""
+    """A unique name for one execution."""
     return secrets.token_hex(4)
 
 
@@ -65,7 +65,7 @@ def _is_listened_at(path: Path) -> bool:
 
 
 def check_socket(path: Path) -> None:
-    """Return if a unix socket can be made there; else BadInput. One that nobody listens at may be in its place."""
+    """Return if a unix socket can be made there; else BadInput. A stale socket may be in its place."""
     path = path.absolute()
     if not path.parent.is_dir():
         raise BadInput("--socket", str(path), "expected a path in a directory that exists")

@@ -63,9 +63,9 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
 
 def _untold(need: str, scenario: Scenario) -> str:
     if need == "radio.tx_status":
-        return "only a radio that acknowledges tells: expected radio.access.method csma-802154 or dcf, acknowledged"
+        return "needs a radio with acknowledgements: expected radio.access.method csma-802154 or dcf, acknowledged"
     if scenario.radio is None:
-        return "only a radio tells: there is no [radio]"
+        return "needs a radio: there is no [radio]"
     return f"the radio does not measure: [radio.measures] has {', '.join(scenario.radio.measures.needs) or 'nothing'}"
 
 

@@ -57,7 +57,7 @@ class Simulation:
         interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
         stop_conditions: end arenas, as the scenario's do; others may take their place before the run.
         controls: pause, step, speed and end of `run`, for other threads.
-        live_events: events given while it goes on, and ended, from any thread.
+        live_events: events begun and ended from any thread during the run.
         served: entered, the robots that answer as real ones, if any.
     """
 
@@ -146,7 +146,7 @@ class Simulation:
         return self
 
     def step(self) -> Truth:
-        """One tick; what the observers saw of it. It may go on beyond the scenario's duration."""
+        """One tick; returns the observers' view of it. Ticks may exceed the scenario's duration."""
         return self._entered().step()
 
     def apply_event(self, event: Mapping[str, Any]) -> int:

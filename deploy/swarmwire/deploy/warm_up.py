@@ -1,6 +1,6 @@
 """A rehearsal: some ticks apart from the run, so that what a machine has not compiled yet is not compiled within it.
 
-Whoever drives a robot in real time would otherwise find it dead for half a minute, and the run behind from then on.
+Otherwise a robot driven in real time would not react for half a minute, and the run would stay late.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ PACKET = b"\0"
 
 
 def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric]) -> None:
-    """Run a world and a medium that nobody needs any more: every robot drives and sends, and metrics are measured."""
+    """Run a temporary world and medium: every robot drives and sends, and metrics are measured."""
     observers = [Metrics(tuple(metrics)), RadioTally()]
     for observer in observers:
         observer.begin(world.static)

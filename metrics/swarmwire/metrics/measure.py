@@ -90,7 +90,7 @@ class Metrics(Observer):
 
     @property
     def values(self) -> FloatArray:
-        """What `latest` tells, (metrics, arenas)."""
+        """The values that `latest` returns, (metrics, arenas)."""
         return self._latest
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:

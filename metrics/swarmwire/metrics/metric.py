@@ -159,7 +159,7 @@ def agreement(x: FloatArray, y: FloatArray, alive: BoolArray, lengths: bool) -> 
     """How near sums of vectors (arenas, robots) come to the most they can be, 0 to 1, (arenas,): |sum| / most.
 
     The most is the sum of their `lengths`, else the number of robots alive, as of unit vectors. The dead do not count;
-    NaN if nobody is alive, 0 if all vectors are 0.
+    NaN if no robot is alive, 0 if all vectors are 0.
     """
     arenas, robots = alive.shape
     share = np.full(arenas, np.nan)

@@ -7,7 +7,7 @@ from swarmwire.comms.truth import Static
 
 
 def sides_m(static: Static) -> tuple[float, float]:
-    """The sides over which a torus goes on, 0 where an arena ends, as the kernel `to_nearest` takes them."""
+    """The sides at which a torus wraps around, 0 where an arena ends, as the kernel `to_nearest` takes them."""
     return static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
 
 

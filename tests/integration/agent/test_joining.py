@@ -108,7 +108,7 @@ def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
         (None, given(), REFUSED),
         (b"\xc1", given(), "another version of swarmwire"),
         (OFFER.replace(b"\xa1v", b"\xa1w"), given(), "another version of swarmwire"),
-        (NOTHING, given(), "the world told nothing of its run: it may not let r in"),
+        (NOTHING, given(), "the world sent no session information: its access rules may exclude r"),
         (OFFER, None, REFUSED),
         (OFFER, NOTHING, "the world did not answer to join"),
         (OFFER, b"\xc1", "the world's answer to join is none"),
@@ -150,7 +150,7 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):
             join(JoinSettings(endpoint, name="r"), Arrivals(), print, SERVER)
-    with pytest.raises(RunnerLost, match=f"nobody answers at {endpoint}") as lost:
+    with pytest.raises(RunnerLost, match=f"no world answers at {endpoint}") as lost:
         join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), print, SERVER)
     assert isinstance(lost.value.__cause__, zenoh.ZError)
 

@@ -247,7 +247,9 @@ def test_where_no_base_takes_such_commands_one_line_says_which(transport):
     driver.robot = "flock-1"
     name = "other" if transport == "bridge" else "flock_1"
     try:
-        with pytest.raises(DriverLost, match=f"nobody takes TwistStamped on /{name}/cmd_vel behind {base.address}"):
+        with pytest.raises(
+            DriverLost, match=f"no subscriber for TwistStamped on /{name}/cmd_vel behind {base.address}"
+        ):
             driver.open()
         with pytest.raises(DriverLost, match="not connected"):
             driver.sense(frozenset())

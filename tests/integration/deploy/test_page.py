@@ -40,7 +40,7 @@ def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, mon
     assert "no live view" in capsys.readouterr().err or out.getvalue() == "no page today\n"
 
 
-@pytest.mark.parametrize(("paused", "held"), [(True, "paused: swarmwire ctl resume"), (False, "going on")])
+@pytest.mark.parametrize(("paused", "held"), [(True, "paused: swarmwire ctl resume"), (False, "running")])
 def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path, monkeypatch, paused, held):
     out = io.StringIO()
     simulation = Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run")
@@ -92,7 +92,7 @@ def test_a_page_of_no_run_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
         code, _, errors = called(monkeypatch, capsys, "ui", *arguments)
         assert code == 2
         assert errors.startswith("error: ")
-        assert "run that goes on" in errors
+        assert "live run" in errors
         assert errors.count("\n") == 1
 
 

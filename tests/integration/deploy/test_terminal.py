@@ -252,5 +252,5 @@ def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why)
 
 
 def test_where_nobody_listens_it_says_so():
-    with pytest.raises(RunnerLost, match="nobody answers at tcp/127.0.0.1:1$"):
+    with pytest.raises(RunnerLost, match="no world answers at tcp/127.0.0.1:1$"):
         join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print, thread_server())

@@ -182,7 +182,7 @@ def waits(control: RemoteControl) -> str:
 def test_a_run_that_waits_for_its_first_agents_is_found_controlled_and_stopped(tmp_path, joiners):
     with listening(tmp_path / "run", joiners) as (simulation, control, errors):
         until(lambda: simulation.run_id in [run.run for run in found_runs()])
-        assert waits(control) == "whoever plays flock-0 … flock-19 (20 robots)"
+        assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
         control.step(2)
         control.event({"do": "kill", "robots": {"names": ["flock-3"]}})
         joiners.start("a")
@@ -207,7 +207,7 @@ def test_a_run_that_waits_for_a_runner_that_is_frozen_or_lost_says_for_whom(tmp_
         until(control.status, lambda status: status["state"] == "running")
         joiners.send("a", signal.SIGKILL)
         until(control.status, lambda status: status["runners"]["lost"] == 1)
-        assert waits(control) == "whoever plays flock-0 … flock-19 (20 robots)"
+        assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
 
 
 def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():

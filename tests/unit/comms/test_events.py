@@ -426,7 +426,7 @@ def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> 
     revive = Revive(at_s=1.0, robots=Selection(group="a"))
     with pytest.raises(TypeError, match="revive lasts for ever: there is nothing to undo"):
         revive.end(0, ActiveEffects(2))
-    with pytest.raises(TypeError, match="ramp does not change by itself"):
+    with pytest.raises(TypeError, match="ramp does not change over time"):
         Ramp(at_s=1.0, what="radio.loss", to=0.5).go_on(0, 0, ROBOT_SWARM, ActiveEffects(2))
 
 

@@ -270,7 +270,7 @@ OF_COMMANDS = [
         "radio probe unit-disk",
         "--contention: expected nodes (2 or more), bytes and an interval of 0.001 to 1 s, such as 20,20,0.1",
     ),
-    ("ctl pause", "expected a run that goes on: this machine has none of yours"),
+    ("ctl pause", "expected a live run: this machine has none of yours"),
 ]
 
 

@@ -134,7 +134,7 @@ def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path
     assert result.counts["observer_failed_TickRecorder"] == 1
     assert len(keeper.seen) == result.ticks == 80
     errors = capfd.readouterr().err
-    assert "the run goes on" in errors
+    assert "the run continues" in errors
     assert "No space left on device" in errors
     ticks = RunFolder(tmp_path).ticks()
     assert 0 < len(ticks) < 80

@@ -320,11 +320,13 @@ def test_an_epuck_as_an_epuck2_has_other_eyes_and_less_senses() -> None:
     assert "its proximity looks to 17, 50, 90, ... deg, not -10, -40, -90, ... deg" in text
     assert "it goes up to 0.1287 m/s, not 0.1382" in text
     assert "it has no scan, imu" in text
-    assert "nobody is told its camera" in text
+    assert "no program receives its camera" in text
 
 
 def test_an_epuck2_as_a_base_of_ros_2_keeps_its_proximity_to_itself() -> None:
-    assert said(Ros2Gateway, "epuck2") == "nobody is told its proximity, ground, bumper; nobody switches its LEDs"
+    assert (
+        said(Ros2Gateway, "epuck2") == "no program receives its proximity, ground, bumper; no program switches its LEDs"
+    )
 
 
 @pytest.mark.parametrize("body", ["turtlebot3-burger", "footbot", "point"])

@@ -162,7 +162,7 @@ def test_a_run_that_is_paused_lets_only_so_many_wait():
     given = door()
     for _ in range(MAX_WAITING):
         given.give(KILL)
-    with pytest.raises(BadInput, match="let the run go on"):
+    with pytest.raises(BadInput, match="resume the run"):
         given.give(KILL)
 
 

@@ -7,10 +7,10 @@ from swarmwire.comms.tick_io import MAX_STATES, SparseTable
 
 
 class LatestValues:
-    """The number that each robot told last. `value` is replaced when it changes, never written to.
+    """The number that each robot noted last. `value` is replaced when it changes, never written to.
 
     Attributes:
-        value: (rows,) NaN: the robot has told none; None: no robot ever has.
+        value: (rows,) NaN: the robot has noted none; None: no robot ever has.
     """
 
     def __init__(self) -> None:
@@ -24,7 +24,7 @@ class LatestValues:
             self.value[noted.rows[here]] = noted.value[here]
 
     def forget(self, rows: BoolArray) -> None:
-        """These robots (rows,) have told nothing."""
+        """Clear the numbers of these robots (rows,)."""
         if self.value is not None and rows.any():
             self.value = np.where(rows, np.nan, self.value)
 

@@ -40,7 +40,7 @@ class Effects(NamedTuple):
 class EventScheduler:
     """The events of a run in order of time; at equal times those that end come first, then by number.
 
-    The number of an event is its place in the scenario; those that are given while the run goes on have higher ones.
+    The number of an event is its place in the scenario; live events have higher ones.
     """
 
     def __init__(

@@ -34,7 +34,7 @@ AT_S = "at_s"
 
 
 class SubmittedEvent(Table):
-    """What somebody gives: one event."""
+    """The body of a live event: one event."""
 
     event: Annotated[Event, OneOf("do", ACTIONS)]
 
@@ -72,7 +72,7 @@ MAX_WAITING = 1000  # for the next tick: a run that is paused takes none
 
 @dataclass(frozen=True, slots=True)
 class LiveEvent:
-    """An event that begins at a tick's start because somebody wanted it, or one that ends."""
+    """A live event that begins at a tick's start, or one that ends."""
 
     tick: int
     number: int  # of the event
@@ -122,7 +122,7 @@ class LiveEvents:
                 for radio in self._radios():
                     event.check_radio(radio)
             if len(self._waiting) >= MAX_WAITING:
-                raise BadInput("", "", f"expected at most {MAX_WAITING} events that wait for a tick; let the run go on")
+                raise BadInput("", "", f"expected at most {MAX_WAITING} events that wait for a tick; resume the run")
             if isinstance(event, Ramp) and event.over_s == 0.0:
                 for before in self._set_before(event.what):
                     self._undo(before)
@@ -145,7 +145,7 @@ class LiveEvents:
                     "", "event", f"expected an event that lasts; {number} is a {event.do}, which happens once"
                 )
             if self._is_over(number):
-                raise BadInput("", "event", f"expected an event that goes on; {number}, a {event.do}, is over")
+                raise BadInput("", "event", f"expected an active event; {number}, a {event.do}, is over")
             if number < len(self._scenario.events) and number not in self.progress.begun:
                 raise BadInput("", "event", f"expected an event that has begun; {number}, a {event.do}, has not")
             self._undo(number)

@@ -73,7 +73,7 @@ class SubtickRadio:
         self._release(at_ns)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Let time pass; what robots received, and learned of their packets, that nobody was handed before."""
+        """Let time pass; return the receptions and transmit statuses that were not handed out before."""
         self._release(until_ns)
         self._now_ns = until_ns
         results = self._medium.advance(until_ns)
@@ -111,7 +111,7 @@ SHARE_EARLY = 5  # of a subtick, at most, that a sleep is shorter: a machine tha
 
 
 class Exchange(Protocol):
-    """Whoever carries packets between agents and air."""
+    """The carrier of packets between agents and the radio medium."""
 
     def take_in(self) -> Sequence[SubtickPackets]:
         """Packets that agents sent since the last call, `at_ns` in wall time."""

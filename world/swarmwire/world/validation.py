@@ -148,7 +148,7 @@ def _check_send_offset(scenario: Scenario, where: str) -> None:
 def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
     key = unfit_for_torus(radio) if scenario.arena.boundary == "torus" else None
     if key is not None:
-        expected = "expected a disk without bodies_block: what is between two robots across a torus's seam is not known"
+        expected = "expected a disk without bodies_block: line of sight across a torus's seam is not defined"
         raise BadInput(where, f"radio.{key}", expected)
 
 
@@ -164,9 +164,7 @@ def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impuls
     engines = engines_of(scenario, bodies)
     for group in event.robots.groups(scenario.groups()):
         if engines[group] == "kinematic":
-            expected = (
-                f"expected robots whose bodies have contacts: those of {group} go where they are told (kinematic)"
-            )
+            expected = f"expected robots whose bodies have contacts: those of {group} are kinematic"
             raise BadInput("", "robots", expected)
         max_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
         if event.speed_mps > max_mps:

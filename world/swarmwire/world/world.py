@@ -63,7 +63,7 @@ class World:
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: what they were asked for, and what they do.
-        alive: (rows,); written in place, by `live`. In an arena that left nobody is.
+        alive: (rows,); written in place, by `live`. In an arena that left, no robot is.
         running: (arenas,) those that have not left; written in place, by `leave`.
         rows_running: (rows,) the same for each robot; replaced by `leave`.
         batteries: of all robots; `charge` may be written to.
@@ -109,7 +109,7 @@ class World:
         return self._physics.names
 
     def live(self, alive: BoolArray) -> None:
-        """These robots (rows,) are alive from now on; the others brake, and resist whatever pushes them."""
+        """These robots (rows,) are alive from now on; the others brake, and resist all pushes."""
         alive = alive & self.rows_running
         revived = alive & ~self.alive  # they start afresh
         self.states.forget(revived)
@@ -120,7 +120,7 @@ class World:
         self._brake()
 
     def leave(self, over: BoolArray) -> None:
-        """Nobody in these arenas (arenas,) senses, acts, moves or is alive any more, whatever happens."""
+        """No robot in these arenas (arenas,) senses, acts, moves or is alive from now on."""
         self.running &= ~over
         self.rows_running = np.repeat(self.running, self.static.robots)
         self._physics.leave(over)

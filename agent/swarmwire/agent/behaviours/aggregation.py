@@ -45,8 +45,8 @@ class Aggregation(VectorAgent[Gathering]):
 
     Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours received in the
     last step, repelled against it; a robot without packets walks at random. The source's robots hear an aggregate's
-    sound where ours receive beacons, and they leave whatever the number near: that is `crowding = 0`. We had only its
-    abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
+    sound where ours receive beacons, and they leave regardless of the number near: that is `crowding = 0`. We had only
+    its abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
     cockroaches depends (Jeanson et al. 2005).
     """
 

@@ -70,7 +70,7 @@ class ThresholdRule(VectorAgent):
         near = self.nearest_m(robots) < self.safe_m
         robots.drive(np.where(near, -self.back_mps, self.speed_mps), np.where(near, self.turn_radps, 0.0))
         robots.note("backing off", near)
-        robots.note("going on", ~near)
+        robots.note("moving", ~near)
 
     def nearest_m(self, robots: Robots) -> FloatArray:
         """The least range of all rays, (n,), from the scanner; inf if none sees anything."""

@@ -35,13 +35,13 @@ class Traffic(Remembered):
 
 
 class BeaconAvoidance(VectorAgent[Traffic]):
-    """Straight on, and around whoever would be met, by the radio alone.
+    """Straight motion that avoids neighbours on a collision course, by the radio alone.
 
     Each robot broadcasts its heading and speed in every step, and remembers for `memory_s` the 8 nearest neighbours
     that it received. Where one was when its packet went on air follows from range and bearing; where it is now from
     the time since, its beacon's velocity and the own motion.
 
-    The robot wants to go on in the direction in which it stood first, at `speed_mps`. If it did, a neighbour at p,
+    The robot keeps the direction of its first heading, at `speed_mps`. If it did, a neighbour at p,
     moving at w against it, would be nearest after t = -p.w / w.w (0 if that is past), at m = p + w t. It pushes away
     from m by
 
@@ -52,7 +52,7 @@ class BeaconAvoidance(VectorAgent[Traffic]):
     head on is passed on the right. The robot turns towards its course plus the push, and drives the slower the more it
     has to turn.
 
-    Our own rule, of the kind of Reynolds's unaligned collision avoidance (Steering Behaviors, 1999). No packet tells
+    Our own rule, of the kind of Reynolds's unaligned collision avoidance (Steering Behaviors, 1999). No packet carries
     how long the medium had it: what `latency_s` does not name makes neighbours seem where they were.
     """
 

@@ -26,8 +26,8 @@ class Consensus(VectorAgent[Estimate]):
 
         x_i <- x_i + gain x sum over packets received since the last step of (x_j - x_i)
 
-    Every step ends with a broadcast of x_i, and tells it by a note, so that `consensus_error` and `consensus_bias` can
-    be measured. Robots stay where they are. With all links there and none delayed, all tend to the average of the
+    Every step ends with a broadcast of x_i, and records it as a note, so that `consensus_error` and `consensus_bias`
+    can be measured. Robots stay where they are. With all links there and none delayed, all tend to the average of the
     first numbers if gain < 2 / (largest eigenvalue of the graph's Laplacian), for which gain < 1 / (most neighbours)
     is enough. Losses slow it, and since what one robot gives the other then does not take, the average moves.
 
@@ -41,7 +41,7 @@ class Consensus(VectorAgent[Estimate]):
     start_width: float = 0.0  # x_i at first is uniform within half of this to either side of start
 
     def step(self, robots: Robots, state: Estimate) -> None:
-        """Move towards what was received, and tell the others."""
+        """Move towards what was received, and broadcast the result."""
         half = 0.5 * self.start_width
         first = self.start + robots.draw.uniform("first value", -half, half)
         own = np.where(np.isnan(state.value), first, state.value)

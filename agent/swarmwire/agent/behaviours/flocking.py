@@ -1,4 +1,4 @@
-"""Flocking over the radio: robots tell one another their headings, and keep together, apart and aligned."""
+"""Flocking over the radio: robots broadcast their headings; cohesion, separation and alignment."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar

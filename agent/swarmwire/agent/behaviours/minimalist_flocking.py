@@ -105,8 +105,8 @@ class MinimalistFlocking(VectorAgent[Turning]):
     The paper's own thresholds, speeds and noise are not known to us. Rules and sides are those of ROS2swarm
     (minimalist_flocking_pattern.py), which states that it implements the paper; the thresholds are its values for the
     jackal (1, 1, 2 and 4 m of 5 m), scaled to the 5 diameters of the paper's robot. They keep robots a diameter apart,
-    and so out of flocks by a criterion of one diameter. There a robot is told from a wall by the number of rays that
-    see it. Speeds are ours; so is `random_turn`, as rule 0, off unless asked for.
+    and so out of flocks by a criterion of one diameter. There a robot is distinguished from a wall by the number of
+    rays that see it. Speeds are ours; so is `random_turn`, as rule 0, off unless asked for.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")

@@ -71,7 +71,7 @@ class RandomWalk(VectorAgent[Walk]):
 
         turn = 2 atan((1 - persistence) / (1 + persistence) tan(pi (U - 1/2))),    U uniform in [0, 1)
 
-    0 is run and tumble, each direction as likely as any other; 1 goes on for ever. It is the correlated random walk of
+    0 is run and tumble, each direction as likely as any other; 1 never turns. It is the correlated random walk of
     animals (Codling, Plank and Benhamou 2008) and of kilobots (Dimidov, Oriolo and Trianni 2016). What rays of the
     front half see ends a spell: the next heading is uniform over the half circle away from it, which is our choice.
     """
@@ -146,7 +146,7 @@ class Coverage(VectorAgent[Walk]):
     """Robots spread, and sweep the space between them: a random walk that received neighbours push away.
 
     Neighbours push as in the potential field of Howard, Mataric and Sukhatme (2002), which spreads a network of sensors
-    over a building and then rests. To go on sweeping, ours turns the directions of a random walk by that push: at the
+    over a building and then rests. To keep sweeping, ours turns the directions of a random walk by that push: at the
     end of a spell, the next heading is that of
 
         u - repulsion_m2 sum of r / |r|^3,    u a unit vector at random, r from the robot to each neighbour received

@@ -27,7 +27,7 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
     `swarmwire.agent.fields`) add up to where the robot wants to go, at an angle a: it drives at `speed_mps` cos a, 0 if
     that is negative, and turns at `turn_gain_per_s` a. Two things keep that from flickering:
 
-    - hysteresis: once a has grown to `blocked_rad` the robot goes on turning to the side to which it turns then, until
+    - hysteresis: once a has grown to `blocked_rad` the robot keeps turning to the side to which it turns then, until
       a has fallen to `free_rad`, wherever noise or a moving neighbour puts it meanwhile;
     - a low-pass of speed and turn rate with the time constant `smooth_s`.
 
@@ -60,7 +60,7 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
         state.angular_radps = low_pass(state.angular_radps, angular, robots.period_s, self.smooth_s)
         robots.drive(state.linear_mps, state.angular_radps)
         robots.note("turning away", state.blocked)
-        robots.note("going on", ~state.blocked)
+        robots.note("moving", ~state.blocked)
 
     def repulsion(self, robots: Robots) -> Vectors:
         """Away from near objects, (n,)."""

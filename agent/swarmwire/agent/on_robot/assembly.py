@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 
 LOG_FORMAT = 1  # of `robot.json`
-NO_ACTUATOR_DRIVER = "no driver moves actuators of your own: what the agent tells them is counted, and does nothing"
+NO_ACTUATOR_DRIVER = "no driver supports custom actuators: their commands are counted and have no effect"
 ENDED_BY = {AgentFailed: "agent failed", DriverLost: "no driver"}
 GUARD_GONE = "the guard is gone"
 

@@ -4,10 +4,10 @@ It is run as a file of its own, and imports nothing but a little of Python, so t
 process of the agent, whose watchdog sends a byte down a pipe several times in the time that it allows, and another
 one when all is closed. If the agent's process ends without that one, or sends nothing for too long, the guard ends
 it and has another process stop the motors by a connection of its own: one that stands by, since on a small computer
-it takes seconds to import what that needs. Whatever the agent has started ends with it: a process that it forked
-could hold the only connection that the robot takes.
+it takes seconds to import what that needs. All processes that the agent has started end with it: a process that it
+forked could hold the only connection that the robot takes.
 
-Signals that ask for the end are passed on; whoever does not heed them in time is ended, too.
+Termination signals are passed on; a process that does not obey in time is killed.
 """
 
 import json
@@ -32,7 +32,7 @@ PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def guard(agent: list[str], stop: list[str], silent_s: float, pipe_option: str, standby_option: str) -> int:
     """The exit code of the command `agent`, or FAILED where `stop` had to be run.
 
-    `pipe_option` tells the agent which file descriptor takes its heartbeats; after the first one, no more than
+    `pipe_option` gives the agent the file descriptor for its heartbeats; after the first one, no more than
     `silent_s` may pass between two. With `standby_option`, `stop` waits for a byte, and ends without one.
     """
     beats, pipe = os.pipe()

@@ -1,7 +1,8 @@
 """Checks of a robot's network: missing robots and poses at run time, and the certificates before the start.
 
 `LivenessWatch` reports other robots of the swarm and tracker poses that have not been received for 5 s, once, and
-their return. A wrong endpoint, a firewall or a camera that is off cannot be told from a quiet swarm in another way.
+their return. A wrong endpoint, a firewall or a camera that is off cannot be distinguished from a quiet swarm in another
+way.
 
 `check_certificates` checks before anything is opened that a robot's certificate goes with its key and its authority.
 Otherwise the network would silently fail to link, for ever.

@@ -75,11 +75,11 @@ def _radio_fault(need: str, capabilities: Capabilities) -> str | None:
     if need in capabilities.radio_measures:
         return None
     if capabilities.radio == "none":
-        return 'only a radio tells: expected radio.kind "zenoh" or "world"'
+        return 'needs a radio: expected radio.kind "zenoh" or "world"'
     if need in OF_POSES and capabilities.radio == "zenoh":
-        return "a real radio does not tell: expected tracker = true"
+        return "a real radio does not measure it: expected tracker = true"
     measures = ", ".join(sorted(capabilities.radio_measures)) or "nothing of a packet"
-    return f"the radio {capabilities.radio} does not tell: it tells {measures}"
+    return f"the radio {capabilities.radio} does not measure it: it measures {measures}"
 
 
 @dataclass(frozen=True)

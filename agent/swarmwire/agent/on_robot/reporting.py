@@ -32,9 +32,9 @@ NOT_STARTED: Mapping[str, Any] = {
 }
 CLOCK_SET = "the clock was set by {:+.3f} s: times in the log before and after do not compare"
 CLOCK_SET_NS = to_ns(0.05)  # per second; a clock that is only synchronised moves by less
-EMERGENCY = "emergency stop at step {}: motors off for good; end the agent, and start it anew, to go on"
-SILENT = "watchdog: nothing was received of the agent for {:.2f} s; motors off until it goes on"
-LOG_FULL = "the log cannot be written, and goes on without what is lost: {}"
+EMERGENCY = "emergency stop at step {}: motors stay off; stop the agent and start it again to continue"
+SILENT = "watchdog: no heartbeat of the agent for {:.2f} s; motors off until the next one"
+LOG_FULL = "the log cannot be written; the agent runs on without lost rows: {}"
 STATUS_INTERVAL_S, TERMINAL_INTERVAL_S = 1.0, 5.0  # of the robot's time
 
 

@@ -33,7 +33,7 @@ from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
 from swarmwire.comms.clock import Clock, to_ns, to_s
 
-OUT_OF_REACH = "the robot is out of reach, and may go on as it was told last"
+OUT_OF_REACH = "the robot is out of reach and may keep executing its last command"
 STOP_REQUESTED = "estop"  # the state of a robot after an emergency stop
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 CHECKS_PER_TIMEOUT = 5  # of the watchdog

@@ -192,7 +192,7 @@ FLAGS = (
     Flag("--max-angular-radps", "max_angular_radps", "fastest turn; else half the body's", "W"),
     Flag("--tracker", "tracker", "poses of robots come over the network", kind="true"),
     Flag("--listen", "network.listen", "where others may call: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
-    Flag("--connect", "network.connect", "whom to call: tcp/127.0.0.1:7548", "ENDPOINT", "list"),
+    Flag("--connect", "network.connect", "endpoint to connect to: tcp/127.0.0.1:7548", "ENDPOINT", "list"),
     Flag("--multicast", "network.multicast", "find one another in the local network", kind="true"),
     Flag("--ca", "network.ca", "certificate that signed all others", "FILE", "path"),
     Flag("--certificate", "network.certificate", "the robot's certificate", "FILE", "path"),

@@ -35,7 +35,7 @@ NO_WHEEL_NOISE = WheelNoise()
 
 @dataclass(frozen=True)
 class Wheels:
-    """Two wheels on one axle; a command that is too fast for a wheel is slowed down as a whole, on the same curve."""
+    """Two wheels on one axle; a command that is too fast for a wheel is scaled down as a whole, on the same curve."""
 
     wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)

@@ -84,7 +84,7 @@ class Event(ABC):
         Returns:
             (rows,) robots for which it began, and those for which it ended.
         """
-        raise TypeError(f"{self.do} does not change by itself")
+        raise TypeError(f"{self.do} does not change over time")
 
     def end(self, serial: int, effects: ActiveEffects) -> BoolArray:
         """Undo `begin`; only called if the event lasts for a time. Return the changed robots, (rows,)."""

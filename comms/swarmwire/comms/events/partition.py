@@ -115,7 +115,8 @@ class Partition(LastingEvent):
         help="groups and names of robots in no set; the others are cut in two in their order, or as halves says",
     )
     one_way: bool = parameter(
-        False, help="of two sets, the second does not hear the first, which goes on to hear the second"
+        False,
+        help="one-way cut of two sets: the second no longer receives the first; the first still receives the second",
     )
     needs_radio = True
 

@@ -89,14 +89,14 @@ class Jammer(LastingEvent):
     A packet that would have been received without it ends as `jammed`.
     """
 
-    do: str = parameter("jammer", help="noise drowns what robots near it should hear", choices=("jammer",))
+    do: str = parameter("jammer", help="noise hides packets from receivers near it", choices=("jammer",))
     at: tuple[float, float] | None = parameter(None, help="where it stands, in the arena's frame", unit="m")
     robots: Selection | None = parameter(None, help="who carry one each; share and count choose among robots alive")
     power_dbm: float = parameter(
-        help="what it radiates, alike in all directions", unit="dBm", at_least=-100, at_most=100
+        help="radiated power, the same in all directions", unit="dBm", at_least=-100, at_most=100
     )
     duty: float = parameter(1.0, help="the share of time for which it is on", above=0, at_most=1)
-    period_s: float = parameter(0.01, help="from one time that it goes on to the next", unit="s", above=0, at_most=1e6)
+    period_s: float = parameter(0.01, help="time between two starts of a transmission", unit="s", above=0, at_most=1e6)
     needs_radio = needs_signals = True
 
     def check(self, groups: Groups) -> None:

@@ -35,7 +35,7 @@ class Kill(LastingEvent):
 
 @dataclass(frozen=True, kw_only=True)
 class Revive(Event):
-    """Robots are alive again, whatever killed them, with a new memory; robots that are alive do not change.
+    """Robots are alive again after any cause of death, with a new memory; robots that are alive do not change.
 
     A robot whose battery was empty gets a full one.
     """

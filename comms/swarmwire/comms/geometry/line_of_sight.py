@@ -71,7 +71,7 @@ def cell_number(cells, arena, column, row):
 
 @kernel()
 def is_beside(x, y, to_x, to_y, obstacles, k):
-    """Whether both ends of a line are beyond the same side of an obstacle, so that it misses whatever rounding does.
+    """Whether both ends of a line are beyond the same side of an obstacle, so that it misses for any rounding.
 
     It decides most lines without a division.
     """

@@ -67,7 +67,7 @@ def obstacles_within(
 
 
 class ObstacleIndices:
-    """The obstacle index of some arenas: built when first needed, and anew after an obstacle was pushed."""
+    """The obstacle index of some arenas: built at first use, and again after an obstacle was pushed."""
 
     def __init__(
         self,

@@ -110,6 +110,6 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
 def to_nearest(away_m, side_m):
     """What to add to a difference of coordinates on a torus, so that it becomes the shortest; 0 if `side_m` is 0.
 
-    A side of 0 stands for an axis along which an arena does not go on at its other side.
+    A side of 0 stands for an axis along which an arena does not wrap around.
     """
     return -side_m * np.floor(away_m / side_m + 0.5) if side_m > 0.0 else 0.0

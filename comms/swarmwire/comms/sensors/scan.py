@@ -25,7 +25,9 @@ class ScanSpec(RangedSensorSpec):
 
     rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
     range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
-    range_min_m: float = parameter(0.0, help="what is nearer than this reads as if it were there", unit="m", at_least=0)
+    range_min_m: float = parameter(
+        0.0, help="least distance; nearer objects read as this distance", unit="m", at_least=0
+    )
     first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
     span_deg: float = parameter(
         FULL_DEG,

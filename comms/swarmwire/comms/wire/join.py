@@ -31,7 +31,7 @@ class JoinLimits:
         robots_per_runner: robots of one runner; a tick of so many fits into a frame many times.
         waiting: answers and requests of one runner in the world's queue. In lockstep the queue holds one, in real time
             a few; a runner that sends more sends answers that no frame asked for.
-        waiting_bytes: bytes of these together; one message is accepted whatever its size.
+        waiting_bytes: bytes of these together; a single message of any size is accepted.
         flood: dropped messages of one runner; after these it is lost, and ignored for the rest of the run. To drop a
             message costs the world some 5 us, so that an endless sender would take a core.
         requests: requests for session info, or to join, of one runner in one run. A runner that comes back each minute

@@ -58,7 +58,7 @@ class Network:
     def check(self, where: str, key: str = "network") -> None:
         """BadInput unless it has an endpoint, its files exist, and it is safe or set to insecure."""
         if not (self.listen or self.connect or self.multicast):
-            raise BadInput(where, key, "expected listen, connect or multicast = true: nobody would be reached")
+            raise BadInput(where, key, "expected listen, connect or multicast = true: no peer would be reached")
         for name in ("listen", "connect"):
             for endpoint in cast("tuple[str, ...]", getattr(self, name)):
                 _check_endpoint(endpoint, where, f"{key}.{name}")
@@ -80,7 +80,9 @@ class Network:
         outside = self.multicast or not all(map(is_local, (*self.listen, *self.connect)))
         if self.proves or not outside:
             return None
-        return "network: insecure = true: whoever is in the network can drive, stop and overhear the robots"
+        return (
+            "network: insecure = true: every host in the network can drive and stop the robots and read their packets"
+        )
 
     def check_files(self, where: str, key: str) -> None:
         """BadInput unless all three files of a certificate exist, or none is set, and others cannot read the key."""

@@ -43,7 +43,7 @@ Row = dict[str, Any]  # one run, by column
 
 
 def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
-    """What came of one arena, by column; of metrics that are `times` their last value alone."""
+    """The results of one arena, by column; of metrics that are `times` their last value alone."""
     row: Row = {
         "ended": arena.ended,
         "error": None,
@@ -81,7 +81,7 @@ def _radio_columns(radio: RadioResult) -> dict[str, Any]:
 def responses_of(scenarios: Iterable[Scenario]) -> tuple[Response, ...]:
     """The responses of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric.
 
-    Times come first, then what the scenarios list, then what is measured in every run, and what became of packets.
+    Times come first, then what the scenarios list, then what is measured in every run, and the fates of packets.
     """
     found: dict[str, Response] = {}
     for scenario in scenarios:

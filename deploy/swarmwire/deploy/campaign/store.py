@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 RUNS = "runs"
 NUMBERED = "part-" + "[0-9]" * 8 + ".parquet"
-ROWS_LOST = "without the file --resume runs again what it held"
+ROWS_LOST = "without the file, --resume repeats its runs"
 SERIES_LOST = "without the file its runs stay in the table, but not their series"
 
 
@@ -74,7 +74,7 @@ def new_folder(folder: Path, what: str) -> Generator[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInput("--out", str(folder), f"expected a new or empty folder; to go on with a {what}: --resume")
+            raise BadInput("--out", str(folder), f"expected a new or empty folder; to continue a {what}: --resume")
         scenario_folder.mkdir()  # of several that found it empty, the system lets one alone make it
         yield scenario_folder
     except OSError as error:

@@ -135,7 +135,7 @@ def check_same(plan: Plan, campaign: Campaign, folder: Path) -> None:
     for name in SAME:
         if _plain(planned, name) != _plain(campaign, name):
             what = "another scenario" if name == "files" else f"other {name}"
-            expected = f"the campaign in the folder has {what}; --resume alone goes on with it"
+            expected = f"the campaign in the folder has {what}; use --resume alone to continue it"
             raise BadInput(f"--resume {folder}", name, expected)
 
 

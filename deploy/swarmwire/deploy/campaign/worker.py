@@ -64,7 +64,7 @@ class TaskResult:
 def run_task(task: Task, worker: str = "", alive: Callable[[], bool] = lambda: True) -> TaskResult:
     """Run a task to its end in this process, which `worker` names in the rows.
 
-    What a run raises is in its row. `alive` is called every second while ticks go on; where it returns False, nobody
+    What a run raises is in its row. `alive` is called every second between ticks; where it returns False, no one
     waits for the task any more: it ends after the tick, and Interrupted is raised.
     """
     clock = WallClock()
@@ -124,7 +124,7 @@ class TickSeries(Observer):
 
 
 class Alive(Observer):
-    """Observer that calls `alive` while ticks go on, and interrupts the run where it returns False."""
+    """Observer that calls `alive` between ticks, and interrupts the run where it returns False."""
 
     def __init__(self, alive: Callable[[], bool], interrupt: Interrupt, clock: Clock | None = None) -> None:
         self._alive, self._interrupt, self._clock = alive, interrupt, clock or WallClock()
@@ -162,7 +162,7 @@ def _together(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes |
         if simulation.record_failed:
             raise simulation.record_failed
         if simulation.interrupt.asked:
-            raise Interrupted("nobody waits for the task any more")
+            raise Interrupted("no client waits for the task any more")
     finally:
         if out is not None and out.exists():
             out.replace(str(task.record_to))

@@ -112,7 +112,7 @@ def _gateway(name: str) -> Entry:
         return _missing("gateway", name, fault, GATEWAYS)
     facts = (
         ("in a run", f"swarmwire run --gateway {name}"),
-        ("sensors that it tells", ", ".join(sorted(kind.sensors))),
+        ("sensors that it reads", ", ".join(sorted(kind.sensors))),
     )
     return _protocol("gateway", name, kind, facts)
 

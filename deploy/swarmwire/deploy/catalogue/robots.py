@@ -177,7 +177,7 @@ def _of_tx_status() -> Entry:
         ("read as", f"robot.radio.tx_status: {first_line(RadioPort.tx_status.__doc__)}"),
         ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
     )
-    told = "The sender learns what became of a packet to one robot, as far as its own radio knows."
+    told = "The sender gets a transmit status for each unicast packet, as far as its own radio knows."
     return Entry(kind="sensor", name=TX_STATUS, help=told, facts=(*facts, *results))
 
 

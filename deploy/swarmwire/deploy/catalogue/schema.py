@@ -75,7 +75,7 @@ UNITS = {
 
 
 def unit_of(name: str) -> str:
-    """The unit that the end of a name tells; empty if it tells none.
+    """The unit at the end of a name; empty if it has none.
 
     >>> unit_of("turn_gain_per_s"), unit_of("speed_mps"), unit_of("cohesion")
     ('1/s', 'm/s', '')

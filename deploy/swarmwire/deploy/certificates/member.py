@@ -22,7 +22,7 @@ from swarmwire.deploy.certificates.register import (
     key_path,
 )
 
-WARNING = "insecure: whoever is in the network can take part in the run, overhear it and end it"
+WARNING = "insecure: every host in the network can take part in the run, read its packets and end it"
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Member:
 
     Attributes:
         network: the settings that sessions take, without endpoints.
-        access: who may do what, for those at whom others call; None: nobody can be told from another.
+        access: the rights of each name, for members that listen; None: members cannot be distinguished.
     """
 
     network: Network
     access: RunAccess | None
 
     def warning(self, endpoints: Sequence[str]) -> str | None:
-        """What to tell the user each time, if these endpoints reach beyond this machine and prove nothing."""
+        """The warning for the user, if these endpoints reach beyond this machine without certificates."""
         told = replace(self.network, listen=tuple(endpoints)).warning
         return WARNING if told and self.network.insecure else None  # without --insecure they are refused
 

@@ -1,4 +1,4 @@
-"""`swarmwire ctl`: status, pace and end of runs that go on, from another terminal."""
+"""`swarmwire ctl`: status, pace and end of live runs, from another terminal."""
 
 import json
 from collections.abc import Generator, Mapping
@@ -129,7 +129,7 @@ def status_command(context: typer.Context, as_json: AsJson = False) -> None:
         for status, folder in told:
             typer.echo(json.dumps({**status, "folder": folder}))
     elif not told:
-        typer.echo("no run of yours goes on on this machine")
+        typer.echo("none of your runs is live on this machine")
     elif len(told) > 1:
         _print_table(told)
     else:

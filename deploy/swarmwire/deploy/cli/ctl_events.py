@@ -123,7 +123,7 @@ def jam_command(
     at: Annotated[
         str | None, typer.Option(help="Where it stands, in m from the arena's middle.", metavar="X,Y")
     ] = None,
-    power_dbm: Annotated[float, typer.Option("--power", help="What it radiates, dBm.", metavar="DBM")] = 20.0,
+    power_dbm: Annotated[float, typer.Option("--power", help="Radiated power, dBm.", metavar="DBM")] = 20.0,
     duty: Annotated[float | None, typer.Option(help="The share of time for which it is on. Default: 1.")] = None,
     for_s: ForS = None,
 ) -> None:

@@ -14,7 +14,7 @@ DEFAULT_NAME = "picture.png"
 FILES = "; ".join(f"{', '.join(of.suffixes)}: {of.help}" for of in EXPORTERS if of in DEFAULTS)
 KINDS = "; ".join(f"{of.name} ({', '.join(of.suffixes)}): {of.help}" for of in EXPORTERS if of not in DEFAULTS)
 
-Run = Annotated[Path, typer.Argument(help="A run folder, of a run that goes on or was killed too.", metavar="RUN")]
+Run = Annotated[Path, typer.Argument(help="A run folder; the run may be live or killed.", metavar="RUN")]
 To = Annotated[
     Path | None,
     typer.Option(help=f"The file, whose suffix selects its content. {FILES}. Default: picture.png in RUN."),
@@ -26,8 +26,8 @@ Kind = Annotated[
 At = Annotated[
     float | None, typer.Option("--at", help="Time of a picture, in s. Default: the end of the run.", metavar="S")
 ]
-From = Annotated[float | None, typer.Option("--from", help="Start of what is exported, in s.", metavar="S")]
-Until = Annotated[float | None, typer.Option("--until", help="End of what is exported, in s.", metavar="S")]
+From = Annotated[float | None, typer.Option("--from", help="Start of the exported part, in s.", metavar="S")]
+Until = Annotated[float | None, typer.Option("--until", help="End of the exported part, in s.", metavar="S")]
 FramesPerS = Annotated[
     float | None,
     typer.Option(help="Frames per second of a film. Default: 10 (GIF), 25 (MP4), or one per tick if that is less."),

@@ -81,10 +81,10 @@ Select = Annotated[
     typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
 ]
 
-View = Annotated[bool, typer.Option("--view", help="Look at it while it goes on, as `swarmwire view` does.")]
+View = Annotated[bool, typer.Option("--view", help="Show the run live, as `swarmwire view` does.")]
 Ui = Annotated[
     bool,
-    typer.Option("--ui", help="Control it in a browser while it goes on, as `swarmwire ui` does; it begins paused."),
+    typer.Option("--ui", help="Control the run in a browser, as `swarmwire ui` does; it starts paused."),
 ]
 Port = Annotated[
     int | None, typer.Option(help="Port of the page for a browser. Default: a free one.", min=1, max=65535)

@@ -49,8 +49,8 @@ def fit_command(
     what was sent on a link (or by a robot to all). The table fits into a scenario as it stands; without path loss it
     is for a radio that has a model or a range of its own.
 
-    Robots' networks tell no strengths: of their logs range, losses and latencies are fitted, and the delivery of
-    each link is told. Every row is a packet that arrived; what was sent and not received was lost.
+    Robots' networks report no signal strength: range, losses and latencies are fitted to their logs, and the delivery
+    of each link is printed. Every row is a packet that arrived; a packet sent without such a row was lost.
     """
     from rich.console import Console
 
@@ -143,7 +143,7 @@ def probe_command(
     contention: Annotated[
         str | None,
         typer.Option(
-            metavar="N,BYTES,INTERVAL_S", help="Of a preset: nodes in one spot, what each sends, and how often."
+            metavar="N,BYTES,INTERVAL_S", help="Of a preset: nodes at one place, payload and sending rate of each."
         ),
     ] = None,
     settings: Overrides = None,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 robots_app = typer.Typer(
-    help="A fleet of real robots, as a fleet.toml lists it: what runs on them, over SSH, all at the same time.",
+    help="Manage the real robots of a fleet.toml: deploy, start, stop and inspect them in parallel over SSH.",
     no_args_is_help=True,
 )
 
@@ -81,7 +81,7 @@ def check_command(
         bool, typer.Option("--trust", help="Show the keys of hosts that are new, and add them to known_hosts.")
     ] = False,
     offline: Annotated[
-        bool, typer.Option("--offline", help="Check only what can be known here: settings, agents, what they need.")
+        bool, typer.Option("--offline", help="Check settings, agents and their needs on this machine only.")
     ] = False,
 ) -> None:
     """Check whether a deployment would work: settings, agents and their needs; each host, its Python, disk and clock.
@@ -143,7 +143,7 @@ def deploy_command(
     robots: OfRobots = None,
     groups: OfGroups = None,
     restart: Annotated[
-        bool, typer.Option("--restart", help="Start robots anew that run an older release. Default: they go on.")
+        bool, typer.Option("--restart", help="Restart robots that run an older release. Default: leave them running.")
     ] = False,
     wheels: Annotated[
         Path | None,
@@ -152,7 +152,7 @@ def deploy_command(
 ) -> None:
     """Bring agents, settings and all packages that they need to robots, as releases that are switched to at once.
 
-    Each is tried out on its robot first. What fails on one robot leaves that one as it was, and others go on; to do
+    Each is tried out on its robot first. A failure leaves that robot unchanged and does not stop the others; to do
     it again does only what is missing. Robots keep their last three releases.
 
     Exit code 0: all robots have it; 1: not every robot; 2: refused before anything was sent. For example:
@@ -173,7 +173,7 @@ def deploy_command(
 
 @robots_app.command("start")
 def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
-    """Start robots' agents; those that run go on.
+    """Start robots' agents; running agents keep running.
 
     Exit code 1: one of them did not start. For example:
 
@@ -201,7 +201,7 @@ def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = No
 
 @robots_app.command("rollback")
 def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
-    """Go back to the release before; robots that run are started anew.
+    """Go back to the release before; running robots are restarted.
 
     Exit code 1: not for every robot. For example:
 
@@ -287,7 +287,7 @@ def logs_command(
     robots: OfRobots = None,
     groups: OfGroups = None,
     lines: Annotated[int, typer.Option(min=0, help="Of each robot, the last ones.")] = 10,
-    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what they print, until Ctrl-C.")] = False,
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Keep printing new lines until Ctrl-C.")] = False,
     fetch: Annotated[
         Path | None,
         typer.Option(help="Bring the log of each robot's last start to this folder, for parity.", metavar="DIR"),

@@ -51,7 +51,7 @@ def router_command(
 ) -> None:
     """Forward messages between runners and a world that cannot reach each other.
 
-    It lets through what each may send, as a world does, and goes on until it is interrupted; whom it calls may come
+    It enforces access rights as a world does, and runs until it is interrupted; peers that it connects to may come
     later, or again. Routers before and behind it are named alike. For example:
 
       swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs

@@ -80,7 +80,7 @@ def run_command(
 ) -> None:
     """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
 
-    Without --realtime the same scenario and seed give the same run bit for bit, whatever --runners and --threads say.
+    Without --realtime the same scenario and seed give the same run bit for bit, for all --runners and --threads.
 
     With --gateway robots answer as real ones would, in real time, to programs that drive them: swarmwire-agent, whose
     settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
@@ -118,7 +118,7 @@ def run_command(
 def run_shown(
     config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
 ) -> None:
-    """Run a scenario into its folder, shown while it goes on and afterwards."""
+    """Run a scenario into its folder, shown live and afterwards."""
     from swarmwire.deploy.host import compiling_told
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
     from swarmwire.deploy.live.remote_control import Announced
@@ -203,7 +203,7 @@ def repeat_command(
     if repetition.changes:
         console.print(f"changed since the {'run' if run is None else 'campaign began'}:")
     elif repetition.same is False and run is None:
-        console.print("files, modules, versions and CPU are the same: does an agent draw or read the time by itself?")
+        console.print("files, modules, versions and CPU match: does an agent use other random numbers or the clock?")
     for change in repetition.changes:
         console.print(f"  {change}", markup=False)
     if out is not None:

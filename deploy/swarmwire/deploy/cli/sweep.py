@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Vary = Annotated[
     list[str] | None,
     typer.Option(
-        help="What varies: PATH=FIRST:LAST:COUNT (radio.loss=0:0.8:9; :log behind it for equal ratios), or a list of "
+        help="Parameter: PATH=FIRST:LAST:COUNT (radio.loss=0:0.8:9; :log behind it for equal ratios), or a list of "
         "values (robots.flock.count=5,10,20); for random and latin designs PATH=FIRST:LAST. Repeatable.",
         metavar="PATH=VALUES",
     ),
@@ -46,7 +46,7 @@ def sweep_command(
     out: Annotated[
         Path | None, typer.Option(help="The campaign's folder, new or empty. Default: campaigns/<scenario>-<UTC>.")
     ] = None,
-    name: Annotated[str | None, typer.Option(help="What the campaign is called. Default: as the scenario.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the campaign. Default: the scenario's.")] = None,
     executor: Annotated[
         str, typer.Option(help="Who works: local, or a cluster, such as dask://host:8786.", metavar="EXECUTOR")
     ] = "local",
@@ -62,10 +62,10 @@ def sweep_command(
         str | None, typer.Option(help="Whose runs get full run folders; as for --seeds.", metavar="SEEDS")
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Do only what is missing of the campaign in this folder.", metavar="DIR")
+        Path | None, typer.Option(help="Run only the missing runs of the campaign in this folder.", metavar="DIR")
     ] = None,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="With --resume: also run again what failed.")
+        bool, typer.Option("--retry-failed", help="With --resume: also repeat failed runs.")
     ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="With --resume: also by another version of the code, or on another CPU.")
@@ -148,7 +148,7 @@ def tune_command(
     search: Annotated[
         list[str] | None,
         typer.Option(
-            help="What is searched: PATH=LOW:HIGH (robots.flock.params.separation_m=0.02:0.2; :log behind it for equal "
+            help="Parameter: PATH=LOW:HIGH (robots.flock.params.separation_m=0.02:0.2; :log behind it for equal "
             "ratios), or choices, PATH=a,b,c. Repeatable.",
             metavar="PATH=VALUES",
         ),
@@ -177,9 +177,7 @@ def tune_command(
         ),
     ] = None,
     overrides: Overrides = None,
-    sampler: Annotated[
-        str | None, typer.Option(help=f"What proposes parameters: tpe or random. Default: {SAMPLER}.")
-    ] = None,
+    sampler: Annotated[str | None, typer.Option(help=f"Search method: tpe or random. Default: {SAMPLER}.")] = None,
     sampler_seed: Annotated[int | None, typer.Option(help=f"Seed of the sampler. Default: {SAMPLER_SEED}.")] = None,
     parallel_trials: Annotated[
         int | None,
@@ -191,7 +189,7 @@ def tune_command(
     workers: Annotated[int | None, typer.Option(help="Worker processes. Default: one for each core.")] = None,
     resume: Annotated[
         Path | None,
-        typer.Option(help="Go on with the tuning in this folder; with --trials up to so many.", metavar="DIR"),
+        typer.Option(help="Continue the tuning in this folder, up to --trials trials.", metavar="DIR"),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="With --resume: also by another version of the code, or on another CPU.")
@@ -241,7 +239,7 @@ def _refuse_with_resume(given: Mapping[str, object]) -> None:
     """BadInput for options that the folder of a tuning answers."""
     for option, value in given.items():
         if value:
-            raise BadInput(option, "", "expected --resume without it: the folder says what was asked")
+            raise BadInput(option, "", "expected --resume without it: the folder holds the campaign's settings")
 
 
 def _tuning_plan(

@@ -33,7 +33,7 @@ def view_command(
     port: Port = None,
     with_parent: WithParent = False,
 ) -> None:
-    """Look at a run: live while it goes on, its recording afterwards. Ctrl-C, or closing the window, ends the view.
+    """Show a run: live, or its recording afterwards. Ctrl-C, or closing the window, ends the view.
 
     Opens a window if there is a screen; else prints an address for a browser on this machine.
     """
@@ -71,7 +71,7 @@ def _show(run: Path, options: "ViewOptions") -> None:
         else:
             return
     if not recording.is_file():
-        raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a run that goes on, or a recording")
+        raise BadInput(str(run), "", f"expected a run folder with {RECORDING} or a live run, or a recording")
     show_recording(recording, options)
 
 
@@ -81,9 +81,7 @@ ELSEWHERE = 0  # in place of a process of this machine
 def ui_command(
     run: Annotated[
         str | None,
-        typer.Argument(
-            help="The id of a run that goes on, or its folder. Default: the only one there is.", metavar="RUN"
-        ),
+        typer.Argument(help="The id of a live run, or its folder. Default: the only live run.", metavar="RUN"),
     ] = None,
     endpoint: Endpoint = None,
     certs: Certs = None,
@@ -95,7 +93,7 @@ def ui_command(
     port: Port = None,
     with_parent: WithParent = False,
 ) -> None:
-    """Open the page of a run that goes on: look at it, pause and step it, break and mend it. Ctrl-C ends the page.
+    """Open the page of a live run: watch, pause and step it, inject and clear faults. Ctrl-C ends the page.
 
     The page is for browsers of this machine alone, and open to anybody who has its address with the token in it.
     """

@@ -50,7 +50,7 @@ async def connected(
 def lost(reason: str = "") -> HostFailed:
     """The failure of a connection that was there."""
     told = f": {reason}" if reason else ""
-    return HostFailed(f"the connection was lost{told}", "do it again: what was under way has changed nothing")
+    return HostFailed(f"the connection was lost{told}", "do it again: the interrupted step has changed nothing")
 
 
 def keys_in(known_hosts: Path) -> asyncssh.SSHKnownHosts:
@@ -91,7 +91,7 @@ def _check_known(host: Host, known: asyncssh.SSHKnownHosts, file: Path) -> None:
 
 def _changed(host: Host, file: Path, detail: str) -> HostFailed:
     return HostFailed(
-        f"{host} is another machine than it was, or was set up anew: its key is not the one in {file} ({detail})",
+        f"{host} is another machine or was reinstalled: its key is not the one in {file} ({detail})",
         "if that is as it should be, remove its line there, then swarmwire robots check --trust",
     )
 
@@ -114,7 +114,7 @@ class NewHost:
 
 
 async def trust_new(hosts: Iterable[Host], known_hosts: Path) -> list[NewHost]:
-    """Add the keys of hosts that are not in the file yet; those of others stay, whatever they show now."""
+    """Add the keys of hosts that are not in the file yet; keys of known hosts never change."""
     known = keys_in(known_hosts)
     found = await asyncio.gather(*(_asked(host) for host in _once(hosts) if not is_known(host, known)))
     lines = [new.line for new in found if new.line]

@@ -39,7 +39,7 @@ async def deploy(
     *,
     restart: bool = False,
 ) -> list[Result]:
-    """What became of each robot; `contents` are the releases' entries by robot."""
+    """The result of each robot; `contents` are the releases' entries by robot."""
     with TemporaryDirectory() as folder:
         deployment = _Deployment(contents, environments, Path(folder), watcher, restart)
         return await on_hosts(robots, fleet.known_hosts, deployment.one, deployment.before, deployment.after, watcher)
@@ -123,7 +123,7 @@ class _Deployment:
         if state.get("ActiveState") not in ("active", "activating") or running == release.name:
             return ""
         if not self.restart:
-            return f"; still runs {running or 'another'}, until it is started anew"
+            return f"; still runs {running or 'another'}, until it is restarted"
         self.watcher.step(robot.name, "restart")
         said = (await session.ask("run_units", verb="restart", robots=[robot.name]))[robot.name]
         if said:

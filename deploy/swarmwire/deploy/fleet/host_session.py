@@ -164,7 +164,7 @@ class HostSession:
 def _trial_failed(lines: list[str]) -> HostFailed:
     """The failure of a trial run, of which these are the last lines."""
     missing = NO_MODULE.search(lines[-1])
-    cures = [f'packages = ["{missing[1]}"] in fleet.toml deploys what the agent imports'] if missing else lines[:-1]
+    cures = [f'packages = ["{missing[1]}"] in fleet.toml deploys a missing package'] if missing else lines[:-1]
     return HostFailed(f"the trial run on the robot failed: {lines[-1]}", " | ".join(cures))
 
 
@@ -190,7 +190,7 @@ async def host_session(host: Host, known_hosts: Path) -> AsyncGenerator[HostSess
 
 
 def start_command(python: str) -> str:
-    """The command for the host's shell; its Python, however old, tells its version, and reads on if it will do."""
+    """The command for the host's shell; any Python prints its version; a supported one continues."""
     return f"exec {shlex.quote(python)} -c {shlex.quote(START)}"
 
 

@@ -25,7 +25,7 @@ newest=$(ls -1d {robot}-*/ 2>/dev/null | sort | tail -n 1)
 test -n "$newest" || exit {no_log}
 exec tar -czf - -C "$newest" ."""
 TOO_LARGE = f"its log is larger than {MAX_BYTES / 1e9:.1f} GB"
-IN_PARTS = "copy what you need of it: scp, from ~/swarmwire/{robot}/log"
+IN_PARTS = "copy the files that you need with scp, from ~/swarmwire/{robot}/log"
 NOTHING_PRINTED = "-- No entries --"  # of journalctl
 Say = Callable[[str, str], None]  # a robot's name, and a line of its
 Work = Callable[[asyncssh.SSHClientConnection, Robot], Awaitable[Result]]
@@ -34,7 +34,7 @@ Work = Callable[[asyncssh.SSHClientConnection, Robot], Awaitable[Result]]
 async def show_logs(
     fleet: Fleet, robots: Sequence[Robot], lines: int, say: Say, *, follow: bool = False
 ) -> list[Result]:
-    """Tell the last lines that robots' agents printed, and with `follow` those to come, until it is cancelled."""
+    """Report the last lines that robots' agents printed, and with `follow` those to come, until it is cancelled."""
 
     async def one(connection: asyncssh.SSHClientConnection, robot: Robot) -> Result:
         printed = False

@@ -207,7 +207,7 @@ def _place(name: str) -> str:
 
 
 def own_entries() -> list[Entry]:
-    """The files of both packages, and what tells of them."""
+    """The files of both packages, and their metadata."""
     return [entry for name in OWN for entry in _entries_of(name)]
 
 
@@ -286,7 +286,7 @@ class LockedEnvironments:
 
 
 def default_cache() -> Path:
-    """Where the user's programs keep what they can make anew."""
+    """The user's cache folder."""
     base = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(base) if base else Path.home() / ".cache") / "swarmwire" / "robots"
 

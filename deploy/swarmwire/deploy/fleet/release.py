@@ -109,7 +109,7 @@ def package_links(environments: Sequence[Archive]) -> dict[str, str]:
 
 
 def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[Entry]:
-    """What a release holds whatever machine it goes to: agent, body, settings, certificates; BadInput without one."""
+    """The parts of a release common to all machines: agent, body, settings, certificates; BadInput without one."""
     settings = tomli_w.dumps(robot_settings(fleet, robot, revoked))
     entries = [Entry(SETTINGS_FILE, settings.encode())]
     for key, name in (("agent", _file_of(robot.settings["agent"])), ("body", robot.settings.get("body", ""))):
@@ -170,7 +170,7 @@ def robot_settings(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[s
 
 
 def operator_network(fleet: Fleet, revoked: Sequence[str], robots: Sequence[Robot]) -> dict[str, Any]:
-    """The network of whoever asks these robots from here; its files are in the fleet's folder of certificates."""
+    """The network of a client of these robots on this machine; its files are in the fleet's folder of certificates."""
     connect = [robot.endpoint for robot in robots]
     if fleet.certificates is None:
         return {"connect": connect, "insecure": True}

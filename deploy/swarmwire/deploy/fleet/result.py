@@ -13,7 +13,7 @@ from swarmwire.deploy.terminal.tables import aligned
 
 
 class HostFailed(SwarmwireError):
-    """A robot's host cannot be reached, or not do what was asked: why, and what helps. Others go on."""
+    """A robot's host cannot be reached or cannot do the request: the reason and a remedy. Other robots continue."""
 
     def __init__(self, cause: str, cure: str = "") -> None:
         self.cause, self.cure = cause, cure
@@ -36,7 +36,7 @@ class Result:
 
 
 class Watcher(Protocol):
-    """Told of each robot what is done to it."""
+    """Receives the progress of each robot."""
 
     def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
         """Something begins, or has got to `done` of `total` bytes."""
@@ -48,7 +48,7 @@ class Watcher(Protocol):
 
 
 class Silent:
-    """Nobody looks on."""
+    """No observer."""
 
     def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
         """Nothing to do."""

@@ -24,7 +24,7 @@ from swarmwire.deploy.fleet.release import operator_network
 from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
 
 AT_REST = ("inactive", "failed")
-LOOK = "swarmwire robots logs tells what its agent says"
+LOOK = "swarmwire robots logs shows its agent's output"
 NETWORK_S = 3.0  # who has not answered by then will not
 CONNECT_S, STOP_S = 5.0, 10.0
 STOP = """export XDG_RUNTIME_DIR="${{XDG_RUNTIME_DIR:-/run/user/$(id -u)}}"
@@ -35,7 +35,7 @@ Said = dict[str, str]  # by robot: "" if it is confirmed, else why not
 
 
 async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
-    """Start robots' agents, each by its current release; those that run go on as they are."""
+    """Start robots' agents, each by its current release; running agents do not change."""
 
     async def before(session: HostSession, _: list[Robot]) -> None:
         session.need_manager()
@@ -79,7 +79,7 @@ async def stop(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT)
 
 
 async def rollback(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
-    """Go back to the release before the current one; robots that run are started anew with it."""
+    """Go back to the release before the current one; running robots are restarted with it."""
 
     async def before(session: HostSession, _: list[Robot]) -> None:
         await session.ask("lock")

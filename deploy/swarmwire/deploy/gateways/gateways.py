@@ -37,7 +37,7 @@ WHERE, OPTION, SWARM = "--gateway", "--gateway-set", "--swarm"
 
 @dataclass(frozen=True)
 class Gateways:
-    """Gateways of a run, and the network on which it tells poses and its air serves agents of such robots.
+    """Gateways of a run, and the network on which it publishes poses and its radio medium serves agents of such robots.
 
     `of` has "KIND" or "KIND@ADDRESS" for each group, and for all others under ""; without an address the gateway
     chooses one.
@@ -105,7 +105,7 @@ def network_of(
 ) -> Network | None:
     """From `--network` and what goes with it; None where nothing is said of it. BadInput if it will not do."""
     if revoked and ca is None:
-        raise BadInput("--revoked", "", "expected --ca with it: without certificates nobody is known by name")
+        raise BadInput("--revoked", "", "expected --ca with it: without certificates peers have no names")
     if endpoint is None and not (ca or certificate or key or insecure):
         return None
     network = Network(
@@ -147,7 +147,7 @@ class Chosen:
     options: Any  # an instance of `made.options`
 
     def sensors(self, body: Body) -> tuple[str, ...]:
-        """The sensors of this body that it tells."""
+        """The sensors of this body that it serves."""
         return tuple(name for name in body.sensors if name in self.made.sensors)
 
 
@@ -201,7 +201,7 @@ WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # what a robot takes: more than a step
 class RobotSettings:
     """From a run to the settings of its robots, with which they act as they would in it.
 
-    Their limits are the body's own, since emulated robots run into nobody.
+    Their limits are the body's own, since emulated robots cannot hurt people.
     """
 
     scenario: Scenario

@@ -1,4 +1,4 @@
-"""The gateways of a run: robots that answer as real ones while the run goes on."""
+"""The gateways of a run: robots that answer as real ones during the run."""
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -82,7 +82,7 @@ class RunGateways:
             raise BadInput("--runners", "", expected)
 
     def sensors(self, needs: Mapping[str, Sequence[str]], bodies: Mapping[str, Body]) -> dict[str, tuple[str, ...]]:
-        """The sensors to compute, by group: what its agent needs and, behind a gateway, also all that this tells."""
+        """The sensors to compute, by group: what its agent needs and, behind a gateway, also all that this serves."""
         told = {group: self._chosen[group].sensors(bodies[group]) if group in self._chosen else () for group in needs}
         return {group: tuple(dict.fromkeys([*need, *told[group]])) for group, need in needs.items()}
 
@@ -98,7 +98,7 @@ class RunGateways:
     ) -> Generator[Served | None]:
         """All robots behind gateways answer within the context; None if there are none.
 
-        `agents` names the spec of each group's agent; `say` is told what people should know. BadInput if an address is
+        `agents` names the spec of each group's agent; `say` receives messages for the user. BadInput if an address is
         taken, or will not do.
         """
         gateways = self._gateways
@@ -171,7 +171,7 @@ NAMED = 6  # robots, at most
 
 
 class Undriven(Observer):
-    """Observer that tells people which robots no program has told how to move: a run in which they stand still."""
+    """Observer that reports robots without a command from any program: these stand still."""
 
     def __init__(self, served: Served, pace: float, say: Callable[[str], None]) -> None:
         """`pace` is of the run, in simulated seconds per second of wall time."""
@@ -179,14 +179,14 @@ class Undriven(Observer):
         self._told = False
 
     def see(self, truth: Truth) -> None:
-        """Tell of them once, when they could be driven."""
+        """Report them once, when they could be driven."""
         if not self._told and to_s(truth.time_ns) >= GRACE_S * self._pace:
             self._told = True
-            self._tell("nobody drives")
+            self._tell("no program drives")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Tell of those that nobody drove at all."""
-        self._tell("nobody drove")
+        """Report those that no program drove at all."""
+        self._tell("no program drove")
         return {}
 
     def _tell(self, verb: str) -> None:

@@ -1,1 +1,1 @@
-"""Looking at a run while it goes on: what it publishes for observers, and the process that shows it."""
+"""Live runs: publishing for observers, and the process that shows them."""

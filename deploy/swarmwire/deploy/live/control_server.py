@@ -28,9 +28,9 @@ SMOOTHING = 0.1  # weight of the newest tick in the mean time of a tick
 
 
 class Status(Observer):
-    """Observer that keeps the newest tick, which costs next to nothing; all else is worked out when somebody asks.
+    """Observer that keeps the newest tick, which costs next to nothing; all else is computed on request.
 
-    Of several arenas it tells of one, as what is published does, but for counts, which are of all.
+    Of several arenas it reports one, as publishing does, except counts, which are of all.
     """
 
     before_agents = True  # it begins before the run's agents are there
@@ -172,7 +172,7 @@ class ControlServer:
                 return "paused", None
             case "resume":
                 controls.resume()
-                return "going on", None
+                return "running", None
             case "step":
                 controls.step_by(value)
                 return f"{value} {'tick' if value == 1 else 'ticks'}, then paused", None

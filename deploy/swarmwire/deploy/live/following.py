@@ -1,4 +1,4 @@
-"""A run that goes on in another process: where it is (`live.json` in its folder), and what it publishes."""
+"""A live run in another process: its address (`live.json` in its folder) and its publications."""
 
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of put, reply and close.
@@ -37,12 +37,12 @@ class Live:
     pid: int  # of the world's process
 
     def write(self, folder: Path) -> None:
-        """Tell of it in the run folder; whoever reads the file finds all of it or none."""
+        """Write the address to the run folder; a reader finds the complete file or none."""
         write_text(folder / LIVE, json.dumps(asdict(self)))
 
 
 def read_live(folder: Path) -> Live | None:
-    """The run that goes on in this folder, None if there is none; BadInput if its file says something else."""
+    """The live run of this folder, None if there is none; BadInput if its file says something else."""
     path = folder / LIVE
     try:
         told: Any = from_json(path.read_bytes())

@@ -145,5 +145,5 @@ class PageBeside(LiveView):
         if self._simulation.tick <= 1:  # it never came to be used, so nobody will press play
             controls.resume()
         elif not self._over:
-            held = "paused: swarmwire ctl resume lets it go on" if controls.paused else "going on"
+            held = "paused: swarmwire ctl resume continues it" if controls.paused else "running"
             self._print(f"the page has ended, the run is {held}; swarmwire ui opens another page")

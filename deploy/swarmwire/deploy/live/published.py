@@ -1,4 +1,4 @@
-"""A run published for observers: whoever wants looks on from a process of its own, and the run does not notice.
+"""A run published for observers: viewers connect from their own processes and do not affect the run.
 
 What adds up from tick to tick (counts of packets, contacts, events) is published in full with the next tick that is; of
 the links that ended, those of that tick alone.
@@ -111,9 +111,9 @@ LEAVE_S = 2.0  # how long the last frame may take
 
 
 class Published(Observer):
-    """Observer that publishes one arena of a run on an endpoint of its own, as `live.json` in the run folder tells.
+    """Observer that publishes one arena of a run on an endpoint of its own, which `live.json` in the run folder names.
 
-    At most 30 ticks per second of wall time are published; nothing is encoded, nor even counted, while nobody looks on.
+    At most 30 ticks per second of wall time are published; nothing is encoded or counted without a viewer.
     Frames are encoded and sent in a thread of their own, and a tick that finds it busy is left out: an observer that is
     slow, frozen or dead does not hold the run. It publishes what `metrics` measured, so that must see each tick before.
 
@@ -149,7 +149,7 @@ class Published(Observer):
         self.frames = self.left_out = 0
 
     def open(self) -> None:
-        """Listen, before anything is there to be seen; `begin` does, if nobody did. BadInput if an endpoint is taken.
+        """Listen before there is anything to publish; `begin` does otherwise. BadInput if an endpoint is taken.
 
         `end` closes it, and so does `close`, if there is no `begin`.
         """
@@ -163,7 +163,7 @@ class Published(Observer):
         self._open.close()
 
     def begin(self, static: Static) -> None:
-        """Tell where it can be seen; BadInput if there is no such arena."""
+        """Write its address to the run folder; BadInput if there is no such arena."""
         if not 0 <= self._arena < static.arenas:
             raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
         self._selected = selected_robot(static, self._selected, "live view")
@@ -188,7 +188,7 @@ class Published(Observer):
             self._open = opening.pop_all()
 
     def see(self, truth: Truth) -> None:
-        """Publish a tick if it is time to and somebody looks on; none once the arena has left."""
+        """Publish a tick if it is due and there is a viewer; none once the arena has left."""
         if not truth.running[self._arena]:
             return
         self._newest = truth
@@ -228,7 +228,7 @@ class Published(Observer):
                 self._fault = error
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Show how it ended and close the endpoint; whoever looks on learns that the run is over."""
+        """Publish the end of the run and close the endpoint; viewers learn that the run is over."""
         if self._watched and self._since.ticks and self._fault is None:
             self._put(self._clock.now_ns())
         self.close()

@@ -1,6 +1,6 @@
 """Control over a run that another process executes, behind `swarmwire ctl` and the page, and how runs here are found.
 
-A run of this machine has a file, for as long as it goes on, in a private folder: `swarmwire` in XDG_RUNTIME_DIR, if
+A run of this machine has a file, until it ends, in a private folder: `swarmwire` in XDG_RUNTIME_DIR, if
 that is the user's, else one named after the user among the temporary files. The folder must be the user's own and
 closed to others: who may write there could lead people to another run.
 """
@@ -36,9 +36,9 @@ class Refused(SwarmwireError):
 
 
 class RemoteControl:
-    """What may be asked of a run. Each call returns once the run has taken it; `status` tells when it has done it.
+    """The commands to a live run. Each call returns once the run has accepted it; `status` shows when it is done.
 
-    Each raises Refused with the run's line, and RunGone if nobody answers.
+    Each raises Refused with the run's line, and RunGone if no run answers.
     """
 
     def __init__(self, session: zenoh.Session, run: str) -> None:
@@ -54,7 +54,7 @@ class RemoteControl:
         return self._ask("pause")
 
     def resume(self) -> dict[str, Any]:
-        """Go on."""
+        """Resume."""
         return self._ask("resume")
 
     def step(self, n: int = 1) -> dict[str, Any]:
@@ -92,7 +92,7 @@ class RemoteControl:
             raise RunGone(f"the run cannot be asked any more: {str(error).split(' at ')[0]}") from error
         except BadFrame as error:
             raise Refused(f"the run answers in another way than this swarmwire expects: {error}") from error
-        raise RunGone("nobody answers: the run has ended or hangs, or who asks may not")
+        raise RunGone("no answer: the run has ended or hangs, or this client lacks the right")
 
 
 @contextmanager
@@ -132,7 +132,7 @@ OF_OTHERS = 0o077  # bits of a folder's mode that let others than its owner at i
 
 @dataclass(frozen=True)
 class FoundRun:
-    """A run that goes on on this machine."""
+    """A live run on this machine."""
 
     run: str  # its id
     endpoint: str  # of observers
@@ -151,7 +151,7 @@ class Announced(Observer):
         self._path: Path | None = None
 
     def begin(self, static: Static) -> None:
-        """Tell where it is."""
+        """Write its address."""
         live = read_live(self._folder)
         if live is None:
             return
@@ -184,7 +184,7 @@ def runs_folder() -> Path:
 
 
 def found_runs() -> list[FoundRun]:
-    """The runs of this user that go on on this machine, oldest first; files of runs that were killed are removed."""
+    """The live runs of this user on this machine, oldest first; files of runs that were killed are removed."""
     found: list[tuple[float, FoundRun]] = []
     for path in runs_folder().glob("[!.]*.json"):
         with suppress(OSError):  # it has ended by now
@@ -204,7 +204,7 @@ def find_run(named: str | None) -> FoundRun:
     if named is not None and Path(named).is_dir():
         live = read_live(Path(named))
         if live is None:
-            raise BadInput(named, "", "expected the folder of a run that goes on")
+            raise BadInput(named, "", "expected the folder of a live run")
         return FoundRun(live.run, live.endpoint, live.pid, "", named)
     runs = found_runs()
     meant = [run for run in runs if run.run.startswith(named or "")]
@@ -212,12 +212,10 @@ def find_run(named: str | None) -> FoundRun:
         return meant[0]
     where = "RUN" if named is None else named
     if not runs:
-        raise BadInput(
-            "" if named is None else named, "", "expected a run that goes on: this machine has none of yours"
-        )
+        raise BadInput("" if named is None else named, "", "expected a live run: this machine has none of yours")
     listed = [f"{run.run} ({run.scenario}, {run.folder})" for run in runs]
     if meant or named is None:
-        raise BadInput("", where, f"several runs go on; expected one of {', '.join(listed)}")
+        raise BadInput("", where, f"several runs are live; expected one of {', '.join(listed)}")
     raise BadInput("", where, f"expected {did_you_mean([run.run for run in runs], named)}, or a run's folder")
 
 

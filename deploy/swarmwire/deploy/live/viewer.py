@@ -1,4 +1,4 @@
-"""Rerun's viewer as a process of its own, in a window or a browser: it shows a recording, or a run while it goes on."""
+"""Rerun's viewer as a process of its own, in a window or a browser: it shows a recording or a live run."""
 
 import os
 import subprocess
@@ -54,7 +54,7 @@ class Viewer:
 
     @property
     def alive(self) -> bool:
-        """Whether it runs: whoever closes the window ends it."""
+        """Whether it runs: closing the window ends it."""
         return self.process.poll() is None
 
     def wait(self, clock: Clock) -> None:
@@ -152,7 +152,7 @@ def show_recording(recording: Path, options: ViewOptions) -> None:
 
 
 def show_live(live: Live, options: ViewOptions) -> None:
-    """Show a run while it goes on and what there was to see afterwards, until the viewer is closed or stopped.
+    """Show a live run, and its recording afterwards, until the viewer is closed or stopped.
 
     RunGone if the run does not answer.
     """
@@ -173,7 +173,7 @@ def show_live(live: Live, options: ViewOptions) -> None:
 class Drawer(threading.Thread):
     """Draws glimpses of a run until it is over.
 
-    In a thread that nobody waits for: drawing stands still while the viewer does, and ends with it.
+    In a daemon thread: drawing stands still while the viewer does, and ends with it.
     """
 
     def __init__(

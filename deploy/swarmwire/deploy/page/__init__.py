@@ -1,1 +1,1 @@
-"""The page: a run that goes on, in a browser on this machine, with what controls, breaks and mends it beside it."""
+"""The page: a live run in a browser on this machine, with controls and fault injection."""

@@ -31,7 +31,7 @@ class NewsThread(threading.Thread):
     A run that does not answer is "silent" until it does, for it may be frozen; it is over once `over()` says so, too.
 
     Attributes:
-        latest: what was told last.
+        latest: the last message.
         history: what the numbers were, by tick, as far as it is kept.
     """
 
@@ -54,7 +54,7 @@ class NewsThread(threading.Thread):
         self._closed = False
 
     def run(self) -> None:
-        """Look, tell, wait."""
+        """Read the state, publish it, wait."""
         while not self._closed:
             try:
                 status = dict(self._control.status())
@@ -180,7 +180,7 @@ def whom(event: EventRecord, static: Static) -> str:
     """The robots that an event changed, in words."""
     changed = names(event, static)[0]
     if not changed:
-        return "nobody"
+        return "none"
     if len(changed) == static.robots:
         return "all"
     return some(changed, NAMED)

@@ -38,7 +38,7 @@ class _Order(BaseModel):
 
 
 class Go(_Order):
-    """Let no tick begin, go on, or end the run."""
+    """Pause, resume or end the run."""
 
     do: Literal["pause", "resume", "stop"]
 
@@ -151,7 +151,7 @@ class Shown:
 
 
 def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str, port: int) -> ASGIApp:
-    """The page, for whoever asks with the token at this port of the loopback."""
+    """The page, for requests with the token at this port of the loopback."""
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MAX_BYTES)
 
     @app.get("/")
@@ -238,7 +238,7 @@ class Door:
 
 
 def closed_to_others(frames: str) -> Mapping[str, str]:
-    """Headers by which a browser lets the page load nothing but its own, and nobody else show or read it."""
+    """Headers by which a browser lets the page load nothing but its own, and no other site embed or read it."""
     policy = (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
         f"frame-src {frames}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"

@@ -1,4 +1,4 @@
-"""Showing a run on the page: what it publishes in rerun's viewer, and beside it what controls, breaks and mends it."""
+"""A run on the page: rerun's viewer, with controls and fault injection beside it."""
 
 import webbrowser
 from collections.abc import Mapping
@@ -53,7 +53,7 @@ def _first_tick(control: RemoteControl) -> None:
 
 
 def facts(scene: ObservedRun) -> Mapping[str, Any]:
-    """What does not change during the run, as the page is told of it."""
+    """The constants of a run, as sent to the page."""
     static = scene.static
     return {
         "name": static.name,

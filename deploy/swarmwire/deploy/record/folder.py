@@ -1,4 +1,4 @@
-"""The run folder: made at the start, filled while the run goes on, closed with the summary."""
+"""The run folder: made at the start, filled during the run, closed with the summary."""
 
 import json
 import sys
@@ -112,7 +112,7 @@ class RunFolder:
         try:
             print(text, file=sys.stderr, flush=True)
         except (OSError, ValueError) as error:
-            self.note(f"(nobody could be told: {error})")
+            self.note(f"(the message could not be printed: {error})")
 
     def note(self, text: str) -> None:
         """Keep a message in the log."""

@@ -199,7 +199,7 @@ class ReplayedBackend:
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """What every robot did; packets go on air when they did. Nobody hears: who would is in the record."""
+        """What every robot did; packets are sent when they were. None is received: receptions are in the record."""
         for put in self._inputs.puts(tick, self._robots):
             medium.send(put)
         medium.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick

@@ -106,7 +106,7 @@ def module_digests(specs: Iterable[str]) -> dict[str, str]:
     """sha256 by module: of swarmwire's parts, and of the outermost package around each "package.module:Class".
 
     The digest is over the source files on the disk, sorted by name; a module that is no package is its one file. Agents
-    may be edited and loaded anew while a process lives, so theirs are read each time; swarmwire's own, hundreds of
+    may be edited and loaded again while a process lives, so theirs are read each time; swarmwire's own, hundreds of
     files, once. What these packages import from others in turn is not followed.
     """
     places = [spec.rpartition(":")[0] for spec in specs]

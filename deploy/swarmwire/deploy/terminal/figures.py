@@ -1,4 +1,4 @@
-"""The figures of a run that people see while it goes on: of its last tick, its last second and its last minute."""
+"""The figures of a live run in the terminal: of its last tick, last second and last minute."""
 
 import math
 from collections import deque
@@ -68,9 +68,9 @@ class Figures:
 
     @property
     def gone(self) -> str:
-        """How many arenas go on, in words; nothing while all do."""
+        """The number of running arenas, as text; empty while all run."""
         arenas = self.static.arenas
-        return f", {self.running} of {arenas} arenas go on" if self.running < arenas else ""
+        return f", {self.running} of {arenas} arenas running" if self.running < arenas else ""
 
     @property
     def time_s(self) -> float:

@@ -274,7 +274,7 @@ class Binding(NamedTuple):
 
 
 BINDINGS = (
-    Binding(" ", "space", "pause", "pause, or go on", Controls.toggle_pause),
+    Binding(" ", "space", "pause", "pause or resume", Controls.toggle_pause),
     Binding("s.", "s", "step", "one tick, then pause again", Controls.step),
     Binding("+=", "+", "faster", "faster, at last without a limit", Controls.faster),
     Binding("-_", "-", "slower", "slower: limit the speed", Controls.slower),

@@ -70,7 +70,7 @@ class ProgressLines(Observer):
 
 
 class Gathering(Observer, JoinObserver):
-    """Told of runners that come and go, and an observer, since the waiting is over when a run begins.
+    """Receives runner events, and is an observer, since the waiting is over when a run begins.
 
     Who came or went and who was refused is said by the run itself; here it is what is still missing.
     """
@@ -102,7 +102,7 @@ class Gathering(Observer, JoinObserver):
             self._tell(free)
 
     def begin(self, static: Static) -> None:
-        """Nobody is waited for any more."""
+        """The waiting is over."""
         self._stop()
 
     def _tell(self, free: tuple[str, ...]) -> None:

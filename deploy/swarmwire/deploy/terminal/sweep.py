@@ -1,4 +1,4 @@
-"""A campaign as people see it in a terminal: while it goes on, and what came of it."""
+"""A campaign in the terminal: its progress and its summary."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -106,7 +106,7 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
     folder = sweep.folder
     if not sweep.is_over:
         console.print(f"interrupted: {sweep.done} of {sweep.runs} runs are done", soft_wrap=True)
-        console.print(f"go on: {program} sweep --resume {folder}", soft_wrap=True)
+        console.print(f"continue: {program} sweep --resume {folder}", soft_wrap=True)
         return
     campaign = CampaignFolder(folder)
     console.print(_table(campaign))
@@ -117,7 +117,7 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
         why = failed["error"].strip().splitlines()[-1]
         console.print(f"failed: {sweep.failed} of {sweep.runs} runs, such as run {failed['run']}: {why}", markup=False)
         console.print(f"if the machine was at fault: {program} sweep --resume {folder} --retry-failed", soft_wrap=True)
-        console.print("if the scenario's files were: a new campaign, once they are mended; this one keeps its copies")
+        console.print("if the scenario's files were at fault: fix them, then start a new campaign in a new folder")
     console.print(f"written: {folder}", soft_wrap=True)
     console.print(f"look at it: {program} report {folder}", soft_wrap=True)
     console.print(f"again: {program} repeat {folder} --run {min(17, sweep.runs - 1)}", soft_wrap=True)

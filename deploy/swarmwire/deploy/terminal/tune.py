@@ -1,4 +1,4 @@
-"""A tuning as people see it in a terminal: while it goes on, and what came of it."""
+"""A tuning in the terminal: its progress and its summary."""
 
 import math
 from collections.abc import Sequence
@@ -149,7 +149,7 @@ def _print_interrupted(tuned: Tuned, console: Console, program: Path) -> None:
         parameters = ", ".join(f"{path}={parameter_text(value)}" for path, value in tuned.best.parameters.items())
         text = f"best so far: {statistic_text(tuned.best, tuned.tuning.goal)} with {parameters}"
         console.print(text, markup=False, soft_wrap=True)
-    console.print(f"go on: {program} tune --resume {tuned.folder}", markup=False, soft_wrap=True)
+    console.print(f"continue: {program} tune --resume {tuned.folder}", markup=False, soft_wrap=True)
 
 
 def _parameters(tuned: Tuned, best: Trial) -> Table:

@@ -56,7 +56,7 @@ def write_best(folder: Path, tuning: Tuning, trial: Trial) -> Path:
 
 @dataclass(frozen=True)
 class FreshCheck:
-    """What came of the check."""
+    """The results of the check."""
 
     own: Sample
     best: Sample

@@ -85,7 +85,7 @@ def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
 
 
 def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
-    """Write the table of trials that are over anew: number, state, a column of each path, what came of it.
+    """Rewrite the table of finished trials: number, state, a column for each path, the result.
 
     StorageFailed if the disk refuses.
     """

@@ -116,7 +116,7 @@ class StudyFile:
     StorageFailed if the disk refuses.
 
     Attributes:
-        study: as Optuna sees it, for what it can tell of one.
+        study: as Optuna sees it, for its analyses of a study.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -152,7 +152,7 @@ class StudyFile:
             self.study.add_trial(frozen)
 
     def finish(self, number: int, result: TrialResult) -> Trial:
-        """Write what came of a trial that is under way, and give it back."""
+        """Write the result of a running trial, and return it."""
         study = self._storage.get_study_id_from_name(NAME)
         trial = self._storage.get_trial_id_from_study_id_trial_number(study, number)
         with storing(self._folder, "tune"):

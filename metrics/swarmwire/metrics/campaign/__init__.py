@@ -1,1 +1,1 @@
-"""A campaign's folder: what was varied, and what came of each run."""
+"""A campaign's folder: the parameters varied, and the results of each run."""

@@ -1,6 +1,6 @@
 """A campaign as `campaign.json` says it before the first run: what is run, at which points, with which seeds.
 
-Reports read it, and sweeps write it and go on with it, by the same model.
+Reports read it, and sweeps write it and resume from it, by the same model.
 """
 
 import json
@@ -29,7 +29,7 @@ SCENARIO_FOLDER = "scenario"  # from what the runs are made
 FINAL = ".final"  # how columns end that hold the last value of a metric, which its bare name means
 LINK_PDR = "radio.link_pdr"  # the column of received / receivers in range
 ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3
-WRITTEN = "expected what swarmwire writes at the start of a campaign"
+WRITTEN = "expected the content that swarmwire writes at the start of a campaign"
 
 Design = Literal["grid", "list", "random", "latin"]
 Value = bool | int | float | str | list[Any] | Mapping[str, Any] | None  # of a parameter; a map is a TOML table
@@ -51,7 +51,7 @@ class Response:
     hold_s: float = 0.0  # of a time that is known only once something has held so long since
 
     def watched_s(self, end_s: FloatArray) -> FloatArray:
-        """Up to when runs that ended at `end_s` tell of this time: what began later had no time left to hold."""
+        """The censoring time of runs that ended at `end_s`: a state that began later had no time left to hold."""
         return np.maximum(end_s - self.hold_s, 0.0)
 
     @property

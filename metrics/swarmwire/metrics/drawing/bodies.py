@@ -64,7 +64,7 @@ _MIN_RADII = 2.0  # seen in each direction at least, in radii of the body
 
 
 def facts_of(body: Body) -> list[tuple[str, str]]:
-    """Name and value of each; a fact without a name goes on with the one above."""
+    """Name and value of each; a fact without a name continues the one above."""
     drive = body.drive
     facts = [
         ("size", f"{_length(2.0 * body.radius_m)} across, {_length(body.height_m)} high"),

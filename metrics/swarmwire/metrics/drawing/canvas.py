@@ -100,7 +100,7 @@ def add_facts(
 ) -> float:
     """Write name and value in rows from these shares of the figure down; returns the share below the last row.
 
-    `across` is the share of the figure's width from a name to its value; a fact without a name goes on with the one
+    `across` is the share of the figure's width from a name to its value; a fact without a name continues the one
     above it.
     """
     step = ROW_IN / height_in

@@ -1,1 +1,1 @@
-"""Metrics of the network: what became of packets, and how the radio graph holds together."""
+"""Metrics of the network: the fates of packets, and the connectivity of the radio graph."""

@@ -28,9 +28,7 @@ class OfWindow(Metric):
 
     needs = ()
 
-    window_s: float = parameter(
-        1.0, help="what counts is so old at most; rounded up to whole ticks", unit="s", above=0.0
-    )
+    window_s: float = parameter(1.0, help="length of the window; rounded up to whole ticks", unit="s", above=0.0)
 
 
 class Window:
@@ -44,7 +42,7 @@ class Window:
         self._at = 0
 
     def add(self, numbers: ArrayLike) -> IntArray:
-        """Take a tick's numbers (numbers, arenas), and tell their sums over the window, which holds it (same shape)."""
+        """Take a tick's numbers (numbers, arenas), and return their sums over the window up to it (same shape)."""
         oldest = self._ring[self._at]
         self._sum -= oldest
         oldest[:] = numbers

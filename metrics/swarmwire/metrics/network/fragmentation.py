@@ -131,8 +131,8 @@ class Fragmented(OfFragmentation):
     """1 while a fragmentation event lasts, 0 else: its mean is the share of the time.
 
     It is 1 from the tick in which the event is counted, as
-    nobody knows before that the split will last: the share of the time from falling apart to being whole again is this
-    mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
+    it is not known before that the split will last: the share of the time from falling apart to being whole again is
+    this mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
     """
 
     name = "fragmented"

@@ -76,7 +76,7 @@ def _shadowing(log: RadioLog, path_loss: PathLossFit | str) -> ShadowingFit | st
     if isinstance(path_loss, str):
         return "needs a fit of path loss"
     if log.ends_m is None:
-        return "needs positions of sender and receiver, of which distance_m tells too little"
+        return "needs positions of sender and receiver, distance_m is not enough"
     return fit_shadowing(places_of(log))
 
 

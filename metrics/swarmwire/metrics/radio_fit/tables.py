@@ -82,7 +82,7 @@ def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
 def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
     """`{"radio": {...}}` with the parameters that were fitted.
 
-    RSSI tell power, gains and reference loss only in sum: the antenna is an input.
+    RSSI gives power, gains and reference loss only in sum: the antenna is an input.
     """
     radio: dict[str, Any] = {}
     tables: dict[str, Any] = {}
@@ -168,7 +168,7 @@ def network_comments(fit: NetworkFit) -> list[str]:
         comments.append("range_m is the farthest that was tried: the network may reach farther.")
     if fit.log.has_distances:
         comments.append(
-            "gives: the robots had a tracker, which tells range and bearing of what is received; exactly, here."
+            "gives: the robots had a tracker, which measures range and bearing of received packets; exactly, here."
         )
     if isinstance(fit.latency, LatencyFit):
         comments.append("Latencies hold the time on air, too: bit_rate_bps is so high that it adds nothing.")

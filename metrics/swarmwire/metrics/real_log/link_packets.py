@@ -1,8 +1,8 @@
-"""What became of every packet on every link, from what was sent and what was received.
+"""The fate of every packet on every link, from the packets sent and received.
 
 A packet that a robot sent and that another, which it was meant for, did not hear was lost. Of a robot whose own log is
-not there, or that was killed before it had written all, what others received tells what it sent: numbers between that
-are missing everywhere were sent, too. Numbers start anew where they fall by far: the agent was started again.
+not there, or that was killed before it had written all, what others received shows what it sent: numbers between that
+are missing everywhere were sent, too. Numbers start again where they fall by far: the agent was started again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,7 +74,7 @@ def own_packets(nodes: Sequence[Node], where: str) -> tuple[OwnPackets, ...]:
 
 
 def link_packets(nodes: Sequence[Node], own: Sequence[OwnPackets]) -> LinkPackets:
-    """What became of them, for each robot whose log is there."""
+    """Their fates, for each robot whose log is there."""
     parts = [
         _link(nodes[sender], sender, packets, node, receiver)
         for sender, packets in enumerate(own)
@@ -89,13 +89,13 @@ def link_packets(nodes: Sequence[Node], own: Sequence[OwnPackets]) -> LinkPacket
 
 
 def usual_latency_s(links: LinkPackets) -> float:
-    """How late packets are that are not unusually late: 99 of 100 are received sooner; 0 if none tells."""
+    """How late packets are that are not unusually late: 99 of 100 are received sooner; 0 if unknown."""
     known = links.latency_s[np.isfinite(links.latency_s)]
     return max(float(np.quantile(known, USUAL)), 0.0) if len(known) else 0.0
 
 
 def restarts_s(time_s: FloatArray, sequence: IntArray) -> FloatArray:
-    """When numbers started anew, (k,): between the last packet before and the first after."""
+    """When numbers started again, (k,): between the last packet before and the first after."""
     order = np.argsort(time_s, kind="stable")
     at_s, falls = time_s[order], np.flatnonzero(np.diff(sequence[order]) < -REORDERED)
     return 0.5 * (at_s[falls] + at_s[falls + 1])

@@ -85,7 +85,7 @@ def in_step(logs: RealLogs) -> RealLogs:
 
 
 def clock_offsets_s(robots: Sequence[RobotLog]) -> FloatArray:
-    """How far each robot's clock is ahead of the swarm's median in s, (robots,); 0 where nothing tells."""
+    """How far each robot's clock is ahead of the swarm's median in s, (robots,); 0 where unknown."""
     place = {robot.name: i for i, robot in enumerate(robots)}
     short_s: dict[tuple[int, int], float] = {}
     for receiver, robot in enumerate(robots):
@@ -180,7 +180,7 @@ def _notes(robots: Sequence[RobotLog]) -> list[str]:
     if missing:
         notes.append(f"no log of {named(missing)}: packets to and from there are left out")
     if killed:
-        notes.append(f"no summary of {named(killed)}: killed, or still going on")
+        notes.append(f"no summary of {named(killed)}: killed or still running")
     notes += [
         f"half a line at the end of {robot.name}'s {', '.join(robot.half_lines)} was dropped"
         for robot in robots

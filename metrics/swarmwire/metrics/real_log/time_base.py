@@ -82,7 +82,7 @@ def _pose_notes(logs: RealLogs, span: tuple[float, float], *, has_poses: bool) -
     if not has_poses:
         without = [robot.name for robot in logs.robots if posed_span_s(robot) is None]
         some = "" if len(without) == len(logs.robots) else f" of {named(without)}"
-        return [f"no poses{some}: without a tracker, what rests on positions is not in the log"]
+        return [f"no poses{some}: without a tracker, measures of positions are not in the log"]
     gaps = {robot.name: longest_gap_s(robot, span) for robot in logs.robots}
     wide = [f"{name} {gap_s:.1f} s" for name, gap_s in gaps.items() if gap_s > GAP_S]
     return [f"poses are missing for a while ({named(wide)}) and drawn straight through"] if wide else []

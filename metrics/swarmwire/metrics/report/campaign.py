@@ -229,7 +229,7 @@ def methods_section(sections: Collection[str], *, times: bool) -> Section:
 
 
 def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Report:
-    """The report of a campaign, finished or not, on these responses, or by default the most telling ones.
+    """The report of a campaign, finished or not, on these responses, by default the most informative ones.
 
     BadInput for an unknown response, or a damaged file.
     """

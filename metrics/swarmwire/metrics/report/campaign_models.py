@@ -193,12 +193,12 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
         return None
     grows = f" Not falling, and so without a curve: {listed(list(dict.fromkeys(growing)))}." if growing else ""
     text = (
-        "What is left of a response, relative to its mean with nothing lost, with 95 % intervals of the means. A "
-        "time counts by its reciprocal, how much is done in a time, and as 0 where it never came. A line and an "
+        "Remaining share of a response: its mean relative to that without loss, with 95 % intervals of the means. A "
+        "time counts by its reciprocal (a rate), and as 0 if it is never reached. A line and an "
         f"exponential are fitted to all runs; the red one has the lower AIC.{grows}"
     )
     header = ("response", "over", "shape", "at 0", "slope at 0", "95 % interval", "R²", "AIC", "")
-    return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of what is left")))
+    return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of the remaining share")))
 
 
 def _is_loss(levels: Levels) -> bool:
@@ -247,7 +247,7 @@ def _resilience_figure(response: Response, levels: Levels, left: FloatArray, fit
     if fits.is_clear:
         verdict = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
     else:
-        verdict = "AIC does not tell the two shapes apart"
+        verdict = "AIC does not distinguish the two shapes"
     caption = f"{sentence(response_title(response))} over `{levels.path}`: {verdict}."
     return Figure(name, as_svg(drawn, name), caption)
 

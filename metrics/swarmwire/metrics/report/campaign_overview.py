@@ -106,7 +106,7 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
     if not len(failed):
         return []
     groups = (
-        failed.with_columns(pl.col("error").fill_null("no error was told").str.strip_chars())
+        failed.with_columns(pl.col("error").fill_null("no error was recorded").str.strip_chars())
         .group_by("error")
         .agg(
             pl.len().alias("count"), pl.col("run").min().alias("first"), pl.col("point").unique().sort().alias("points")
@@ -118,7 +118,7 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
         for error, count, first, points in groups.select("error", "count", "first", "points").head(_MAX_ERRORS).rows()
     ]
     more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
-    caption = f"Runs that failed, by their error. They have no part in what follows.{more}"
+    caption = f"Failed runs, by error. The following sections exclude them.{more}"
     return [Table(("error", "runs", "first run", "design points"), tuple(rows), caption)]
 
 

@@ -94,7 +94,7 @@ def _course(run: RunData) -> list[tuple[str, str]]:
         reached = f"recorded up to {number(float(run.film.time_s[-1]))} s" if isinstance(run.film, Film) else "no tick"
         planned = run.started.get("ticks")
         of_planned = f" of {number(planned / run.static.rate_hz)} s" if isinstance(planned, int) else ""
-        return [("ended", f"no summary: it was killed, or goes on; {reached}{of_planned}")]
+        return [("ended", f"no summary: it was killed or is running; {reached}{of_planned}")]
     runners = summary["runners"]
     backend = (
         "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
@@ -150,7 +150,7 @@ def _problems(run: RunData) -> list[str]:
     problems: list[str] = []
     if arenas > 1:
         problems.append(
-            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; what is told of others says so."
+            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; sections on the others say so."
         )
     if summary is None:
         return problems
@@ -176,7 +176,7 @@ def _problems(run: RunData) -> list[str]:
 
 
 def run_report(folder: Path) -> Report:
-    """The report of a run, also of one that was killed or goes on: scenario, timeline, paths, radio and metrics.
+    """The report of a run, also of one that was killed or is live: scenario, timeline, paths, radio and metrics.
 
     Figures are of the first arena; tables cover all. A table that was not recorded, or is damaged, costs
     its figure, and the text says so. BadInput where there is no run folder, or its `static.json` or summary cannot be
@@ -190,7 +190,7 @@ def run_report(folder: Path) -> Report:
 def _about(run: RunData) -> str:
     static = run.static
     seeds = f"seed {static.seeds[0]}" if static.arenas == 1 else counted(static.arenas, "arena")
-    time_s = "killed or going on" if run.summary is None else f"{number(run.summary['sim_time_s'])} s"
+    time_s = "killed or running" if run.summary is None else f"{number(run.summary['sim_time_s'])} s"
     return f"A run of {groups(static)}, {seeds}, {time_s}."
 
 

@@ -96,7 +96,7 @@ def links(run: RunData) -> Figure | str:
         return f"Delivery by link: {found}"
     received, in_range = of_links(found, run.static.robots)
     if not in_range.any():
-        return "Delivery by link: nobody was in range of anybody."
+        return "Delivery by link: no two robots were in range."
     link_pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MAX_SQUARES:
         caption = "link_pdr of each link: received / in range (and sight), of packets that went on air."

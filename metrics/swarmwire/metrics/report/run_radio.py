@@ -31,7 +31,7 @@ TITLE = "The radio"
 def fates(run: RunData) -> list[str | Table]:
     """The tables of fates and latencies from the summary; without a summary a sentence."""
     if run.summary is None:
-        return ["What became of packets in all is counted at the end of a run, which this one has not reached."]
+        return ["Fates of packets are counted at the end of a run; this run has not ended."]
     arenas = [found for arena in range(run.static.arenas) if (found := run.of_arena("radio", arena))]
     if not arenas:
         return []
@@ -74,7 +74,7 @@ def distances(run: RunData) -> Figure | str:
         return f"Delivery over distance: {table}{killed}"
     shown = received_bins(table)
     if not len(shown):
-        return "Delivery over distance: no packet went on air."
+        return "Delivery over distance: no packet was transmitted."
     caption = (
         "pdr (received / intended) over distance: of all robots that packets on air were meant for, however far, the "
         "share that received. Bars are 95 % intervals (Wilson), receivers taken as independent."

@@ -39,7 +39,7 @@ class RadioDistances(Table):
 
     Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets that
     went on air: all robots alive then, however far, or the one addressed), received (of these), pdr (received /
-    intended; null if nobody was meant). Of more than 70 robots one of so many packets is counted as
+    intended; null if there was no intended receiver). Of more than 70 robots one of so many packets is counted as
     `record.radio_distances.every` says in the summary. If packets were on their way for more than 5 s, as `unknown`
     beside it says, pdr is null.
     """

@@ -50,7 +50,7 @@ class Events(Table):
     Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
     effect), do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those
     it changed there). Arenas that have left have no row; nor, of what happens to each robot at a time of its own
-    (`singly` in the summary), have those in which nobody changed.
+    (`singly` in the summary), have those in which no robot changed.
     """
 
     name = "events"

@@ -1,4 +1,4 @@
-"""The table `packets`: what became of each packet for each receiver within reach; of all packets, or of a share."""
+"""The table `packets`: the fate of each packet at each receiver within reach; of all packets, or of a share."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -138,7 +138,7 @@ class PacketRecorder(Observer):
 
 
 class PacketSample:
-    """Which packets are recorded: a share of them, the same whatever the layout, each with all of its receivers."""
+    """Which packets are recorded: a share of them, the same for every layout, each with all of its receivers."""
 
     def __init__(self, share: float, seeds: tuple[int, ...]) -> None:
         self._share = share

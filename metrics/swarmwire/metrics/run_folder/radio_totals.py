@@ -1,4 +1,4 @@
-"""The tables `radio_robots` and `radio_links`: what became of the packets of each robot, and on each link."""
+"""The tables `radio_robots` and `radio_links`: the fates of the packets of each robot, and on each link."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -125,8 +125,8 @@ class RobotCounts(Totals):
         packets_on_air: (rows,) of these, that it put on air.
         on_air_ns: (rows,) their airtime.
         intended: (rows,) receivers that its packets were meant for.
-        as_sender: (rows, fates) these receivers by what became of the packet for them, as far as it is final.
-        as_receiver: (rows, fates) packets that might have reached it, by what became of them for it.
+        as_sender: (rows, fates) these receivers by the packet's fate, as far as it is final.
+        as_receiver: (rows, fates) packets that might have reached it, by fate.
         received_bytes: (rows,) payload that it received, with tags.
     """
 
@@ -165,7 +165,7 @@ class RobotCounts(Totals):
         return pl.DataFrame(columns, schema=RadioRobots.types)
 
     def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
-        """Add packets that left their radios, and what became of packets."""
+        """Add packets that left their radios, and fates."""
         self._add_departed(departed)
         sender = finished.arena * self._robots + finished.sender
         _add(self.as_sender, sender * FATES + finished.fate, finished.receivers)
@@ -179,7 +179,7 @@ class RobotCounts(Totals):
 
     @property
     def in_flight(self) -> IntArray:
-        """Receivers of packets that left the radio for whom nothing is final yet, (rows,)."""
+        """Receivers of packets that left the radio, whose fates are not final yet, (rows,)."""
         return self.intended - self.as_sender.sum(axis=1)
 
     def _add_departed(self, departed: TransmissionRecords) -> None:

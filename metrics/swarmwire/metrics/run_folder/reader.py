@@ -1,4 +1,4 @@
-"""A run folder, read back: of runs that ended, that were killed, and that still go on."""
+"""A run folder, read back: of runs that ended, were killed, or are live."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -72,7 +72,7 @@ CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined whi
 class RunFolder:
     """Tables of a run as polars frames (`.to_pandas()` gives pandas': needs pyarrow, which the extra [view] brings).
 
-    Of a run that was killed or still goes on they hold what is on disk; each call looks again. BadInput where a file is
+    Of a killed or live run they hold the rows on disk; each call reads again. BadInput where a file is
     missing or damaged.
     """
 

@@ -87,7 +87,7 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
     except BadInput as error:
         return None, Finding(SUMMARY, State.DAMAGED, error.expected)
     if summary is None:
-        return None, Finding(SUMMARY, State.MISSING, "the run did not end by itself, or still goes on")
+        return None, Finding(SUMMARY, State.MISSING, "the run was killed or is still running")
     arenas = f", {summary['arenas']} arenas" if summary["arenas"] > 1 else ""
     text = f"ended: {summary['ended']}; {summary['ticks']} ticks ({summary['sim_time_s']:g} s){arenas}"
     return summary, Finding(SUMMARY, State.INTACT, text)
@@ -193,7 +193,7 @@ def check_run_json(folder: Path) -> Finding:
         case {"seeds": list(), "ticks": int(ticks)}:
             return Finding(RUN_JSON, State.INTACT, f"{ticks} ticks asked for")
         case _:
-            return Finding(RUN_JSON, State.DAMAGED, "expected what swarmwire writes at the start of a run")
+            return Finding(RUN_JSON, State.DAMAGED, "expected the content that swarmwire writes at the start of a run")
 
 
 def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
@@ -233,7 +233,7 @@ def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Findin
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """The readable files of a table, and how it is as far as they tell."""
+    """The readable files of a table, and its state as far as they show."""
 
     state: State
     files: list[Path]

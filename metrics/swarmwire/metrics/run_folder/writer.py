@@ -1,4 +1,4 @@
-"""A table on disk: numbered part files while a run goes on, one file once it is over.
+"""A table on disk: numbered part files during a run, one file at its end.
 
 `NAME/part-000000.parquet` and so on become `NAME.parquet`. Each file is written aside and renamed, so a file of that
 name is whole: a Parquet file that is cut off is unreadable.
@@ -98,7 +98,7 @@ class TableWriter:
             raise self._failed(self._fault) from self._fault
 
     def _failed(self, fault: BaseException) -> RecordFailed:
-        return RecordFailed(f"{self._folder / self._name}: {fault}; what was written before stays")
+        return RecordFailed(f"{self._folder / self._name}: {fault}; earlier rows remain")
 
 
 class ChunkLimit:
@@ -129,7 +129,7 @@ def table_file(folder: Path, name: str) -> Path:
 
 
 def part_file(folder: Path, name: str, number: int) -> Path:
-    """A part of a table whose run goes on, or was killed."""
+    """A part of a table whose run is live or was killed."""
     return folder / name / f"part-{number:06d}.parquet"
 
 

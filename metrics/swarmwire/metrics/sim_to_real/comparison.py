@@ -53,7 +53,7 @@ class MetricRow:
 
     @property
     def within(self) -> bool | None:
-        """Whether the log lies within the spread, or the means differ by no more than chance; None: nothing tells."""
+        """Whether the log lies within the spread, or the means differ by no more than chance; None: undecided."""
         if not math.isnan(self.reach):
             return self.distance <= self.reach
         return None if math.isnan(self.difference.low) else self.difference.low <= 0.0 <= self.difference.high
@@ -68,7 +68,7 @@ class MetricRow:
 
 @dataclass(frozen=True)
 class RadioValue:
-    """One number, of each run that has it and of the log; NaN: the log does not tell."""
+    """One number, of each run that has it and of the log; NaN: the log lacks it."""
 
     name: str
     unit: str
@@ -231,8 +231,8 @@ def why_no_radio(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
 def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) -> Iterator[RadioValue]:
     """Traffic, PDR and latencies over this time: to the agent, where logs have no others.
 
-    The PDR is received / intended receivers, in range or not. Runs that are longer have what their counts of
-    each tick tell; none has anything if the log is longer.
+    The PDR is received / intended receivers, in range or not. For longer runs, the values come from the counts of
+    each tick; none has values if the log is longer.
     """
     fits = duration_s >= WHOLE * log.duration_s
     wholes = [_within(run, emulated, duration_s) for run in emulated.runs if run.radio and fits]

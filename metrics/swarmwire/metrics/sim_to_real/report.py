@@ -57,7 +57,7 @@ def spread_text(of: Spread) -> str:
 
 
 def verdict(of: SimToReal) -> str:
-    """One line: how many of the metrics, and of the radio's numbers, lie within what the runs tell."""
+    """One line: how many of the metrics, and of the radio's numbers, lie within the spread of the runs."""
     if not of.rows and not of.radio:
         return "No number is on both sides: nothing can be said of sim-to-real agreement."
     metrics, radio = [row.within is True for row in of.judged], [row.within is True for row in of.judged_radio]
@@ -75,10 +75,10 @@ def verdict(of: SimToReal) -> str:
         )
     if of.runs > 1:
         return f"{of.runs} runs have no spread: give {MIN_RUNS} seeds or more."
-    more = f" (of the radio's {len(of.radio)} numbers it tells nothing)" if of.radio else ""
+    more = f" (of the radio's {len(of.radio)} numbers one run allows no statement)" if of.radio else ""
     return (
         f"The means of {sum(metrics)} of {len(metrics)} metrics differ by no more than chance within one run{more}"
-        f"{worst}; what other seeds would give, only a campaign tells."
+        f"{worst}; the spread over seeds needs a campaign."
     )
 
 

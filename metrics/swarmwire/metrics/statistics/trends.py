@@ -62,7 +62,7 @@ class Degradation:
 
     @property
     def is_clear(self) -> bool:
-        """Whether AIC tells the forms apart, by 2 or more."""
+        """Whether AIC distinguishes the forms, by 2 or more."""
         return abs(self.linear.aic - self.exponential.aic) >= TELLING
 
 

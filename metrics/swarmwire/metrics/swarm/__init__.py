@@ -1,1 +1,1 @@
-"""Metrics of the swarm: how it is spread, how it moves, whom it touches."""
+"""Metrics of the swarm: spread, motion and contacts."""

@@ -21,7 +21,7 @@ NOT_YET = -1
 class OfClosePairs(Metric):
     """A metric of the robots alive between whose surfaces there are less than `gap_m`, as seen from above.
 
-    The gap of two robots is |x_i - x_j| - r_i - r_j, the shortest way on a torus, whatever their heights: from surface
+    The gap of two robots is |x_i - x_j| - r_i - r_j, the shortest way on a torus, ignoring heights: from surface
     to surface, since the centres of two discs that touch are a diameter apart already.
     """
 
@@ -43,7 +43,7 @@ class Aggregation(OfClosePairs):
     """Robots alive in the largest cluster / robots alive, 1/N to 1; NaN if none is alive.
 
     A cluster is a connected component of the graph that joins two robots alive with less than `gap_m` from surface to
-    surface, by default a robot's diameter: whoever can be reached by such steps belongs to it, so a chain is one
+    surface, by default a robot's diameter: every robot that such steps reach belongs to it, so a chain is one
     cluster. `aggregation_hop` takes one step only. Of mixed bodies the default gap of a pair is the mean of both
     diameters, so that at most touching robots of their size fit between.
 

@@ -51,7 +51,7 @@ class WallContacts(Metric):
 
 @dataclass(frozen=True)
 class CollisionRate(Metric):
-    """2 x contacts between robots that began so far / robot-hours alive so far, in 1/h; NaN while nobody was alive.
+    """2 x contacts between robots that began so far / robot-hours alive so far, in 1/h; NaN while no robot was alive.
 
     A contact that lasts counts once, and for both robots, so this is how often one robot is in a collision. Robots
     alive are added up over time. The dead can be hit, and their contacts count as any. `final` is the rate of the run.
@@ -60,7 +60,7 @@ class CollisionRate(Metric):
     metre, touch at a rate of (8 / pi) n D v (N - 1) / N each, since their mean relative speed is 4 v / pi: 237 an hour
     for 60 of 7 cm at 0.1 m/s on 4 x 4 m.
 
-    Source: the kinetic theory of gases in the plane, for the rate of those that avoid nobody.
+    Source: the kinetic theory of gases in the plane, for the rate without avoidance.
     """
 
     name = "collision_rate"

@@ -17,7 +17,7 @@ from swarmwire.metrics.torus import sides_m
 
 @dataclass(frozen=True)
 class Oscillation(Metric):
-    """Changes of turning side so far / robot-minutes alive so far, in 1/min; NaN while nobody was alive.
+    """Changes of turning side so far / robot-minutes alive so far, in 1/min; NaN while no robot was alive.
 
     A robot changes sides when the turning rate that is commanded, within its limits, is beyond `dead_band_radps` to one
     side, and the last that was beyond it, however long ago, was to the other. Going straight in between is no change.
@@ -76,7 +76,7 @@ class PathEfficiency(Metric):
     a torus x is unrolled: who went once around is a side away from where it was. What a robot went while dead, pushed
     by others, counts once it is alive again. NaN while no robot alive has moved.
 
-    A random walk has sqrt(pi / (4 n)) after n steps of equal length, n large: it falls as the run goes on.
+    A random walk has sqrt(pi / (4 n)) after n steps of equal length, n large: it falls over the run.
 
     Source: the straightness index of E. Batschelet, Circular Statistics in Biology (1981).
     """
@@ -133,21 +133,23 @@ class Deadlocked(Metric):
 
     Our own definition; we know of none that others share. A robot alive is deadlocked if over the last `window_s`
 
-    - it was told to go at least `told_m`: the sum over ticks, while it was alive, of the commanded speed (forward or
-      backward, and sideways, within its limits) times the tick's length; and
+    - it was commanded to go at least `told_m`: the sum over ticks, while it was alive, of the commanded speed (forward
+      or backward, and sideways, within its limits) times the tick's length; and
     - its centre is now less than `moved_m` from where it was `window_s` ago, the shortest way on a torus.
 
     So who waits, or turns on the spot, is not deadlocked; who pushes against others is, who goes to and fro between
-    two, and who drives in circles that small. Nothing is told of why. `told_m` should be well above `moved_m`: a robot
-    that was told to go a little is not held back. The window is rounded to whole ticks, at least one.
+    two, and who drives in circles that small. The reason is not part of it. `told_m` should be well above `moved_m`: a
+    robot that was commanded to go a little is not held back. The window is rounded to whole ticks, at least one.
     """
 
     window_s: float = parameter(10.0, help="how far it looks back", unit="s", above=0.0, at_most=3600.0)
     moved_m: float = parameter(0.05, help="who came less far from where it was has not come away", unit="m", above=0.0)
-    told_m: float = parameter(0.2, help="who was commanded to go at least so far was told to move", unit="m", above=0.0)
+    told_m: float = parameter(
+        0.2, help="commanded path over the window from which a robot counts as commanded to move", unit="m", above=0.0
+    )
 
     name = "deadlocked"
-    help = "robots alive that were told to move over a window and stayed where they were / robots alive"
+    help = "robots alive that were commanded to move over a window and did not / robots alive"
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

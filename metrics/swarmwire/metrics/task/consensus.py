@@ -16,16 +16,16 @@ from swarmwire.metrics.metric import Measure, Metric, TickView
 class ConsensusError(Metric):
     """Root mean square deviation of the robots' values from their mean: sqrt(mean of (x_i - mean of x)^2).
 
-    x_i is the number that robot i told last (`note(value=…)`); who is dead or has told none does not count. 0 in
-    agreement, whatever on; n times its square is the squared norm of the disagreement vector. In the unit of the
-    values, 0 or more; NaN while no robot alive has told one.
+    x_i is the number that robot i noted last (`note(value=…)`); robots that are dead or have noted none do not count. 0
+    in agreement on any value; n times its square is the squared norm of the disagreement vector. In the unit of the
+    values, 0 or more; NaN while no robot alive has noted one.
 
     Source: R. Olfati-Saber, R. M. Murray, Consensus problems in networks of agents with switching topology and
     time-delays, IEEE Transactions on Automatic Control 49 (9), 2004.
     """
 
     name = "consensus_error"
-    help = "root mean square deviation from their mean of the values that robots alive told, in the values' unit"
+    help = "root mean square deviation from their mean of the values that robots alive noted last, in the values' unit"
     needs = ()
     bounds = (0.0, None)
 
@@ -53,21 +53,21 @@ def _spread(value, alive):
 class ConsensusBias(Metric):
     """Mean of the robots' values - mean of the first values: 0 if a consensus on the average keeps the average.
 
-    A robot's value is the number that it told last (`note(value=…)`), of robots alive; its first one counts from when
-    it was told, and whatever becomes of the robot. One-way losses carry a consensus away from the average, since what
-    one robot gives the other does not take. In the unit of the values; NaN while no robot alive has told one.
+    A robot's value is the number that it noted last (`note(value=…)`), of robots alive; its first one counts from when
+    it was noted, and also when the robot dies. One-way losses carry a consensus away from the average, since what
+    one robot gives the other does not take. In the unit of the values; NaN while no robot alive has noted one.
 
     Source: what is preserved on balanced graphs, R. Olfati-Saber, R. M. Murray, Consensus problems in networks of
     agents with switching topology and time-delays, IEEE Transactions on Automatic Control 49 (9), 2004.
     """
 
     name = "consensus_bias"
-    help = "mean of the values that robots alive told last - mean of those told first, in the values' unit"
+    help = "mean of the values that robots alive noted last - mean of those noted first, in the values' unit"
     needs = ()
     bounds = (-np.inf, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps what each robot told first."""
+        """A fresh measure, which keeps the first number of each robot."""
         first: FloatArray = np.full((static.arenas, static.robots), np.nan)
 
         def measure(view: TickView) -> FloatArray | float:

@@ -69,8 +69,8 @@ class TargetMean(_TargetDistance):
 class FindTime(Metric):
     """First time in s at which ceil(`share` x N) of the N robots alive, at least one, are within `within_m` of a light.
 
-    Of their centres, each to the light nearest to it. 0 if they stand there at the start. It stays, whatever becomes of
-    the robots. NaN until then, and without lights.
+    Of their centres, each to the light nearest to it. 0 if they stand there at the start. It stays for any later motion
+    of the robots. NaN until then, and without lights.
     """
 
     name = "find_time_s"

@@ -189,4 +189,4 @@ def _death(log: str) -> SwarmwireError:
             "no graphics: rerun's viewer found no Vulkan driver; on Debian and Ubuntu `apt-get install libvulkan1 "
             "mesa-vulkan-drivers` brings one that needs no GPU"
         )
-    return SwarmwireError(f"rerun's viewer ended by itself:\n{log[-2000:]}")
+    return SwarmwireError(f"rerun's viewer ended unexpectedly:\n{log[-2000:]}")

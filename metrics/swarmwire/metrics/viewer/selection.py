@@ -53,7 +53,7 @@ class RerunSelected:
     """The selected robot of one arena. Its rays end where the reading says that something is, noise and all.
 
     Of the rays that see more than noise could feign, those on which a robot stands are red, the others white.
-    Bars outwards from the rim tell how much light each photocell sees. Between a robot's turns these are what it
+    Bars outwards from the rim show how much light each photocell sees. Between a robot's turns these are what it
     sensed last; sensors that its agent does not use are not there.
     """
 

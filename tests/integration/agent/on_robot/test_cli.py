@@ -79,7 +79,7 @@ def test_a_run_that_ends_while_its_robot_is_lost_says_that_it_may_go_on(tmp_path
     assert code == 1
     lost, out_of_reach = err.splitlines()
     assert "the robot is lost, and tried again" in lost
-    assert out_of_reach.endswith("the robot is out of reach, and may go on as it was told last")
+    assert out_of_reach.endswith("the robot is out of reach and may keep executing its last command")
 
 
 def test_the_guard_hears_of_an_agent_until_all_is_closed(tmp_path, monkeypatch):

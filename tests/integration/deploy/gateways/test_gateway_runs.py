@@ -188,7 +188,7 @@ def test_a_body_that_is_another_robot_than_its_gateway_emulates_is_told_of_at_th
 ) -> None:
     with Simulation(scenario, gateways={"own": "scripted"}, realtime=FAST):
         told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith("own: body epuck2 as scripted: nobody is told its scan, ")
+    assert told[0].startswith("own: body epuck2 as scripted: no program receives its scan, ")
     monkeypatch.setattr(ScriptedGateway, "differences", lambda _: ())
     with Simulation(scenario, gateways={"own": "scripted"}, realtime=FAST):
         assert "as scripted" not in capsys.readouterr().err
@@ -281,28 +281,28 @@ def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys
     with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, out=out, record=BARE) as simulation:
         scripted[-1].drive = dict.fromkeys(driven, (0.0, 0.0))
         simulation.run(15)
-        early = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
-    late = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
+        early = [line for line in capsys.readouterr().err.splitlines() if "no program dr" in line]
+    late = [line for line in capsys.readouterr().err.splitlines() if "no program dr" in line]
     names = [f"other-{place}" for place in range(3) if place not in driven]
     if not names:
         assert early == late == []
         return
     rest = f"{', '.join(names)}: swarmwire-agent run --config {out}/robots/{names[0]}.toml and so on"
-    assert (early, late) == ([f"nobody drives {rest}"], [f"nobody drove {rest}"])
+    assert (early, late) == ([f"no program drives {rest}"], [f"no program drove {rest}"])
 
 
 def test_what_is_said_soon_is_said_in_wall_time(scenario, scripted, capsys) -> None:
     with Simulation(scenario, gateways="scripted", realtime=100) as simulation:
         simulation.run(15)
-        assert "nobody dr" not in capsys.readouterr().err
+        assert "no program dr" not in capsys.readouterr().err
 
 
 def test_few_are_named(scenario, scripted, capsys) -> None:
     many = ["robots.other.count=8"]
     with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=many) as simulation:
         simulation.run(1)
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if "nobody dr" in line]
-    assert line == "nobody drove other-0, other-1, other-2, other-3, other-4, other-5 and 2 more"
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "no program dr" in line]
+    assert line == "no program drove other-0, other-1, other-2, other-3, other-4, other-5 and 2 more"
 
 
 def test_one_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, capsys) -> None:
@@ -314,7 +314,7 @@ def test_one_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, 
             simulation.run(tick)
             scripted[-1].drive = dict.fromkeys(range(3), (0.0, 0.0))
             simulation.run(tick + 1)
-    assert "nobody drove other-0" in capsys.readouterr().err
+    assert "no program drove other-0" in capsys.readouterr().err
 
 
 def test_a_program_of_plain_sockets_turns_a_robot(tmp_path) -> None:

@@ -72,7 +72,7 @@ def test_nobody_gets_past_a_machine_without_a_router(tmp_path):
             world.said("listens at")
             with on(near, "join", at, "--name", "r1", "--certs", certs) as stray:
                 assert stray.ended() != 0
-            assert "nobody answers" in stray.lines[-1]
+            assert "no world answers" in stray.lines[-1]
 
 
 @pytest.mark.slow  # the runner waits for ten seconds before it believes it

@@ -140,7 +140,7 @@ def test_a_robot_alone_has_a_report(tmp_path, radio):
     silent = {"departed": departed([]), "finished": links([], [], 0, 0), "tally": tally({})} if radio else {}
     report = run_report(run_folder(tmp_path, of, wandering(of, 9, **silent), links=True))
     assert names(report)[:2] == ["timeline", "trajectories"]
-    assert ("nobody was in range" in texts(report)) == radio
+    assert ("no two robots were in range" in texts(report)) == radio
 
 
 def test_what_users_name_is_escaped(tmp_path):

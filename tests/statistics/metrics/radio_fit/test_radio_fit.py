@@ -167,7 +167,7 @@ def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
     )
     found = fit_radio(read_log(path))
     assert isinstance(found.path_loss, PathLossFit)
-    assert found.shadowing == "needs positions of sender and receiver, of which distance_m tells too little"
+    assert found.shadowing == "needs positions of sender and receiver, distance_m is not enough"
     assert found.losses == "needs 100 packets, got 20"
     assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
 

@@ -151,7 +151,7 @@ def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tm
     looking.control.estop()
     said = until(lambda: capsys.readouterr().err)
     assert said == (
-        "robot-0: emergency stop at step 12: motors off for good; end the agent, and start it anew, to go on\n"
+        "robot-0: emergency stop at step 12: motors stay off; stop the agent and start it again to continue\n"
     )
     looking.steps(10)
     assert (looking.written["state"], looking.written["emergency_stop_at"]) == ("estop", 12)
@@ -164,7 +164,7 @@ def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tm
 def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.onlookers.silent(0.512)
-    told = "watchdog: nothing was received of the agent for 0.51 s; motors off until it goes on"
+    told = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
     assert until(lambda: capsys.readouterr().err) == f"robot-0: {told}\n"
     looking.onlookers.end("duration")
 
@@ -186,7 +186,7 @@ def test_a_log_that_cannot_be_written_is_told_of_once_and_stops_nobody(tmp_path,
     looking.steps(30)
     looking.onlookers.end("duration")
     assert capsys.readouterr().err.splitlines() == [
-        "robot-0: the log cannot be written, and goes on without what is lost: [Errno 28] No space left on device"
+        "robot-0: the log cannot be written; the agent runs on without lost rows: [Errno 28] No space left on device"
     ]
     assert looking.written["counts"] == {"clipped_commands": 3, "log_rows_lost": 30}
 

@@ -273,7 +273,7 @@ def test_the_log_can_tell_which_code_ran():
 def test_what_a_worlds_air_tells_is_not_judged_before_it_was_joined():
     medium = {"radio.kind": "world", "network.connect": ["tcp/127.0.0.1:7447"]}
     assert _plan("Ranging", **medium).settings.radio.kind == "world"
-    with pytest.raises(BadInput, match="a real radio does not tell: expected tracker = true"):
+    with pytest.raises(BadInput, match="a real radio does not measure it: expected tracker = true"):
         _plan("Ranging", **{**medium, "radio.kind": "zenoh"})
 
 
@@ -317,10 +317,13 @@ UNMET = {
     "compass": (_offer(), "does not give (it gives proximity): expected tracker = true"),
     "camera": (_offer(), "the body epuck2 lacks: it has proximity"),
     "positioning": (_offer(tracker=True), "the body epuck2 lacks"),
-    "radio.range": (_offer(), 'only a radio tells: expected radio.kind "zenoh" or "world"'),
-    "radio.bearing": (_offer(radio="zenoh"), "a real radio does not tell: expected tracker = true"),
-    "radio.tx_status": (_offer(radio="zenoh", tracker=True), "the radio zenoh does not tell: it tells radio.bearing"),
-    "radio.rssi": (_offer(radio="world"), "the radio world does not tell: it tells nothing"),
+    "radio.range": (_offer(), 'needs a radio: expected radio.kind "zenoh" or "world"'),
+    "radio.bearing": (_offer(radio="zenoh"), "a real radio does not measure it: expected tracker = true"),
+    "radio.tx_status": (
+        _offer(radio="zenoh", tracker=True),
+        "the radio zenoh does not measure it: it measures radio.bearing",
+    ),
+    "radio.rssi": (_offer(radio="world"), "the radio world does not measure it: it measures nothing"),
 }
 
 

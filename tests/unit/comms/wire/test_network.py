@@ -129,7 +129,7 @@ def test_a_key_that_others_may_read_is_refused_with_the_cure(files, mode):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({}, "network: expected listen, connect or multicast = true: nobody would be reached"),
+        ({}, "network: expected listen, connect or multicast = true: no peer would be reached"),
         ({"listn": LOCAL}, "network.listn: unknown; expected one of listen"),
         ({"listen": "tcp/127.0.0.1:0"}, "network.listen: expected a list of texts, got 'tcp/127.0.0.1:0'"),
         ({"listen": [1]}, "network.listen: expected a list of texts, got [1]"),

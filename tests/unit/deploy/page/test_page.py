@@ -322,7 +322,7 @@ def test_delivery_is_that_of_the_last_simulated_second():
     assert seen.numbers["link_pdr"] is None
 
 
-@pytest.mark.parametrize(("robots", "told"), [((), "nobody"), ((1, 3), "flock-1, flock-3"), (range(4), "all")])
+@pytest.mark.parametrize(("robots", "told"), [((), "none"), ((1, 3), "flock-1, flock-3"), (range(4), "all")])
 def test_events_say_whom_they_changed_when_they_began(robots, told):
     seen = Seen(OF)
     seen.see(glimpse(0, events=(happened(robots),)))

@@ -128,7 +128,7 @@ def test_arenas_that_have_stopped_are_told_once_there_are_any():
         metrics.see(now)
         figures.see(now)
         told.append(figures.gone)
-    assert told == ["", ", 2 of 3 arenas go on", ", 1 of 3 arenas go on"]
+    assert told == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
 
 def test_what_is_averaged_together_stays_so_as_the_minute_moves_on():

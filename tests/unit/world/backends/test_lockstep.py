@@ -390,7 +390,7 @@ def test_a_loop_that_was_frozen_goes_on_from_there_instead_of_catching_up() -> N
     pace.hold(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [200 * MS]
     assert (pace.missed_ticks, pace.lag_ns, pace.worst_lag_ns) == (1, 0, 3600 * NS_PER_S - 100 * MS)
-    assert said == ["real time: the loop stood still for 3599.9 s in tick 1, and goes on from there"]
+    assert said == ["real time: the loop stalled for 3599.9 s in tick 1; the schedule restarts from there"]
 
 
 def test_nor_does_one_that_was_frozen_in_its_sleep() -> None:
@@ -399,4 +399,4 @@ def test_nor_does_one_that_was_frozen_in_its_sleep() -> None:
     clock.sleep_until = lambda at_ns: setattr(clock, "time_ns", at_ns + 60 * NS_PER_S)
     pace.hold(0)
     assert pace.over_ns(1) == clock.time_ns + 100 * MS
-    assert said == ["real time: the loop stood still for 60.0 s in tick 0, and goes on from there"]
+    assert said == ["real time: the loop stalled for 60.0 s in tick 0; the schedule restarts from there"]

@@ -235,7 +235,7 @@ def test_an_engine_that_is_asked_for_is_taken(engine: str) -> None:
         (
             {},
             {"obstacles": [{key: value for key, value in MOVABLE.items() if key != "mass_kg"}]},
-            "arena.obstacles.0.mass_kg: is missing; expected the mass of what is movable (kg)",
+            "arena.obstacles.0.mass_kg: is missing; expected the mass of a movable obstacle (kg)",
         ),
         (
             {},

@@ -18,7 +18,7 @@ MAINS = BatterySpec(capacity_wh=inf)  # of a body without a battery: its charge 
 
 
 class Batteries:
-    """The batteries of all robots of all arenas; `any` tells whether there are some.
+    """The batteries of all robots of all arenas; `any`: whether there are some.
 
     Attributes:
         charge: (arenas, robots) 1 full, 0 empty; always 1 for a body without a battery. Changed in place, and may be.

@@ -150,7 +150,7 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
 
     Where a run waits for lost runners, a replacement that joins within a tick gets a frame of that tick. The lost
     runner's answer to that tick is discarded, and its agents' memory is restored to the start of the tick. Where a run
-    goes on, the robots of a lost runner stand or coast from that tick on, until the first tick that opens with an
+    continues, the robots of a lost runner stand or coast from that tick on, until the first tick that opens with an
     agent.
     """
 

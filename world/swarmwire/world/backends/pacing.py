@@ -146,7 +146,7 @@ class Pace:
         """Continue from here: the stalled time counts as a pause."""
         self.begin_anew(tick + 1, self.factor, for_ns)
         self.lag_ns = 0
-        self._warn(f"the loop stood still for {to_s(for_ns):.1f} s in tick {tick}, and goes on from there")
+        self._warn(f"the loop stalled for {to_s(for_ns):.1f} s in tick {tick}; the schedule restarts from there")
 
     def _warn(self, text: str) -> None:
         now_ns = self._clock.now_ns()

@@ -83,7 +83,7 @@ NON_BLOCKING = ("stand", "coast")  # policies under which a run that has begun w
 
 @dataclass(frozen=True)
 class Loss:
-    """A runner, or a process of an agent host, that was lost in a run that goes on."""
+    """A runner, or a process of an agent host, that was lost in a run that continues."""
 
     runner: str
     robots: str
@@ -103,7 +103,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         a loss    stop          RunnerLost                      (ends the run; so does any loss before the first tick)
                   dead          the allocation is given up      (its robots stand still until the end)
                   wait          the allocation is free again    (the run waits until a runner plays its robots)
-                  stand, coast  the allocation is free again    (the run goes on: its robots stand, or repeat their
+                  stand, coast  the allocation is free again    (the run continues: its robots stand, or repeat their
                                                                 last command)
         a frame "failed"        as a loss, but `stop` raises AgentFailed
         a frame "leave"         as a loss, but `stop` raises Interrupted: nothing failed
@@ -112,7 +112,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     does not fit is counted by name and dropped; it never changes the state.
 
     Attributes:
-        losses: runners that were lost while the run went on.
+        losses: runners that were lost during the run.
         events: arrivals and departures of runners; those of the run's own runners only after the first tick.
     """
 
@@ -181,7 +181,11 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         for allocation in tuple(self._allocations):
             if self._holds_up(allocation):
                 robots = allocation.assignment.robots_text
-                return f"{allocation.runner}, which plays {robots}" if allocation.runner else f"whoever plays {robots}"
+                return (
+                    f"{allocation.runner}, which plays {robots}"
+                    if allocation.runner
+                    else f"the runner that plays {robots}"
+                )
         return ""
 
     def counts(self) -> dict[str, int]:

@@ -39,7 +39,7 @@ class CustomActuator(ABC):
 
     @abstractmethod
     def act(self, tick: int, rows: IntArray, values: FloatArray) -> None:
-        """Do what agents set it to in a tick, before bodies move; called in every tick, also for nobody.
+        """Do what agents set it to in a tick, before bodies move; called in every tick, also for no robot.
 
         Of the scene it may change what engines are given, `target`, the `leds`, the `charge`, and what lies in `own`.
 

@@ -62,7 +62,7 @@ class Gateway(ABC):
         without_actuator = [*self.body.actuators]
         return tuple(
             f"{words} {', '.join(names)}"
-            for words, names in (("nobody is told its", missing), ("nobody moves its", without_actuator))
+            for words, names in (("no program receives its", missing), ("no program moves its", without_actuator))
             if names
         )
 

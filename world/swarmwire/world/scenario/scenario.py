@@ -42,7 +42,7 @@ class PhysicsTable(Table):
     """[physics]: how bodies move and touch."""
 
     engine: Literal["auto", EngineName] = "auto"
-    """What moves bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
+    """Engine of bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
     obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
     steps: int = Field(default=5, ge=1, le=1000)
     """Physics steps per tick; refused if a robot with contacts at full speed would move over a quarter of its radius in
@@ -55,7 +55,7 @@ class RobotsTable(Table):
     body: str = Field(min_length=1)
     """Name of the body."""
     body_overrides: dict[str, Any] = Field(default_factory=dict)
-    """What of the body's data sheet is otherwise for this group, such as sensors.proximity.drop_out."""
+    """Changes of the body's data sheet for this group, such as sensors.proximity.drop_out."""
     count: int = Field(ge=1, le=1_000_000)
     """How many robots."""
     agent: str = Field(min_length=1)
@@ -82,7 +82,7 @@ class RunTable(Table):
 
     on_runner_loss: Literal["stop", "dead", "wait", "stand", "coast"] = "stop"
     """A lost runner ends the run (stop), or its robots stand still to the end (dead), or the run waits until another
-    runner takes over (wait), or it goes on, and until one does they stand still (stand) or keep their last command
+    runner takes over (wait), or it continues, and until one does they stand still (stand) or keep their last command
     (coast)."""
     runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
     """A runner is lost if it gives no answer for so long."""
@@ -96,7 +96,7 @@ class Scenario(Table):
     format: Literal[1]
     """Version of this format."""
     name: str = Field(min_length=1, max_length=200)
-    """What the run is about."""
+    """Description of the run."""
     seed: int = Field(default=1, ge=0, le=2**63 - 1)
     """The seed of every draw of the run's arena."""
     duration_s: float = Field(gt=0, le=1e9, json_schema_extra={"unit": "s"})
@@ -112,13 +112,13 @@ class Scenario(Table):
     radio: Annotated[Radio, AsTable()] | None = None
     """The radio; without it robots hear nothing."""
     events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
-    """What happens to robots and radios on the way."""
+    """Scheduled changes of robots and radios."""
     standard_metrics: bool = True
     """Whether the standard metrics are measured; false: only those that `metrics` and `stop` name."""
     metrics: tuple[MetricItem, ...] = Field(default=(), strict=False)
     """More metrics, by name, or classes of your own, as module:Class or file.py:Class; or tables with parameters."""
     stop: StopTables = ()
-    """What ends an arena before its time; of several tables any does."""
+    """Stop conditions: any of these tables ends an arena before its time."""
     run: RunTable = RunTable()
     """Runners."""
 
@@ -132,7 +132,7 @@ class Scenario(Table):
 
     @property
     def source(self) -> str:
-        """The file, or whatever else the scenario came from, for messages."""
+        """The file or other source of the scenario, for messages."""
         return self._source
 
     @property

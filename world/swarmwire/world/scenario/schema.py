@@ -102,7 +102,7 @@ class AsTable:
 
 @dataclass(frozen=True)
 class OneOf:
-    """Annotation of a field that holds one of several parameter dataclasses: `tag` is the key that tells which."""
+    """Annotation of a field that holds one of several parameter dataclasses: `tag` is the key that selects one."""
 
     tag: str
     kinds: tuple[type[Any], ...]

@@ -231,7 +231,7 @@ _Stops = Annotated[tuple[StopTable, ...], Field(strict=False), Tag("array")]
 StopTables = Annotated[Annotated[StopTable, Tag("object")] | _Stops, Discriminator(form_of)]
 
 
-NEEDS_MASS = "is missing; expected the mass of what is movable (kg)"
+NEEDS_MASS = "is missing; expected the mass of a movable obstacle (kg)"
 NO_MASS = "expected a mass only with movable = true"
 ImageFile = Annotated[str, StringConstraints(min_length=1)]
 
@@ -272,7 +272,7 @@ class _ObstacleTable(_StandingTable):
     """An obstacle of any shape."""
 
     height_m: Length | None = None
-    """Its height; taller than anything if left out. What is above it neither touches nor sees it."""
+    """Its height; default: taller than anything. Robots above it neither touch nor see it."""
     movable: bool = False
     """Whether robots can push it; it slides on the floor with friction. Only the pymunk engine moves obstacles."""
     mass_kg: Mass | None = None

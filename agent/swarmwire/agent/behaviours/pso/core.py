@@ -122,7 +122,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
 
         v <- w v + a U (own best - x) + b U (neighbours' best - x),    |v| <= speed x time between updates
 
-    with U uniform in [0, 1), drawn anew for each term and axis. Own best is where the robot itself saw the brightest
+    with U uniform in [0, 1), drawn again for each term and axis. Own best is where the robot itself saw the brightest
     light; neighbours' best is the brightest place that it has received of or seen. Between two updates it heads for x +
     v.
 

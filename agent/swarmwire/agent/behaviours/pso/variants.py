@@ -88,7 +88,7 @@ class PsoModel(ParticlesByPlaces):
     needs: ClassVar[tuple[str, ...]] = ("light", "compass", "positioning")
 
     def head_for_target(self, robots: Robots, state: PositionedParticle) -> None:
-        """Straight to the target in whatever direction, and no further."""
+        """Straight to the target, in any direction, without overshoot."""
         away = np.hypot(state.target_x, state.target_y)
         bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
         speed = np.minimum(self.speed_mps, away / robots.period_s)
@@ -111,7 +111,7 @@ class WheeledParticle(Particle):
 
 
 class PsoSearch(ParticlesOnWheels[WheeledParticle]):
-    """Particle swarm search by what a robot itself senses: wheels, compass, and a radio that tells range and bearing.
+    """Particle swarm search with a robot's own sensors: wheels, compass, and a radio that measures range and bearing.
 
     Neighbours are those whose broadcast is received; a best comes as a vector from its sender, and the receiver adds
     where it hears the sender. Places are kept by dead reckoning: the mean way of both wheels, along the compass'

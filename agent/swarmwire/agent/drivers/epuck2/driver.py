@@ -1,7 +1,7 @@
 """The driver of an e-puck2 over Wi-Fi: one exchange per reading, and one packet per command.
 
 `sense` requests a reading and waits for it; `act` sends at once and requests nothing. So readings are as new as the
-network allows, whatever the rate of the agent. The robot has no watchdog: when the connection is lost, it keeps
+network allows, independent of the agent's rate. The robot has no watchdog: when the connection is lost, it keeps
 executing its last command.
 """
 
@@ -51,15 +51,15 @@ class Epuck2Options:
     )
     magnetometer: str = parameter(CHIPS[0], help="the robot's chip; the second in robots from 2025 on", choices=CHIPS)
     offset_x_ut: float = parameter(
-        0.0, help="middle of what the magnetometer's x reads in a full turn of the robot", unit="uT"
+        0.0, help="middle of the magnetometer's x readings over a full turn of the robot", unit="uT"
     )
     offset_y_ut: float = parameter(0.0, help="the same of its y", unit="uT")
-    turn_offset_radps: float = parameter(0.0, help="what the gyro tells of a robot at rest", unit="rad/s")
-    ground_black: float = parameter(GROUND_BLACK, help="what the ground sensors tell on black")
-    ground_white: float = parameter(GROUND_WHITE, help="what they tell on white")
+    turn_offset_radps: float = parameter(0.0, help="the gyro's reading at rest", unit="rad/s")
+    ground_black: float = parameter(GROUND_BLACK, help="the ground sensors' reading on black")
+    ground_white: float = parameter(GROUND_WHITE, help="the ground sensors' reading on white")
     connect_s: float = parameter(3.0, help="the robot must take a connection and answer within", unit="s", above=0)
     answer_s: float = parameter(
-        0.1, help="wait for a new reading at most; then the one before is told once more", unit="s", above=0
+        0.1, help="longest wait for a new reading; after it, the previous reading is used again", unit="s", above=0
     )
     silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
 

@@ -74,8 +74,8 @@ class CommandPublisher:
 class Ros2Driver(Driver):
     """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is that one's endpoint.
 
-    The base stays at rest, whatever the command, until each of scanner, odometry and IMU that the agent needs has
-    been received once.
+    The base stays at rest, and commands have no effect, until each of scanner, odometry and IMU that the agent needs
+    has been received once.
     """
 
     options: ClassVar[type] = Ros2Options
@@ -196,7 +196,7 @@ class Ros2Driver(Driver):
     def _no_base_text(self) -> str:
         options = self._options
         topic = absolute(options.namespace or ros_name(self.robot), options.command_topic)
-        return f"nobody takes {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
+        return f"no subscriber for {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
 
     def _check_link(self) -> CommandPublisher:
         """The commander of a working connection; otherwise DriverLost."""

@@ -29,7 +29,7 @@ class Ros2Options:
 
     transport: str = parameter(
         "bridge",
-        help="what the base speaks zenoh by: zenoh-bridge-ros2dds, or rmw_zenoh",
+        help="the base's Zenoh connection: zenoh-bridge-ros2dds or rmw_zenoh",
         choices=TRANSPORTS,
     )
     namespace: str = parameter("", help="where its topics lie; empty: the robot's name as ROS takes it; /: nowhere")

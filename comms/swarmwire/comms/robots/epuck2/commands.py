@@ -2,7 +2,7 @@
 
 Clockwise from ahead the lights are LED1 (red), LED2 (any colour), LED3 (red), and so on to LED8; the body's spec has
 them in that order. The red LEDs are on or off. The firmware of the radio module shows the state of the WiFi with LED2,
-whatever a command sets.
+whether or not a command sets them.
 """
 
 from collections.abc import Iterator, Mapping

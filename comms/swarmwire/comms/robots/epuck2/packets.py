@@ -28,7 +28,7 @@ class PacketRequest(IntFlag):
 
 
 class RobotSettingsBits(IntFlag):
-    """What a command tells beside speeds and lights."""
+    """The flags of a command, beside speeds and lights."""
 
     NONE = 0
     CALIBRATE = 1  # of the proximity sensors: takes a second, with nothing near

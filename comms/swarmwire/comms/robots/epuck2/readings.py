@@ -54,7 +54,7 @@ def to_light(value: FloatArray) -> AnyArray:
 
 
 def shade(raw: AnyArray, black: float, white: float) -> FloatArray:
-    """The floor's shade, 0 black to 1 white, of sensors that tell `black` and `white` there."""
+    """The floor's shade, 0 black to 1 white, of sensors that read `black` and `white` there."""
     return np.clip((raw - black) / (white - black), 0.0, 1.0)
 
 
@@ -70,7 +70,7 @@ def distance_m(raw: AnyArray, spec: ScanSpec) -> FloatArray:
 
 
 def to_distance(range_m: FloatArray, spec: ScanSpec) -> AnyArray:
-    """The inverse of `distance_m`; inf: what the sensor tells that sees nothing."""
+    """The inverse of `distance_m`; inf is the reading of a sensor that sees nothing."""
     seen_m = np.minimum(range_m, 0.001 * SEES_NOTHING_MM) - (DISTANCE_AHEAD_M - spec.at_m)
     return np.where(np.isinf(range_m), SEES_NOTHING_MM, _whole(1000.0 * seen_m, 0, SEES_NOTHING_MM))
 

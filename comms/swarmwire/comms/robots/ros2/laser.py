@@ -62,7 +62,7 @@ def returns_m(message: Any) -> FloatArray:
     """The distance of the return on each ray, (rays,); inf: none.
 
     Nearer than the scanner's `range_min` it is `range_min`, as -inf is (REP 117): something is there. Beyond
-    `range_max`, 0 (which TurtleBot3's scanner tells for no return) and nan are none.
+    `range_max`, 0 (TurtleBot3's scanner's reading for no return) and nan are none.
     """
     with np.errstate(invalid="ignore"):  # a nan may be a signalling one
         range_m = np.asarray(message.ranges, np.float64)

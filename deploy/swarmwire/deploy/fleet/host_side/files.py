@@ -70,7 +70,7 @@ def whole_in(folder: Path) -> list[str]:
 
 
 def sync_files(folder: Path) -> None:
-    """See to it that what a folder holds is on the disk, whatever happens to the robot from now on."""
+    """Write a folder's content through to the disk, so that a power cut does not lose it."""
     for path in folder.iterdir():
         if path.is_file() and not path.is_symlink():
             _sync(path)

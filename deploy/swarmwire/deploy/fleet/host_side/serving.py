@@ -233,5 +233,5 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def main() -> None:
-    """Serve whoever started this process."""
+    """Serve the parent process."""
     serve(sys.stdin.buffer, sys.stdout.buffer)

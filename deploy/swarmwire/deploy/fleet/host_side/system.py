@@ -79,7 +79,7 @@ def shown(robots: list[str]) -> dict[str, dict[str, str]]:
     for robot, block in zip(robots, blocks, strict=False):
         known = dict(line.split("=", 1) for line in block.splitlines() if "=" in line)
         if ANSWERED - known.keys():
-            raise Refusal("systemd", f"systemctl show does not tell the state of {unit_of(robot)}")
+            raise Refusal("systemd", f"systemctl show does not report the state of {unit_of(robot)}")
         found[robot] = {**dict.fromkeys(SHOWN, ""), **known, "running": _release_of(robot, known.get("MainPID", "0"))}
     return found
 
@@ -139,12 +139,12 @@ def manager() -> str:
 
 
 def lingers() -> bool:
-    """Whether the user's units go on when nobody is logged in."""
+    """Whether the user's units keep running without a login session."""
     return _loginctl("show-user", getpass.getuser(), "--property=Linger").stdout.strip() == "Linger=yes"
 
 
 def linger() -> str:
-    """Let the user's units go on when nobody is logged in; what went wrong, or ""."""
+    """Let the user's units keep running without a login session; return the error, or ""."""
     if lingers():
         return ""
     done = _loginctl("enable-linger")

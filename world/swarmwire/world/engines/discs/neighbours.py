@@ -1,6 +1,6 @@
 """Neighbour lists (Verlet lists) of the discs engine: the things that a robot may touch soon. Compiled.
 
-Things are listed with a margin, and anew once a robot has moved by that margin. The motion does not depend on the
+Things are listed with a margin, and again once a robot has moved by that margin. The motion does not depend on the
 margin: contacts are found among the listed things by their present distance, in an order that the lists keep: pairs by
 the lower and then by the higher row, fixed things by row.
 

@@ -259,7 +259,7 @@ def advance(
     step, steps, dt_s, margin_m, max_radius_m, half_size_m, per_arena, robots, state, travel_m, touched, braked, target,
     contacts, met, contacting, isolated, circle, side_start, side, onsets,
 ):  # fmt: skip
-    """Move all robots from this step of the tick on, to its end or until near things have to be listed anew.
+    """Move all robots from this step of the tick on, to its end or until near things have to be listed again.
 
     Returns:
         The step that was reached, and the greatest speed of any robot or target.

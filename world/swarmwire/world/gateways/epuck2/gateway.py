@@ -82,7 +82,7 @@ def _drive_differences(body: Body, model: Body) -> list[str]:
 
 def _at_rest(body: Body, model: Body) -> list[str]:
     absent = [name for name in model.sensors if name in READABLE_SENSORS and name not in body.sensors]
-    return [f"it has no {', '.join(absent)}, which are told as of a robot at rest"] if absent else []
+    return [f"it has no {', '.join(absent)}, which read as for a robot at rest"] if absent else []
 
 
 class Epuck2Gateway(Gateway):

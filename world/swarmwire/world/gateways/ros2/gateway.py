@@ -52,10 +52,10 @@ class Ros2Gateway(Gateway):
 
     def differences(self) -> tuple[str, ...]:
         """As `Gateway.differences`."""
-        return (*super().differences(), *(["nobody switches its LEDs"] if self.body.led_count else []))
+        return (*super().differences(), *(["no program switches its LEDs"] if self.body.led_count else []))
 
     def open(self) -> tuple[str, ...]:
-        """As `Gateway.open`: one endpoint for all robots, which their namespaces tell apart."""
+        """As `Gateway.open`: one endpoint for all robots, distinguished by namespace."""
         try:
             self._session, endpoint = open_router(self.address)
         except zenoh.ZError as error:
@@ -69,7 +69,7 @@ class Ros2Gateway(Gateway):
         return (endpoint,) * len(self.names)
 
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
-        """As `Gateway.publish`: what is due, and somebody subscribes to."""
+        """As `Gateway.publish`: the topics that are due and have subscribers."""
         if self._began_ns is None:
             self._began_ns = self.clock.utc_ns() - time_ns
         stamp_ns = self._began_ns + time_ns
@@ -85,7 +85,7 @@ class Ros2Gateway(Gateway):
             _put(self._clocks, self._messages.encode(CLOCK, now), stamp_ns)
 
     def take(self) -> Commands:
-        """As `Gateway.take`; a base that was told nothing for `cmd_timeout_s` is told to stand still."""
+        """As `Gateway.take`; a base without a command for `cmd_timeout_s` stops."""
         newest = [base.inbox.newest() for base in self._bases]
         told = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
         drive = np.array([command is not None for command in newest], np.bool_)

@@ -29,7 +29,7 @@ class Ros2GatewayOptions:
     )
     cmd_timeout_s: float = parameter(0.5, help="a base stops after so long without a command", unit="s", above=0)
     full_lux: float = parameter(
-        FULL_LUX, help="illuminance that a photocell tells where it reads 1", unit="lx", above=0
+        FULL_LUX, help="illuminance that a photocell reports where it reads 1", unit="lx", above=0
     )
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
 
@@ -73,7 +73,7 @@ class Broadcaster(ABC):
     rate_hz: float
 
     def is_told(self, fields: Fields) -> bool:
-        """Whether there is anything to tell of."""
+        """Whether there is anything to publish."""
         return any(name in fields for name in self.reads)
 
     def follow(self, time_ns: int, fields: Fields) -> None:
