@@ -58,7 +58,6 @@ UNWRITTEN: tuple[str, ...] = (  # pages and folders that are still to be rewritt
     "docs/summary.md",
     "docs/tuning.md",
     "docs/ways.md",
-    "docs/experiments/",
     "comms/swarmwire/comms/radio/",
     "deploy/swarmwire/deploy/cli/certs.py",
 )

@@ -18,7 +18,7 @@ RADIOS = ("", "-bursts")
 BEHAVIOURS = ("avoidance", "flocking", "pso")
 CHECKS = {  # each beside the column without losses of the map whose break it explains
     "loss-map-avoidance-told": ("avoidance", "agents know the latency"),
-    "loss-map-pso-early": ("pso", "bests told 3 s before an update"),
+    "loss-map-pso-early": ("pso", "bests sent 3 s before an update"),
 }
 CAMPAIGNS = (*(f"loss-map-{behaviour}{radio}" for behaviour in BEHAVIOURS for radio in RADIOS), *CHECKS)
 COLUMNS = ("radio.link_pdr",)
@@ -125,7 +125,7 @@ def _size(runs: Mapping[str, pl.DataFrame]) -> str:
 
 def _check_lines(runs: Mapping[str, pl.DataFrame]) -> list[str]:
     """A table of what heals a break, latency by latency, without losses."""
-    lines = ["| | latency, s | as in the map | with the cure | difference |", f"|{' --- |' * 5}"]
+    lines = ["| | latency, s | as in the map | with the change | difference |", f"|{' --- |' * 5}"]
     for name, (behaviour, cure) in CHECKS.items():
         cured = results(runs[name], behaviour)
         plain = results(runs[f"loss-map-{behaviour}"], behaviour).filter(pl.col("loss") == 0.0)

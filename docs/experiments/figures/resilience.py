@@ -157,7 +157,7 @@ def _fits(fits: Degradation | None) -> tuple[str, str, str]:
     if fits is None:
         return "–", "–", "–"
     apart = fits.linear.aic - fits.exponential.aic
-    form = fits.better.form if fits.is_clear else "not told apart"
+    form = fits.better.form if fits.is_clear else "undecided"
     return _slope(fits.linear), _slope(fits.exponential), f"{apart:+.1f}: {form}"
 
 
