@@ -97,9 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"swarmwire-agent {version('swarmwire-agent')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     helps = {
-        "run": "run an agent on a robot until it is ended",
+        "run": "run an agent on a robot until it is stopped",
         "check": "check the settings and print the plan or the errors; connect to nothing",
-        "stop-motors": "stop the motors of a robot, and nothing else; it may be given all that `run` was",
+        "stop-motors": "stop the motors of a robot, and nothing else; accepts all flags of `run`",
     }
     for name, text in helps.items():
         command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
@@ -110,18 +110,18 @@ def _parser() -> argparse.ArgumentParser:
             "--duration-s",
             metavar="S",
             type=_duration,
-            help=hidden or "end after so long; else it runs until it is ended",
+            help=hidden or "end after this time; default: run until stopped",
         )
         command.add_argument(
             "--no-guard",
             action="store_true",
-            help=hidden or "do without the process that stops the motors if this one dies: for debuggers",
+            help=hidden or "run without the guard process, which stops the motors if this one dies: for debuggers",
         )
         command.add_argument("--heartbeats", type=int, help=argparse.SUPPRESS)
         command.add_argument("--standby", action="store_true", help=argparse.SUPPRESS)
-    text = "play robots of a run elsewhere, with the agent that is installed here"
+    text = "run robots' agents for a remote run, with the agent that is installed here"
     add_join(commands.add_parser("join", help=text, description=JOIN, formatter_class=raw))
-    commands.add_parser("drivers", help="list the drivers that are installed, with their options")
+    commands.add_parser("drivers", help="list the installed drivers, with their options")
     return parser
 
 

@@ -16,24 +16,29 @@ if TYPE_CHECKING:
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.agent.runner import Arrivals
 
-ABOUT = """Run the agents of robots of a run that `swarmwire world` has opened elsewhere.
+ABOUT = """Run robots' agents for a run that `swarmwire world` serves.
 
 The agent is the one that is installed here; its file must be the same as the world's."""
 
 
 def add_join(command: argparse.ArgumentParser) -> None:
     """Add the arguments of `swarmwire-agent join`."""
-    command.add_argument("endpoint", metavar="ENDPOINT", help="where the world listens: tls/10.0.0.5:7447")
+    command.add_argument("endpoint", metavar="ENDPOINT", help="endpoint of the world: tls/10.0.0.5:7447")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--robots", type=int, metavar="N", help="so many; else all that are free, or the next part")
+    which.add_argument(
+        "--robots",
+        type=int,
+        metavar="N",
+        help="number of free robots to take; default: all free ones, or the next part",
+    )
     which.add_argument("--names", metavar="A,B", help="these robots")
     command.add_argument(
-        "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; else as the scenario names it"
+        "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; default: the scenario's"
     )
-    command.add_argument("--processes", type=int, metavar="N", help="divide the robots between so many; else one each")
+    command.add_argument("--processes", type=int, metavar="N", help="number of processes; default: one per robot")
     command.add_argument("--scenario", type=Path, metavar="FILE", help="join only a run of exactly this scenario")
-    command.add_argument("--name", help="the runner's; else its certificate's, or one made up")
-    command.add_argument("--run", metavar="ID", help="which run, if there are several")
+    command.add_argument("--name", help="the runner's name; default: its certificate's, or a generated one")
+    command.add_argument("--run", metavar="ID", help="id of the run, if there are several")
     command.add_argument("--ca", type=Path, metavar="FILE", help="certificate that signed all others")
     command.add_argument("--certificate", type=Path, metavar="FILE", help="the runner's certificate")
     command.add_argument("--key", type=Path, metavar="FILE", help="its private key")

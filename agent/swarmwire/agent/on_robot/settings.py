@@ -48,7 +48,7 @@ class DriverSettings:
     """The driver, and the robot that it reaches."""
 
     name: str = parameter(help="expected a driver, as `swarmwire-agent drivers` lists them")
-    address: str = parameter("", help="where the robot is reached, as its driver says")
+    address: str = parameter("", help="address of the robot, in the driver's format")
     options: dict[str, Any] = field(default_factory=dict[str, Any])  # unchecked; the driver declares its options
 
 
@@ -64,17 +64,19 @@ class RobotSettings:
     params: dict[str, Any] = field(default_factory=dict[str, Any])
     body: str = parameter("", help="a body's name, or its file beside this one; else the driver's")
     rate_hz: int = parameter(10, help="steps of the agent per second", unit="Hz", at_least=1, at_most=1000)
-    watchdog_s: float = parameter(0.5, help="motors stop when the agent is later", unit="s", at_least=0.01, at_most=10)
+    watchdog_s: float = parameter(
+        0.5, help="stop the motors when the agent is later; needs a working link", unit="s", at_least=0.01, at_most=10
+    )
     max_linear_mps: float | None = parameter(None, help="fastest speed; else half the body's", unit="m/s", above=0)
     max_angular_radps: float | None = parameter(None, help="fastest turn; else half the body's", unit="rad/s", above=0)
     radio: RadioSettings = field(default_factory=RadioSettings)
-    tracker: bool = parameter(False, help="whether poses of robots come over the network")
+    tracker: bool = parameter(False, help="receive robots' poses over the network")
     network: Network | None = None
-    log: str = parameter("", help="folder for the logs; else there is none")
+    log: str = parameter("", help="folder for the logs; default: none")
     pace: float = parameter(
         1.0, help="times as fast as the wall clock, for an emulated robot", at_least=0.01, at_most=1000
     )
-    seed: int = parameter(0, help="of the agent's draws, with the robot's index", at_least=0)
+    seed: int = parameter(0, help="seed of the agent's random numbers, with the robot's index", at_least=0)
     format: int = FORMAT
 
     @property
@@ -170,8 +172,8 @@ class Flag(NamedTuple):
 
 AGENT = "AGENT"
 FLAGS = (
-    Flag("--driver", "driver.name", "how the robot is reached: see `swarmwire-agent drivers`", "NAME", "text"),
-    Flag("--address", "driver.address", "where the robot is reached, as its driver says", "ADDRESS", "text"),
+    Flag("--driver", "driver.name", "driver of the robot: see `swarmwire-agent drivers`", "NAME", "text"),
+    Flag("--address", "driver.address", "address of the robot, in the driver's format", "ADDRESS", "text"),
     Flag("--option", "driver", "an option of the driver", "K=V", "pairs"),
     Flag("--radio", "radio.kind", "zenoh: the robots' own network; world: that of a world; none", "KIND", "text"),
     Flag("--max-payload-bytes", "radio.max_payload_bytes", "largest message, tag included", "N"),
@@ -180,27 +182,27 @@ FLAGS = (
     Flag(
         "--robot",
         "robots",
-        "a robot of the swarm, this one too: once for each, in the same order everywhere",
+        "a robot of the swarm, this one included: repeat for each, in the same order on all robots",
         "NAME",
         "list",
     ),
     Flag("--body", "body", "a body's name or its sheet; else the driver's", "NAME", "spec"),
     Flag("--param", "params", "a parameter of the agent", "K=V", "pairs"),
     Flag("--rate-hz", "rate_hz", "steps of the agent per second", "N"),
-    Flag("--watchdog-s", "watchdog_s", "motors stop when the agent is later", "S"),
+    Flag("--watchdog-s", "watchdog_s", "stop the motors when the agent is later; needs a working link", "S"),
     Flag("--max-linear-mps", "max_linear_mps", "fastest speed; else half the body's", "V"),
     Flag("--max-angular-radps", "max_angular_radps", "fastest turn; else half the body's", "W"),
-    Flag("--tracker", "tracker", "poses of robots come over the network", kind="true"),
-    Flag("--listen", "network.listen", "where others may call: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
+    Flag("--tracker", "tracker", "receive robots' poses over the network", kind="true"),
+    Flag("--listen", "network.listen", "endpoint for others: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
     Flag("--connect", "network.connect", "endpoint to connect to: tcp/127.0.0.1:7548", "ENDPOINT", "list"),
     Flag("--multicast", "network.multicast", "find one another in the local network", kind="true"),
     Flag("--ca", "network.ca", "certificate that signed all others", "FILE", "path"),
     Flag("--certificate", "network.certificate", "the robot's certificate", "FILE", "path"),
     Flag("--key", "network.key", "its private key", "FILE", "path"),
     Flag("--insecure", "network.insecure", "go without certificates beyond this machine", kind="true"),
-    Flag("--log", "log", "folder for the logs; else there is none", "FOLDER", "path"),
+    Flag("--log", "log", "folder for the logs; default: none", "FOLDER", "path"),
     Flag("--pace", "pace", "times as fast as the wall clock, for an emulated robot", "X"),
-    Flag("--seed", "seed", "of the agent's draws", "N"),
+    Flag("--seed", "seed", "seed of the agent's random numbers", "N"),
 )
 
 DRIVER_FLAGS = ("--driver", "--address", "--option", "--name", "--body")  # sufficient to stop the motors

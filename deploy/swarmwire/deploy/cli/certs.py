@@ -29,7 +29,7 @@ def init_command(
         bool, typer.Option("--renew", help="Make another CA in its place; the old folder is kept under another name.")
     ] = False,
 ) -> None:
-    """Begin a CA, good for ten years, in a new folder that you alone may enter.
+    """Create a CA, valid for ten years, in a new folder that only you can enter.
 
     Its key, ca.key, signs who belongs to the swarm: keep the folder where no robot and no repository gets at it. For
     example:
@@ -52,11 +52,13 @@ def issue_command(
     folder: AuthorityFolder,
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Whose: names of robots, runners, …; tracker, operator, world.", metavar="NAME…"),
+        typer.Argument(help="Names of members: robots, runners, …; tracker, operator, world.", metavar="NAME…"),
     ] = None,
     hosts: Annotated[
         list[str] | None,
-        typer.Option("--host", help="An IP address or host name at which they listen. Repeatable.", metavar="ADDRESS"),
+        typer.Option(
+            "--host", help="IP address or host name at which the members listen. Repeatable.", metavar="ADDRESS"
+        ),
     ] = None,
     fleet: Annotated[
         Path | None,
@@ -64,7 +66,7 @@ def issue_command(
             help="Instead of names: all of this fleet.toml, tracker and operator who lack a good one.", metavar="FILE"
         ),
     ] = None,
-    days: Annotated[int, typer.Option(min=1, max=3650, help="How long they hold.")] = 365,
+    days: Annotated[int, typer.Option(min=1, max=3650, help="Validity.")] = 365,
     purpose: Annotated[
         str | None,
         typer.Option(
@@ -123,7 +125,7 @@ def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
 
 @certs_app.command("revoke")
 def revoke_command(
-    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Whose certificates.", metavar="NAME")]
+    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Names of members.", metavar="NAME")]
 ) -> None:
     """Revoke a name for good: under this CA it never gets a certificate again.
 

@@ -24,9 +24,9 @@ def compare_command(
         list[str] | None,
         typer.Option(help="Compare where this parameter has this value. Repeatable.", metavar="PATH=VALUE"),
     ] = None,
-    to: Annotated[Path | None, typer.Option(help="Write the numbers to this file, too.", metavar="FILE.csv")] = None,
+    to: Annotated[Path | None, typer.Option(help="Also write the numbers to this file.", metavar="FILE.csv")] = None,
 ) -> None:
-    """Compare two campaigns: medians, their difference and how sure it is, at each design point that both have.
+    """Compare two campaigns: medians, their difference and its interval, at each common design point.
 
     Points that agree in every parameter that both vary are compared, and seeds that both ran one by one. Unless
     responses are named they are all times, the last values of metrics, and the link PDR. For example:
@@ -67,7 +67,7 @@ def report_command(
 ) -> None:
     """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
 
-    Also of what is not finished. Unless responses are named they are times, last values of metrics and the link PDR, of
+    Unfinished campaigns and runs are accepted. Default responses are times, last values of metrics and the link PDR, of
     those that differ between runs; tables that are folded hold the others. For example:
 
       swarmwire report campaigns/loss --response aggregation_time_s --response order
@@ -112,12 +112,12 @@ def sim_to_real_command(
     to: Annotated[
         Path | None, typer.Option(help="A page with the distributions, too; figures go beside it.", metavar="FILE.html")
     ] = None,
-    csv: Annotated[Path | None, typer.Option(help="Write the numbers to this file, too.", metavar="FILE.csv")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Also write the numbers to this file.", metavar="FILE.csv")] = None,
 ) -> None:
-    """Compare a log of real robots with emulated runs: the same metrics side by side, and how far apart they are.
+    """Compare a log of real robots with simulated runs: the same metrics side by side, and their differences.
 
     With a campaign each metric is within the spread if the log is no farther from the runs than the runs are from one
-    another. What a log cannot know (contacts, times on air, who is within range) is left out. For example:
+    another. Values that a log cannot hold (contacts, airtime, robots within range) are left out. For example:
 
       swarmwire robots logs fleet.toml --fetch logs/monday
 

@@ -115,7 +115,7 @@ def tell(reply: Mapping[str, Any]) -> None:
 
 @ctl_app.command("status")
 def status_command(context: typer.Context, as_json: AsJson = False) -> None:
-    """Print how a run is doing; of several runs on this machine, a line each.
+    """Print the status of a run, or a line for each of several runs on this machine.
 
     With --json there is a JSON object per run, each on a line. For example:
 
@@ -233,7 +233,7 @@ def resume_command(context: typer.Context) -> None:
 
 @ctl_app.command("step")
 def step_command(
-    context: typer.Context, ticks: Annotated[int, typer.Argument(help="How many ticks.", min=1, metavar="N")] = 1
+    context: typer.Context, ticks: Annotated[int, typer.Argument(help="Number of ticks.", min=1, metavar="N")] = 1
 ) -> None:
     """Run exactly N ticks, then pause.
 

@@ -20,7 +20,8 @@ Which = Annotated[
     ),
 ]
 ForS = Annotated[
-    float | None, typer.Option("--for", help="Undone after so many simulated seconds. Default: not.", metavar="S")
+    float | None,
+    typer.Option("--for", help="Revert after this many simulated seconds. Default: permanent.", metavar="S"),
 ]
 
 events_app = typer.Typer()
@@ -28,7 +29,7 @@ events_app = typer.Typer()
 
 @events_app.command("kill")
 def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> None:
-    """Kill robots: they stop where they stand, and say nothing.
+    """Kill robots: they stop and send nothing.
 
     For example two by name, or five drawn for 20 s:
 
@@ -43,7 +44,7 @@ def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> N
 
 @events_app.command("revive")
 def revive_command(context: typer.Context, robots: Which) -> None:
-    """Have robots that were killed act again, with a fresh memory.
+    """Revive killed robots, with an empty memory.
 
     For example all of them:
 
@@ -56,12 +57,12 @@ def revive_command(context: typer.Context, robots: Which) -> None:
 def impulse_command(
     context: typer.Context,
     robots: Which,
-    speed_mps: Annotated[float, typer.Option("--speed", help="Added to their velocity, m/s.", metavar="M/S")],
+    speed_mps: Annotated[float, typer.Option("--speed", help="Speed added to their velocity, m/s.", metavar="M/S")],
     direction_rad: Annotated[
-        float, typer.Option("--direction", help="Where to, in the arena: 0 along x, 1.57 along y.", metavar="RAD")
+        float, typer.Option("--direction", help="Direction in the arena: 0 along x, 1.57 along y.", metavar="RAD")
     ] = 0.0,
 ) -> None:
-    """Push robots: their velocity changes at once; then it is up to their motors.
+    """Push robots: their velocity changes at once, then their motors correct it.
 
     For example along y:
 
@@ -86,14 +87,14 @@ def partition_command(
         typer.Option(help="A set of groups and robots, a,b-3; twice or more: the sets.", metavar="NAMES"),
     ] = None,
     isolate: Annotated[
-        str | None, typer.Option(help="Groups and robots, a,b-3, each of which is alone.", metavar="NAMES")
+        str | None, typer.Option(help="Groups and robots, a,b-3, each isolated from all others.", metavar="NAMES")
     ] = None,
     one_way: Annotated[
-        bool, typer.Option("--one-way", help="Of two sets the second does not hear the first, which hears it.")
+        bool, typer.Option("--one-way", help="One way: the second set receives nothing from the first.")
     ] = False,
     for_s: ForS = None,
 ) -> None:
-    """Let sets of robots not hear one another, until `end` or after a time.
+    """Block radio between sets of robots, until `end` or for a time.
 
     For example:
 
@@ -118,16 +119,14 @@ def partition_command(
 def jam_command(
     context: typer.Context,
     robots: Annotated[
-        list[str] | None, typer.Argument(help="Who carry a jammer each, as for kill.", metavar="[ROBOTS]")
+        list[str] | None, typer.Argument(help="Robots that carry a jammer each, as for kill.", metavar="[ROBOTS]")
     ] = None,
-    at: Annotated[
-        str | None, typer.Option(help="Where it stands, in m from the arena's middle.", metavar="X,Y")
-    ] = None,
+    at: Annotated[str | None, typer.Option(help="Position, in m from the arena's middle.", metavar="X,Y")] = None,
     power_dbm: Annotated[float, typer.Option("--power", help="Radiated power, dBm.", metavar="DBM")] = 20.0,
-    duty: Annotated[float | None, typer.Option(help="The share of time for which it is on. Default: 1.")] = None,
+    duty: Annotated[float | None, typer.Option(help="Share of time for which it transmits. Default: 1.")] = None,
     for_s: ForS = None,
 ) -> None:
-    """Put up a jammer, in runs whose radio has signals, until `end` or after a time.
+    """Place a jammer, in runs whose radio has a PHY, until `end` or for a time.
 
     For example in the middle:
 
@@ -151,7 +150,7 @@ def set_command(
     context: typer.Context,
     settings: Annotated[list[str], typer.Argument(help="Numbers of the radio, such as loss=0.5.", metavar="KEY=VALUE")],
     over_s: Annotated[
-        float, typer.Option("--over", help="How long the way there takes, simulated seconds.", min=0, metavar="S")
+        float, typer.Option("--over", help="Change evenly over this many simulated seconds.", min=0, metavar="S")
     ] = 0.0,
 ) -> None:
     """Set numbers of the radio, at once or evenly over a time; `swarmwire ctl status` prints them.
@@ -198,10 +197,10 @@ COLUMNS = ("number", "tick", "event", "")
 def event_command(
     context: typer.Context,
     table: Annotated[
-        str, typer.Argument(help="A table as that of an event in a scenario, without at_s.", metavar="'{ do = …, … }'")
+        str, typer.Argument(help="An event's table as in a scenario, without at_s.", metavar="'{ do = …, … }'")
     ],
 ) -> None:
-    """Have any event happen at the start of the next tick; `swarmwire list events` names them.
+    """Inject any event at the start of the next tick; `swarmwire list events` names them.
 
     For example:
 
@@ -214,7 +213,7 @@ def event_command(
 
 @events_app.command("events")
 def events_command(context: typer.Context) -> None:
-    """List the run's events, the scenario's and those given: number, tick, what, and whether it is over.
+    """List the scenario's and the live events: number, tick, kind, and whether it is over.
 
     For example:
 
@@ -247,10 +246,10 @@ def events_command(context: typer.Context) -> None:
 def end_command(
     context: typer.Context,
     number: Annotated[
-        int, typer.Argument(help="Of the event, as `swarmwire ctl events` prints it.", min=0, metavar="NUMBER")
+        int, typer.Argument(help="Number of the event, from `swarmwire ctl events`.", min=0, metavar="NUMBER")
     ],
 ) -> None:
-    """Undo an event that lasts, such as a kill, a partition, a jammer or a number that was set.
+    """End a lasting event, such as a kill, a partition, a jammer or a changed number.
 
     For example:
 

@@ -36,7 +36,7 @@ Speed = Annotated[
     float | None,
     typer.Option(help="Simulated seconds per second of a film. Default: 1, or more, for 300 frames at most."),
 ]
-Arena = Annotated[int | None, typer.Option(help="Which of several arenas. Default: 0.")]
+Arena = Annotated[int | None, typer.Option(help="Number of the arena. Default: 0.")]
 Metric = Annotated[
     list[str] | None,
     typer.Option(
@@ -95,7 +95,7 @@ def draw_command(
 ) -> None:
     """Draw a scenario as it starts, or a body with its sensors, without running anything.
 
-    A scenario: arena, obstacles, lights, every robot where the seed puts it, and how far the radio reaches.
+    A scenario: arena, obstacles, lights, every robot at its start for the seed, and the radio's range.
     A body: to scale and from above, with wheels, rays and photocells, its figures and their source.
     """
     path = Path(subject)

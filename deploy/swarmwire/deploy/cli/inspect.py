@@ -19,7 +19,7 @@ from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile
 
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
-    """Check a scenario without running it: keys, values, agents, what they need, and room for everything."""
+    """Check a scenario without running it: keys, values, agents and their needs, and room for robots and obstacles."""
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.world.scenario_file import load_scenario
 
@@ -41,7 +41,7 @@ def list_command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List what a scenario or an agent may name: the kinds, or all things of one kind.
+    """List the names that a scenario or an agent can use: the kinds, or all names of one kind.
 
     For example all events, and then one of them:
 
@@ -72,7 +72,7 @@ def describe_command(
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Describe one thing: what it is, its parameters with unit, default and bounds, and where its figures come from.
+    """Describe one name: its purpose, its parameters with unit, default and bounds, and the source of its numbers.
 
     For example a body, a key of a scenario, one of two things of the same name, an agent and a body of your own:
 
@@ -109,9 +109,9 @@ def new_command(
     ],
     within: Annotated[Path, typer.Option("--in", help="The folder in which to make it.", metavar="DIR")] = Path(),
 ) -> None:
-    """Make a folder to start from: an agent, a scenario with a lossy radio, a test that passes, and a README.
+    """Create a swarm's folder: an agent, a scenario with a lossy radio, a passing test, and a README.
 
-    For example, and then a first run of it:
+    For example, followed by a first run:
 
       swarmwire new my_swarm
 
@@ -131,9 +131,9 @@ STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # red 
 def verify_command(
     folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="RUN")],
 ) -> None:
-    """Check a run folder: read all of it, compare it with its summary, and say what is missing.
+    """Check a run folder: read all files, compare them with the summary, and list missing or damaged ones.
 
-    Exit code 0: intact; 1: incomplete or damaged (what a killed run left can still be read); 2: no run folder.
+    Exit code 0: intact; 1: incomplete or damaged (the tables of a killed run stay readable); 2: no run folder.
     """
     from swarmwire.metrics.run_folder.verify import verify
 

@@ -56,7 +56,7 @@ RealTime = Annotated[
 Subtick = Annotated[
     float | None,
     typer.Option(
-        help="In real time, wake every so many seconds between ticks, 0.001 or more, and let packets cross then.",
+        help="In real time, interval in s at which packets are exchanged between ticks, 0.001 or more.",
         metavar="SECONDS",
     ),
 ]
@@ -115,15 +115,15 @@ def _names(option: str, who: str) -> typer.models.OptionInfo:
 Endpoint = Annotated[
     str | None,
     typer.Option(
-        help="Of a run on another machine: where it takes observers.", metavar="ENDPOINT", rich_help_panel=ACCESS
+        help="Of a run on another machine: its endpoint for observers.", metavar="ENDPOINT", rich_help_panel=ACCESS
     ),
 ]
 Certs = Annotated[
     Path | None,
     typer.Option(
         "--certs",
-        help="A folder with ca.pem, a certificate with its key, and the register of `swarmwire certs`, which has who "
-        "may take part and who is revoked.",
+        help="A folder with ca.pem, a certificate with its key, and the register of `swarmwire certs`, which "
+        "lists members and revoked names.",
         metavar="DIR",
         rich_help_panel=ACCESS,
     ),
@@ -131,17 +131,17 @@ Certs = Annotated[
 Name = Annotated[
     str | None,
     typer.Option(
-        "--name", help="Whose certificate, if the folder has several.", metavar="NAME", rich_help_panel=ACCESS
+        "--name", help="Name on the certificate, if the folder has several.", metavar="NAME", rich_help_panel=ACCESS
     ),
 ]
 Ca = Annotated[
     Path | None,
     typer.Option(
-        help="Instead of --certs: who signed the certificates; with --certificate and --key.", rich_help_panel=ACCESS
+        help="Instead of --certs: the CA's certificate; with --certificate and --key.", rich_help_panel=ACCESS
     ),
 ]
-Certificate = Annotated[Path | None, typer.Option(help="The own certificate.", rich_help_panel=ACCESS)]
-Key = Annotated[Path | None, typer.Option(help="Its key, which its owner alone may read.", rich_help_panel=ACCESS)]
+Certificate = Annotated[Path | None, typer.Option(help="This program's certificate.", rich_help_panel=ACCESS)]
+Key = Annotated[Path | None, typer.Option(help="Its key, readable by its owner only.", rich_help_panel=ACCESS)]
 RunnerNames = Annotated[list[str] | None, _names("--runner", "who may run robots' agents")]
 ObserverNames = Annotated[list[str] | None, _names("--observer", "who may look on")]
 OperatorNames = Annotated[list[str] | None, _names("--operator", "who may look on and control")]
@@ -161,7 +161,7 @@ Insecure = Annotated[
     bool,
     typer.Option(
         "--insecure",
-        help="Go beyond this machine without certificates: anybody there can take part, overhear and drive robots.",
+        help="Go beyond this machine without certificates: every host there can join, read packets and drive robots.",
         rich_help_panel=ACCESS,
     ),
 ]
@@ -188,7 +188,7 @@ NetworkEndpoint = Annotated[
     str | None,
     typer.Option(
         "--network",
-        help="Where the run sends its robots' agents their poses, and lends them its radio. Default: "
+        help="Endpoint at which robots' agents get poses and use the run's radio. Default: "
         "tcp/127.0.0.1:0, a free port of this machine.",
         metavar="ENDPOINT",
         rich_help_panel=GATEWAYS,

@@ -36,10 +36,10 @@ def fit_command(
     write: Annotated[
         Path | None, typer.Option(help="The .toml to write the radio's table to. Default: print it.")
     ] = None,
-    power_dbm: Annotated[float, typer.Option(help="Power that the robots sent with, in dBm.")] = 0.0,
+    power_dbm: Annotated[float, typer.Option(help="Transmit power of the robots, in dBm.")] = 0.0,
     gain_dbi: Annotated[float, typer.Option(help="Gain of their antennas, in dBi.")] = 0.0,
     within: Annotated[
-        float | None, typer.Option(help="Use packets at most so many metres apart only.", metavar="M")
+        float | None, typer.Option(help="Use only packets over at most this distance, in m.", metavar="M")
     ] = None,
     size: Size = USUAL_SIZE_PX,
 ) -> None:
@@ -147,9 +147,9 @@ def probe_command(
         ),
     ] = None,
     settings: Overrides = None,
-    runs: Annotated[int, typer.Option(min=1, max=10_000, help="With --contention: how many runs, seeds 1, 2, …")] = 10,
+    runs: Annotated[int, typer.Option(min=1, max=10_000, help="With --contention: number of runs, seeds 1, 2, …")] = 10,
     measured_s: Annotated[
-        float, typer.Option(min=0.001, max=3600, help="With --contention: measured time of each.")
+        float, typer.Option(min=0.001, max=3600, help="With --contention: measured time of each run.")
     ] = 2.0,
     at: Annotated[
         str | None, typer.Option(help="Of a scenario: the place in m that the map is drawn from.", metavar="X,Y")

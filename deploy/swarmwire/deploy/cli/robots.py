@@ -86,8 +86,8 @@ def check_command(
 ) -> None:
     """Check whether a deployment would work: settings, agents and their needs; each host, its Python, disk and clock.
 
-    Nothing is changed on robots. Hosts are known by their keys: with --trust keys of new ones are kept; compare
-    what is shown with `ssh-keygen -lf /etc/ssh/ssh_host_ed25519_key.pub` on the robot. A key that has changed is
+    Robots are not changed. Hosts are identified by their keys: --trust stores the keys of new hosts; compare
+    them with `ssh-keygen -lf /etc/ssh/ssh_host_ed25519_key.pub` on the robot. A key that has changed is
     refused either way.
 
     Exit code 0: all is well; 1: not with every robot; 2: the fleet's file is wrong. For example, before the
@@ -150,7 +150,7 @@ def deploy_command(
         typer.Option(help="A folder with the wheels that robots need, instead of the package index.", metavar="DIR"),
     ] = None,
 ) -> None:
-    """Bring agents, settings and all packages that they need to robots, as releases that are switched to at once.
+    """Copy agents, settings and all packages that they need to robots, as releases with an atomic switch.
 
     Each is tried out on its robot first. A failure leaves that robot unchanged and does not stop the others; to do
     it again does only what is missing. Robots keep their last three releases.
@@ -217,7 +217,7 @@ def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups 
 def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Stop robots at once, over the swarm's network and by SSH at the same time.
 
-    A line per robot shows by which way it was confirmed. Exit code 1: one of them is not confirmed, so switch it off
+    A line per robot shows which way confirmed the stop. Exit code 1: one of them is not confirmed, so switch it off
     by hand. For example, all robots:
 
       swarmwire robots estop fleet.toml
@@ -233,7 +233,7 @@ COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent
 
 @robots_app.command("status")
 def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None, as_json: AsJson = False) -> None:
-    """Print what each robot runs, since when, and the last report of its agent.
+    """Print each robot's release, uptime and its agent's last report.
 
     Exit code 1: something is wrong. For example:
 
@@ -286,14 +286,16 @@ def logs_command(
     file: FleetFile,
     robots: OfRobots = None,
     groups: OfGroups = None,
-    lines: Annotated[int, typer.Option(min=0, help="Of each robot, the last ones.")] = 10,
+    lines: Annotated[int, typer.Option(min=0, help="Number of last lines of each robot.")] = 10,
     follow: Annotated[bool, typer.Option("--follow", "-f", help="Keep printing new lines until Ctrl-C.")] = False,
     fetch: Annotated[
         Path | None,
-        typer.Option(help="Bring the log of each robot's last start to this folder, for parity.", metavar="DIR"),
+        typer.Option(
+            help="Copy the log of each robot's last start to this folder, for sim-to-real comparison.", metavar="DIR"
+        ),
     ] = None,
 ) -> None:
-    """Show what robots' agents print, or fetch their logs.
+    """Show the output of robots' agents, or fetch their logs.
 
     Exit code 1: not of every robot. For example:
 

@@ -29,7 +29,7 @@ POLL_S = 0.2  # how often it is looked up whether it is to end
 def router_command(
     listen: Annotated[
         list[str],
-        typer.Option("--listen", help="Where runners and further routers call. Repeatable.", metavar="ENDPOINT"),
+        typer.Option("--listen", help="Endpoint for runners and further routers. Repeatable.", metavar="ENDPOINT"),
     ],
     connect: Annotated[
         list[str],

@@ -78,11 +78,11 @@ def run_command(
     insecure: Insecure = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a scenario, show how it goes, and leave a run folder: summary, tables, recording, log.
+    """Run a scenario, show its progress, and write a run folder: summary, tables, recording, log.
 
     Without --realtime the same scenario and seed give the same run bit for bit, for all --runners and --threads.
 
-    With --gateway robots answer as real ones would, in real time, to programs that drive them: swarmwire-agent, whose
+    With --gateway robots act as real ones, in real time, for programs that drive them: swarmwire-agent, whose
     settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
     --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
@@ -158,7 +158,7 @@ def _say_where(result: "Result", folder: Path, console: Console) -> None:
 
 def repeat_command(
     folder: Annotated[Path, typer.Argument(help="The run folder, or a campaign's folder.", metavar="RUN")],
-    run: Annotated[int | None, typer.Option(help="Which run of a campaign, by its number.", metavar="NUMBER")] = None,
+    run: Annotated[int | None, typer.Option(help="Number of the run in a campaign.", metavar="NUMBER")] = None,
     runners: Runners = "none",
     out: Annotated[
         Path | None, typer.Option(help="A run folder for the repetition, new or empty. Default: nothing is written.")
@@ -167,11 +167,11 @@ def repeat_command(
     links: Links = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a run again from its folder alone, and check whether it comes out the same, bit for bit.
+    """Repeat a run from its folder alone, and check whether the result is the same, bit for bit.
 
-    Of a campaign's folder it is the run that --run names.
+    For a campaign's folder, --run selects the run.
 
-    Exit code 0: the same, as far as can be compared; 1: different, or there is nothing to compare with; 2: the folder
+    Exit code 0: the same, as far as recorded; 1: different, or there is nothing to compare with; 2: the folder
     holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.

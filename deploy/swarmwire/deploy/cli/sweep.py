@@ -40,7 +40,7 @@ def sweep_command(
     design: Annotated[
         str | None, typer.Option(help="grid (default), list (values one to one), random or latin.", metavar="DESIGN")
     ] = None,
-    points: Annotated[int | None, typer.Option(help="How many points a random or latin design draws.")] = None,
+    points: Annotated[int | None, typer.Option(help="Number of points of a random or latin design.")] = None,
     design_seed: Annotated[int | None, typer.Option(help="Seed of these points. Default: 1.")] = None,
     overrides: Overrides = None,
     out: Annotated[
@@ -48,7 +48,7 @@ def sweep_command(
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the campaign. Default: the scenario's.")] = None,
     executor: Annotated[
-        str, typer.Option(help="Who works: local, or a cluster, such as dask://host:8786.", metavar="EXECUTOR")
+        str, typer.Option(help="Workers: local, or a cluster, such as dask://host:8786.", metavar="EXECUTOR")
     ] = "local",
     workers: Annotated[
         int | None,
@@ -59,7 +59,7 @@ def sweep_command(
     ] = None,
     series: Annotated[bool, typer.Option(help="Keep the metrics of each tick.")] = True,
     record_seeds: Annotated[
-        str | None, typer.Option(help="Whose runs get full run folders; as for --seeds.", metavar="SEEDS")
+        str | None, typer.Option(help="Seeds whose runs get full run folders; as for --seeds.", metavar="SEEDS")
     ] = None,
     resume: Annotated[
         Path | None, typer.Option(help="Run only the missing runs of the campaign in this folder.", metavar="DIR")
@@ -74,8 +74,8 @@ def sweep_command(
 ) -> None:
     """Run a scenario at many points with many seeds, on all cores: a campaign, with a table of all runs.
 
-    Seeds are the same at every point. A run that fails is a row with its error. Ctrl-C, or a kill, loses what is under
-    way alone: --resume DIR does what is missing.
+    Seeds are the same at every point. A failed run is a row with its error. Ctrl-C, or a kill, loses only the running
+    tasks: --resume DIR runs the missing ones.
 
     Exit code 0: all runs have rows; 1: the folder cannot be written, no worker can start, or the cluster is gone; 2:
     refused before anything was run; 130: interrupted.
@@ -161,7 +161,7 @@ def tune_command(
             metavar="GOAL",
         ),
     ] = None,
-    trials: Annotated[int | None, typer.Option(help=f"How many are tried. Default: {TRIALS}.")] = None,
+    trials: Annotated[int | None, typer.Option(help=f"Number of trials. Default: {TRIALS}.")] = None,
     seeds: Annotated[
         str | None,
         typer.Option(
@@ -171,8 +171,7 @@ def tune_command(
     check_seeds: Annotated[
         str | None,
         typer.Option(
-            help="On which the best is checked at the end: how many after those, or as for --seeds. "
-            f"Default: {CHECK_SEEDS}.",
+            help=f"Seeds of the final check: a number of further seeds, or as for --seeds. Default: {CHECK_SEEDS}.",
             metavar="SEEDS",
         ),
     ] = None,
@@ -181,7 +180,7 @@ def tune_command(
     sampler_seed: Annotated[int | None, typer.Option(help=f"Seed of the sampler. Default: {SAMPLER_SEED}.")] = None,
     parallel_trials: Annotated[
         int | None,
-        typer.Option(help=f"Trials that are proposed together, and run at the same time. Default: {PARALLEL_TRIALS}."),
+        typer.Option(help=f"Trials proposed together, and run at the same time. Default: {PARALLEL_TRIALS}."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="The tuning's folder, new or empty. Default: tunings/<scenario>-<UTC>.")
@@ -199,8 +198,8 @@ def tune_command(
     """Search the parameters of a scenario with which a response over many seeds is best.
 
     Each trial runs all seeds with the parameters that Optuna proposes. The best is then checked against the scenario's
-    own parameters on seeds that no trial had. Ctrl-C, or a kill, loses the trials under way alone: --resume DIR goes
-    on. For example:
+    own parameters on seeds that no trial had. Ctrl-C, or a kill, loses only the running trials: --resume DIR
+    continues. For example:
 
       swarmwire tune flock.toml --search robots.flock.params.separation_m=0.2:2 --goal "max order.q50"
 

@@ -35,7 +35,7 @@ def view_command(
 ) -> None:
     """Show a run: live, or its recording afterwards. Ctrl-C, or closing the window, ends the view.
 
-    Opens a window if there is a screen; else prints an address for a browser on this machine.
+    Opens a window if there is a screen; otherwise prints a URL for a browser on this machine.
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.controls import Interrupt
@@ -95,7 +95,7 @@ def ui_command(
 ) -> None:
     """Open the page of a live run: watch, pause and step it, inject and clear faults. Ctrl-C ends the page.
 
-    The page is for browsers of this machine alone, and open to anybody who has its address with the token in it.
+    The page is for browsers of this machine only; its URL contains the access token.
     """
     UI.need("ui")
     VIEW.need("ui")

@@ -44,16 +44,16 @@ def world_command(
     scenario: ScenarioFile,
     listen: Annotated[
         list[str],
-        typer.Option("--listen", help="Where runners call: tls/0.0.0.0:7447. Repeatable.", metavar="ENDPOINT"),
+        typer.Option("--listen", help="Endpoint for runners: tls/0.0.0.0:7447. Repeatable.", metavar="ENDPOINT"),
     ],
     observe: Annotated[
         list[str] | None,
-        typer.Option("--observe", help="Where observers and operators call. Repeatable.", metavar="ENDPOINT"),
+        typer.Option("--observe", help="Endpoint for observers and operators. Repeatable.", metavar="ENDPOINT"),
     ] = None,
     start_with: Annotated[
         int | None,
         typer.Option(
-            help="Begin once so many robots have an agent; the others do what run.on_runner_loss says, stand or coast. "
+            help="Start once this many robots have an agent; others follow run.on_runner_loss (stand or coast). "
             "Default: all.",
             metavar="N",
         ),
@@ -83,10 +83,10 @@ def world_command(
     insecure: Insecure = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a scenario with agents from elsewhere: wait for them, and print the command that starts them there.
+    """Run a scenario with remote agents: wait for them, and print the command that starts them.
 
-    Each comes with swarmwire join, from another terminal or another machine, with the agent that is installed there,
-    and gets robots that are free. It may come late, leave, and come back, where run.on_runner_loss of the scenario is
+    Each joins with swarmwire join, from another terminal or another machine, with the agent that is installed there,
+    and gets robots that are free. It may join late, leave, and rejoin, if run.on_runner_loss of the scenario is
     wait, stand or coast. For example:
 
       swarmwire world scenarios/flocking-lossy.toml --listen tls/0.0.0.0:7447 --certs lab-certs
@@ -141,12 +141,10 @@ def _warn(of: "Member", endpoints: list[str]) -> None:
 
 
 def join_command(
-    endpoint: Annotated[
-        str, typer.Argument(help="Where the world, or a router before it, listens: tls/10.0.0.5:7447.")
-    ],
+    endpoint: Annotated[str, typer.Argument(help="Endpoint of the world or of a router before it: tls/10.0.0.5:7447.")],
     robots: Annotated[
         int | None,
-        typer.Option(help="So many robots, the next that are free. Default: all that are free, or the next part."),
+        typer.Option(help="Number of free robots to take. Default: all free ones, or the next part."),
     ] = None,
     names: Annotated[str | None, typer.Option(help="These robots: flock-0,flock-3.", metavar="NAME,…")] = None,
     agents: Annotated[
@@ -164,14 +162,14 @@ def join_command(
         str | None,
         typer.Option(help="The runner's name. Default: that of its certificate, or one made up.", metavar="NAME"),
     ] = None,
-    run: Annotated[str | None, typer.Option(help="Which run, if there are several.", metavar="ID")] = None,
+    run: Annotated[str | None, typer.Option(help="Id of the run, if there are several.", metavar="ID")] = None,
     certs: Certs = None,
     ca: Ca = None,
     certificate: Certificate = None,
     key: Key = None,
     insecure: Insecure = False,
 ) -> None:
-    """Run the agents of robots of a run that `swarmwire world` has opened elsewhere.
+    """Run robots' agents for a run that `swarmwire world` serves.
 
     The agent is the one that is installed here; its file must be the same as the world's: code is never sent. Ctrl-C
     leaves the run. On a machine that has the agents' package alone it is swarmwire-agent join. For example:
