@@ -25,7 +25,9 @@ WORDS: dict[str, str] = {  # a regular expression, and the replacement to sugges
     r"(?:go|goes|went|gone|going) on(?! air\b)": "continue, run, last",
     r"founding papers?": "replicated experiments",
 }
-PATTERNS = {re.compile(rf"\b(?:{word})\b", re.IGNORECASE): instead for word, instead in WORDS.items()}
+PATTERNS = {
+    re.compile(rf"\b(?:{word})\b".replace(" ", r"\s+"), re.IGNORECASE): instead for word, instead in WORDS.items()
+}
 UNWRITTEN: tuple[str, ...] = (  # pages and folders that are still to be rewritten: not checked until then
     "docs/behaviours",
     "docs/api/",

@@ -69,7 +69,7 @@ def installed_class(group: str, name: str, base: type[T], what: str, where: str,
     except ImportError as error:
         raise BadInput(where, key, f"the {what} {name} does not import: {error}{_remedy(point, error)}") from error
     except AttributeError as error:
-        raise BadInput(where, key, f"the {what} {name} is not what {_package(point)} says: {error}") from error
+        raise BadInput(where, key, f"the {what} {name} is missing in {_package(point)}: {error}") from error
     if not isinstance(kind, type) or not issubclass(kind, base):
         other = cast("object", kind)
         raise BadInput(where, key, f"expected a {base.__name__}, got {point.value}, which is {other!r}")
@@ -143,7 +143,7 @@ def _hint(error: BaseException, path: str) -> str:
     hint = f" (line {lines[-1]})" if lines else ""
     missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
     if missing.isidentifier() and _is_file(Path(path).with_name(f"{missing}.py")):
-        hint += "; a file is loaded alone: it imports what is installed, not what lies beside it"
+        hint += "; a file is loaded alone: it can import installed packages, but no files of its folder"
     return hint
 
 

@@ -91,7 +91,7 @@ class Listening:
         if not 0 <= self.start_with <= robots:
             raise BadInput("--start-with", "", f"expected 0 to {robots} (the robots), got {self.start_with}")
         if self.start_with < robots and scenario.run.on_runner_loss not in NON_BLOCKING:
-            expected = "expected stand or coast with --start-with: what robots do that have no agent yet"
+            expected = "expected stand or coast with --start-with, for robots without an agent"
             raise BadInput(scenario.source, "run.on_runner_loss", expected)
 
     def for_agents(self, run_id: str) -> ListenSettings:

@@ -86,7 +86,9 @@ class RepeatedRun:
             expected = "expected the record of live events, on which this run depends"
             raise BadInput(str(folder / LIVE_EVENTS), "", expected)
         if self._inputs is not None and runners not in (None, "none"):
-            raise BadInput("--runners", "", f'expected "none": {INPUTS} says what the runners did; got {runners!r}')
+            raise BadInput(
+                "--runners", "", f'expected "none": {INPUTS} holds the actions of the runners; got {runners!r}'
+            )
         self.simulation = Simulation(
             folder / SCENARIO,
             seeds=self.facts.seeds,

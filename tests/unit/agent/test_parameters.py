@@ -140,7 +140,7 @@ def test_an_edited_file_is_loaded_anew_and_no_bytecode_is_left_beside_it(tmp_pat
 
 def test_what_lies_beside_a_file_is_not_there_for_it(tmp_path: Path) -> None:
     (tmp_path / "swarmwire_test_beside.py").write_text("")
-    told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it imports what is installed"
+    told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it can import installed packages"
     assert told in refused(written(tmp_path, "import swarmwire_test_beside\n"))
 
 

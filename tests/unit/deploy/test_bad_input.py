@@ -257,7 +257,7 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
 OF_COMMANDS = [
     ("run absent.toml", "absent.toml: expected a readable file: No such file or directory"),
     (f"run {LOSSY} --runners all", '--runners: expected "none", "per-robot" or 1 to 20 (the robots), got \'all\''),
-    ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe NAME describes one thing"),
+    ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe NAME describes one name"),
     ("describe flokking", "flokking: nothing has this name; nearest: Flocking (swarmwire list names all)"),
     ("export absent --to film.gif", "absent: expected a run folder: there is none"),
     ("certs issue absent a", "absent: expected a CA's folder: swarmwire certs init absent"),

@@ -41,7 +41,7 @@ class Wheels:
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
-    noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="how the wheels differ from what they are asked for")
+    noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("wheels", help="kind of drive", choices=("wheels",))
 
     @property
@@ -64,7 +64,7 @@ class Twist:
     max_angular_radps: float = parameter(help="fastest turn", unit="rad/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
-    noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="how the wheels differ from what they are asked for")
+    noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("twist", help="kind of drive", choices=("twist",))
 
 

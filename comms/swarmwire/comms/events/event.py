@@ -24,7 +24,7 @@ class Event(ABC):
     """
 
     at_s: float = parameter(help="when it happens", unit="s", at_least=0, at_most=1e9)
-    do: str = parameter(help="what happens")
+    do: str = parameter(help="kind of event")
     needs_radio: ClassVar[bool] = False
     needs_signals: ClassVar[bool] = False  # needs a radio with a PHY, which has signal strengths
 

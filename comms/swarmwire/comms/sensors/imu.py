@@ -24,7 +24,7 @@ class ImuSpec(SensorSpec):
         0.0, help="standard deviation of the accelerations' constant bias, among robots", unit="m/s²", at_least=0
     )
     drift_mps2: float = parameter(
-        0.0, help="standard deviation of what the accelerations' bias drifts in 1 s", unit="m/s²", at_least=0
+        0.0, help="standard deviation of the drift of the accelerations' bias in 1 s", unit="m/s²", at_least=0
     )
     noise_radps: float = parameter(
         0.0, help="standard deviation of the turn rate's noise, new in each reading", unit="rad/s", at_least=0
@@ -33,7 +33,7 @@ class ImuSpec(SensorSpec):
         0.0, help="standard deviation of the turn rate's constant bias, among robots", unit="rad/s", at_least=0
     )
     drift_radps: float = parameter(
-        0.0, help="standard deviation of what the turn rate's bias drifts in 1 s", unit="rad/s", at_least=0
+        0.0, help="standard deviation of the drift of the turn rate's bias in 1 s", unit="rad/s", at_least=0
     )
 
     @classmethod

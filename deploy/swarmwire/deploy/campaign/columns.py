@@ -90,7 +90,7 @@ def responses_of(scenarios: Iterable[Scenario]) -> tuple[Response, ...]:
             if before.hold_s < response.hold_s:  # it is varied: what all runs can tell of
                 found[response.column] = before = replace(before, hold_s=response.hold_s)
             if before.column == STOP_TIME and before.help != response.help:
-                found[STOP_TIME] = replace(before, help=STOPPED.format("what is to stop the run"))
+                found[STOP_TIME] = replace(before, help=STOPPED.format("the stop condition"))
     return tuple(sorted(found.values(), key=_rank))
 
 

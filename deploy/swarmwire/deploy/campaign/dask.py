@@ -207,11 +207,11 @@ class DaskExecutor:
         if self._workers:
             self._worked_ns = now_ns
         elif now_ns - self._worked_ns > self._no_worker_ns:
-            raise self._failed("no worker is there any more")
+            raise self._failed("no worker is left")
 
     def _failed(self, why: str) -> ClusterFailed:
         resume = f"--resume {self._scenario.parent}, here or --executor local"
-        return ClusterFailed(f"{self._name}: {why}; what is done stays: {resume}")
+        return ClusterFailed(f"{self._name}: {why}; finished runs are kept: {resume}")
 
     def _checked_workers(self, no_worker_s: float) -> int:
         """The number of workers that are there, or come in time; BadInput if one does not fit."""

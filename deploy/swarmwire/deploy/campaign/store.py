@@ -47,7 +47,7 @@ def storing(folder: Path, command: str = "sweep") -> Generator[None]:
         yield
     except (OSError, *corruption_errors()) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        text = f"{folder}: cannot be written: {why}; what is done stays: swarmwire {command} --resume {folder}"
+        text = f"{folder}: cannot be written: {why}; finished rows are kept: swarmwire {command} --resume {folder}"
         raise StorageFailed(text) from error
 
 

@@ -59,7 +59,7 @@ def kind_named(name: str) -> Kind:
     found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
     if found is None:
         kinds = did_you_mean((kind.name for kind in KINDS), name)
-        raise BadInput(name, "", f"expected {kinds}; swarmwire describe NAME describes one thing")
+        raise BadInput(name, "", f"expected {kinds}; swarmwire describe NAME describes one name")
     return found
 
 
@@ -123,8 +123,8 @@ SAID_BY_VALUE = ("a number", "a table")
 
 def print_kinds(console: Console) -> None:
     """All kinds, with how many things there are of each."""
-    _print_rows(console, ("kind", "things", "what they are"), [(k.name, str(len(k.entries())), k.help) for k in KINDS])
-    _line(console, "\nswarmwire list KIND lists one kind, swarmwire describe NAME describes one thing")
+    _print_rows(console, ("kind", "names", "description"), [(k.name, str(len(k.entries())), k.help) for k in KINDS])
+    _line(console, "\nswarmwire list KIND lists one kind, swarmwire describe NAME describes one name")
 
 
 def print_list(kind: Kind, console: Console) -> None:
@@ -144,7 +144,7 @@ def print_entry(entry: Entry, console: Console) -> None:
     for table in entry.tables:
         _line(console, f"\n{table.title}", "bold")
         _print_rows(
-            console, ("name", "unit", table.value_is, "what it is"), [_row(of, table) for of in table.parameters]
+            console, ("name", "unit", table.value_is, "description"), [_row(of, table) for of in table.parameters]
         )
         if not table.parameters:
             _line(console, "no figures")

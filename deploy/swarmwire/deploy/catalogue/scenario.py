@@ -183,7 +183,7 @@ def _event(kind: type[Event]) -> Entry:
 
 METRIC_KINDS = {
     "level": "level: a state at each tick",
-    "count": "count: what happened within a tick, added up over the run",
+    "count": "count: number of occurrences within a tick, added up over the run",
     "time": "time: when something happened, in s from the start of the run; none if it did not",
 }
 

@@ -142,11 +142,11 @@ Ca = Annotated[
 ]
 Certificate = Annotated[Path | None, typer.Option(help="This program's certificate.", rich_help_panel=ACCESS)]
 Key = Annotated[Path | None, typer.Option(help="Its key, readable by its owner only.", rich_help_panel=ACCESS)]
-RunnerNames = Annotated[list[str] | None, _names("--runner", "who may run robots' agents")]
-ObserverNames = Annotated[list[str] | None, _names("--observer", "who may look on")]
-OperatorNames = Annotated[list[str] | None, _names("--operator", "who may look on and control")]
-RouterNames = Annotated[list[str] | None, _names("--router", "who passes on what others may send")]
-WorldNames = Annotated[list[str] | None, _names("--world", "who is taken for the world")]
+RunnerNames = Annotated[list[str] | None, _names("--runner", "allowed to run robots' agents")]
+ObserverNames = Annotated[list[str] | None, _names("--observer", "allowed to observe")]
+OperatorNames = Annotated[list[str] | None, _names("--operator", "allowed to observe and control")]
+RouterNames = Annotated[list[str] | None, _names("--router", "allowed to forward permitted messages")]
+WorldNames = Annotated[list[str] | None, _names("--world", "accepted as the world")]
 Revoked = Annotated[
     list[str] | None,
     typer.Option(

@@ -51,8 +51,8 @@ def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
     ]
     if not folder.finished:
         parts.append(
-            f"{counted(len(folder.missing), 'run')} of {runs:,} had not ended when this report was made, and what "
-            "follows is about the others. This does what is missing:"
+            f"{counted(len(folder.missing), 'run')} of {runs:,} had not ended when this report was made; the "
+            "following sections cover the others. This command runs the missing ones:"
         )
         parts.append(Listing(f"swarmwire sweep --resume {name}"))
     return parts

@@ -117,7 +117,7 @@ def _ended(summary: dict[str, Any]) -> str:
     arenas: list[dict[str, Any]] = summary["by_arena"]
     stopped = [arena for arena in arenas if arena["stopped_by"]]
     if len(arenas) > 1 and stopped:
-        how += f"; {len(stopped)} of {len(arenas)} arenas by what they stop at"
+        how += f"; {len(stopped)} of {len(arenas)} arenas by a stop condition"
     elif stopped:
         how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
     return f"{how}: {summary['error']}" if summary["error"] else how

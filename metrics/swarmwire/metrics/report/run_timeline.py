@@ -145,7 +145,7 @@ def small_panels(time_s: FloatArray, curves: Sequence[Curve]) -> Any:
 def what_happened(run: RunData) -> Section:
     """The section: timeline, paths of the robots, small panels of the scenario's metrics, and events."""
     if isinstance(run.film, str):
-        return Section("What happened", (f"No tick can be shown: {run.film}",))
+        return Section("Events", (f"No tick can be shown: {run.film}",))
     film = run.film
     parts: list[Any] = []
     main = curves(film, MAIN)
@@ -158,7 +158,7 @@ def what_happened(run: RunData) -> Section:
     if others:
         figure = small_panels(film.time_s, others)
         parts.append(Figure("metrics", as_svg(figure, "metrics"), _rest("The other metrics", len(others))))
-    return Section("What happened", (*parts, *_events(run)))
+    return Section("Events", (*parts, *_events(run)))
 
 
 def second(film: Film) -> list[str]:
@@ -200,7 +200,7 @@ def _caption(main: list[Curve], lanes: list[Lane]) -> str:
     if not lanes:
         return f"{text}; no events."
     more = f" Of {len(lanes)} kinds of events the first {_MAX_LANES} are drawn." if len(lanes) > _MAX_LANES else ""
-    return f"{text}, and above it what happened: a bar until it was over, a diamond where no end is recorded.{more}"
+    return f"{text}, and above it the events: a bar until the end, a diamond where no end is recorded.{more}"
 
 
 def _rest(what: str, there: int) -> str:

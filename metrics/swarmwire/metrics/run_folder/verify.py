@@ -76,7 +76,7 @@ def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
         return compared()
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
         reason = " ".join(repr(error)[:60].split())
-        return [Finding(name, State.DIFFERS, f"{SUMMARY} does not say what a run says there ({reason})")]
+        return [Finding(name, State.DIFFERS, f"{SUMMARY} has unexpected content ({reason})")]
     except corruption_errors() as error:
         return [Finding(name, State.DAMAGED, str(error).splitlines()[0])]
 
@@ -154,7 +154,7 @@ def _recording(folder: RunFolder, summary: dict[str, Any] | None) -> Finding:
 def _log(folder: RunFolder) -> Finding:
     path = folder.path / LOG
     if not path.exists():
-        return Finding(LOG, State.MISSING, "what was said during the run")
+        return Finding(LOG, State.MISSING, "the messages of the run")
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -181,7 +181,7 @@ def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
     assert (held.help, held.hold_s) == ("when this began to hold: order at least 0.5 for 2 s", 2.0)
     varied = plan(scenario, "stop.hold_s=1.0,3.0", overrides=(stop % 2.0,)).responses
     (held,) = (of for of in varied if of.column == "stop_time_s")
-    assert (held.help, held.hold_s) == ("when this began to hold: what is to stop the run", 3.0)
+    assert (held.help, held.hold_s) == ("when this began to hold: the stop condition", 3.0)
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def test_a_resumed_campaign_names_a_damaged_table_also_where_polars_panics(writt
         with pytest.raises(BadInput) as refused:
             call()
         assert refused.value.where == str(part)
-        assert "--resume runs again" in refused.value.expected
+        assert "--resume repeats its runs" in refused.value.expected
 
 
 @pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])

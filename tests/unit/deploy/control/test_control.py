@@ -73,7 +73,7 @@ def test_which_run_is_meant_must_be_clear(tmp_path):
     with pytest.raises(BadInput, match="aa1, ab2"):
         find_run("b")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(BadInput, match="empty: expected the folder of a run"):
+    with pytest.raises(BadInput, match="empty: expected the folder of a live run"):
         find_run(str(tmp_path / "empty"))
 
 

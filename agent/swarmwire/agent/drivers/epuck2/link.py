@@ -89,7 +89,7 @@ class RobotLink:
             for header, payload in self._answers.fed(data):
                 self._answered(header, payload)
         except BadFrame as garbage:
-            raise self._lost(garbage.fault, f"the robot answers what is no answer: {garbage}") from garbage
+            raise self._lost(garbage.fault, f"the robot sent a malformed answer: {garbage}") from garbage
         return True
 
     def drain(self) -> None:
