@@ -35,6 +35,7 @@ UNWRITTEN: tuple[str, ...] = (  # pages and folders that are still to be rewritt
     "docs/concepts.md",
     "docs/control.md",
     "docs/design.md",
+    "docs/fault-evidence.md",
     "docs/fleet.md",
     "docs/getting-started.md",
     "docs/joining.md",
