@@ -42,6 +42,16 @@ def links() -> Problems:
                 yield f"{page}: links to {target}, which does not exist"
 
 
+def contents() -> Problems:
+    """The landing page lists every page once; pages of behaviours and experiments are listed on their own."""
+    blocks = re.findall(r"^```\{toctree\}\n(.*?)^```", _text("docs/index.md"), re.DOTALL | re.MULTILINE)
+    listed = [line for block in blocks for line in block.splitlines() if line and not line.startswith(":")]
+    yield from (f"docs/index.md: lists {name} more than once" for name in sorted(set(listed)) if listed.count(name) > 1)
+    pages = {page.removeprefix("docs/").removesuffix(".md") for page in PAGES if page.startswith("docs/")}
+    below = {page for page in pages if page.startswith(("behaviours/", "experiments/"))} - {"experiments/index"}
+    yield from (f"docs/index.md: does not list {name}" for name in sorted(pages - below - {"index"} - set(listed)))
+
+
 def code_blocks() -> Problems:
     """Tables are TOML, bodies are bodies, and every program is in a file that the page names and a command uses."""
     for page in PAGES:
@@ -168,6 +178,7 @@ def robot_bytes() -> Problems:
 
 CHECKS: tuple[Callable[[], Problems], ...] = (
     links,
+    contents,
     code_blocks,
     behaviour_pages,
     experiment_pages,

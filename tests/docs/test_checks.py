@@ -24,6 +24,16 @@ def test_a_link_that_leads_nowhere_is_a_problem(page: Path):
     assert len(list(checks.links())) == 1
 
 
+def test_a_page_that_is_listed_twice_or_not_at_all_is_a_problem(page: Path):
+    index = page.with_name("index.md")
+    index.write_text("```{toctree}\n:caption: Pages\n\npage\n```\n")
+    assert list(checks.contents()) == []
+    index.write_text("```{toctree}\npage\n```\n\n```{toctree}\npage\n```\n")
+    assert len(list(checks.contents())) == 1
+    index.write_text("page")
+    assert len(list(checks.contents())) == 1
+
+
 @pytest.mark.parametrize(
     "text",
     ["```toml\na = \n```\n", "```python\n1\n```\n", "<!-- file: a.py -->\n```python\n1\n```\nNobody runs `a.py`.\n"],
