@@ -27,7 +27,12 @@ RATE_HZ, TICKS, WARM_UP = 10, 60, 10
 BOX_M = (0.2, 0.1)
 STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis
 PLACES_KEY = 1
-SHADOWED = ("radio.shadowing.deviation_db=4", "radio.shadowing.correlation_m=5", "radio.fading.distribution=rayleigh")
+SHADOWED = (
+    "radio.shadowing.deviation_db=4",
+    "radio.shadowing.correlation_m=5",
+    "radio.fading.distribution=rayleigh",
+    "radio.cut_off_db=10",
+)
 
 
 @dataclass(frozen=True)
