@@ -34,7 +34,7 @@ def draw() -> None:
     _draw(dsss_axes, receivers, (-6.0, 10.0))
     say(dsss_axes, f"802.11b, {OCTETS_B} octets, by Mbit/s", "SINR in dB", "")
     receivers = [(f"{rate / 1e6:g}", ieee80211ag(rate), 8 * OCTETS_AG) for rate in error_rates.OFDM_RATES_BPS]
-    _draw(ofdm_axes, receivers, (0.0, 26.0))
+    _draw(ofdm_axes, receivers, (-2.0, 22.0))
     say(ofdm_axes, f"802.11a/g, {OCTETS_AG} octets, by Mbit/s", "SINR in dB", "")
     write(figure, "reception")
 
