@@ -1,4 +1,4 @@
-"""One command gives all six distributions, their pins on one another, the lock and the changelog the next version.
+"""One command gives all six distributions, their pins, the lock, CITATION.cff and the changelog the next version.
 
 python -m tests.release.bump 0.2.0
 """
@@ -15,12 +15,13 @@ from tests.release.built import PARTS, ROOT, UV
 
 PROJECTS = ("pyproject.toml", *(f"{part}/pyproject.toml" for part in PARTS))
 OWN = re.compile(r'^version = "(.+)"$', re.MULTILINE)
+CITED = re.compile(r"^version: (.+)$", re.MULTILINE)
 PIN = re.compile(r'("swarmwire-[^"=]*==)[^"]+"')
 UNRELEASED = "## [Unreleased]\n"
 
 
 def bump(root: Path, version: str, date: str) -> None:
-    """Write the version into all projects below this folder, and close the changelog's section of what is unreleased.
+    """Write the version into CITATION.cff and all projects below this folder, and close the changelog's section Unreleased.
 
     SystemExit says why not; nothing is written then.
     """
@@ -30,6 +31,8 @@ def bump(root: Path, version: str, date: str) -> None:
     for path, text in projects.items():
         own = OWN.sub(f'version = "{version}"', text, count=1)
         path.write_text(PIN.sub(rf'\g<1>{version}"', own), encoding="utf-8")
+    cited = (root / "CITATION.cff").read_text(encoding="utf-8")
+    (root / "CITATION.cff").write_text(CITED.sub(f"version: {version}", cited), encoding="utf-8")
     closed = changelog.replace(UNRELEASED, f"{UNRELEASED}\n## [{version}] - {date}\n", 1)
     (root / "CHANGELOG.md").write_text(closed, encoding="utf-8")
 

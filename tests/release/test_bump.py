@@ -6,19 +6,21 @@ from pathlib import Path
 import pytest
 
 from tests.release.built import ROOT
-from tests.release.bump import OWN, PIN, PROJECTS, bump
+from tests.release.bump import CITED, OWN, PIN, PROJECTS, bump
+
+FILES = (*PROJECTS, "CHANGELOG.md", "CITATION.cff")
 
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    for name in (*PROJECTS, "CHANGELOG.md"):
+    for name in FILES:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     return tmp_path
 
 
 def everything(root: Path) -> dict[str, str]:
-    return {name: (root / name).read_text(encoding="utf-8") for name in (*PROJECTS, "CHANGELOG.md")}
+    return {name: (root / name).read_text(encoding="utf-8") for name in FILES}
 
 
 def test_all_versions_and_pins_rise_together_and_nothing_else_changes(copied: Path) -> None:
@@ -27,6 +29,9 @@ def test_all_versions_and_pins_rise_together_and_nothing_else_changes(copied: Pa
     after = everything(copied)
     changelog, was = after.pop("CHANGELOG.md"), before.pop("CHANGELOG.md")
     assert changelog == was.replace("## [Unreleased]\n", "## [Unreleased]\n\n## [7.8.9] - 2027-01-02\n")
+    cited, cited_before = after.pop("CITATION.cff"), before.pop("CITATION.cff")
+    assert cited == cited_before.replace(f"version: {OWN.findall(before['pyproject.toml'])[0]}\n", "version: 7.8.9\n")
+    assert CITED.findall(cited) == ["7.8.9"]
     pins = 0
     for name, text in after.items():
         lines = list(zip(before[name].splitlines(), text.splitlines(), strict=True))

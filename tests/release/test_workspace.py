@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from tests.release.bump import CITED
+
 ROOT = Path(__file__).parents[2]
 PARTS = ("comms", "agent", "world", "metrics", "deploy")
 HEAVY = ("matplotlib", "numba", "pandas", "polars", "pyarrow", "pydantic", "pymunk", "rerun", "rich", "scipy", "typer")
@@ -34,6 +36,7 @@ def run_python(code: str) -> subprocess.CompletedProcess[str]:
 
 def test_one_version_number_everywhere() -> None:
     versions = {folder: project(folder)["version"] for folder in (".", *PARTS)}
+    versions["CITATION.cff"] = CITED.findall((ROOT / "CITATION.cff").read_text(encoding="utf-8"))[0]
     assert len(set(versions.values())) == 1, versions
 
 
