@@ -21,7 +21,7 @@ UNRELEASED = "## [Unreleased]\n"
 
 
 def bump(root: Path, version: str, date: str) -> None:
-    """Write the version into CITATION.cff and all projects below this folder, and close the changelog's section Unreleased.
+    """Write the version into CITATION.cff and all projects in this folder; close the section Unreleased of the changelog.
 
     SystemExit says why not; nothing is written then.
     """
