@@ -21,7 +21,7 @@ UNRELEASED = "## [Unreleased]\n"
 
 
 def bump(root: Path, version: str, date: str) -> None:
-    """Write the version into CITATION.cff and all projects in this folder; close the section Unreleased of the changelog.
+    """Write the version into CITATION.cff and all projects of this folder; close the changelog's section Unreleased.
 
     SystemExit says why not; nothing is written then.
     """
