@@ -265,7 +265,7 @@ class RunParts:
         """Every arena at its start, with the sensors that its agents need."""
         needs = {name: kind.needs for name, kind in check_agents(self.scenario, self.agents).items()}
         needs = self.gateways.sensors(needs, bodies_of(self.scenario, self.scenario.source))
-        return World(self.scenario, seeds, needs)
+        return World(self.scenario, seeds, needs, self.config.threads)
 
     def _new_status(self) -> Status:
         return Status(

@@ -8,6 +8,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.threads import WORTH_ROWS
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, Simulation, backends, run
 from tests.support.agent.hosts import PLAYERS
@@ -52,6 +53,24 @@ def test_into_how_many_parts_robots_are_split_and_who_gets_which_does_not_matter
     result = encoded(monkeypatch, LOSSY, **split)
     assert result.trajectory_sha256 == local.trajectory_sha256
     assert (result.radio, result.metrics) == (local.radio, local.metrics)
+
+
+def test_how_many_threads_there_are_does_not_matter():
+    """Of enough robots that their rays are worth another thread."""
+    robots, arenas = 50, 200
+    assert robots * arenas >= WORTH_ROWS
+    overrides = ["duration_s=0.3", f"robots.wanderers.count={robots}", "arena.size_m=[6.0,6.0]"]
+    one, two = (
+        run(ROOT / "scenarios" / "avoidance.toml", overrides=overrides, seeds=arenas, threads=threads)
+        for threads in (1, 2)
+    )
+    assert one.trajectory_sha256 == two.trajectory_sha256
+    assert len(set(one.trajectory_sha256)) == arenas
+
+
+def test_fewer_threads_than_one_are_refused():
+    with pytest.raises(BadInput, match="--threads"):
+        run(LOSSY, threads=0)
 
 
 def test_a_users_agent_of_the_same_rule_gives_the_same_run(local):

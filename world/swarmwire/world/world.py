@@ -18,6 +18,7 @@ from swarmwire.comms.geometry.ground import ground_of
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.phy.propagation import range_of
+from swarmwire.comms.threads import Threads
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
@@ -72,8 +73,12 @@ class World:
         states: what each robot is at, as its agent named it.
     """
 
-    def __init__(self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]]) -> None:
+    def __init__(
+        self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]], threads: int = 1
+    ) -> None:
         """An arena per seed; `needs` names, by group, the sensors to compute (`radio.…` is not the world's affair).
+
+        `threads` change nothing but the speed.
 
         Raises BadInput if a body lacks a sense, or if something finds no room.
         """
@@ -94,7 +99,7 @@ class World:
         self.alive: BoolArray = np.ones(self.static.arenas * self.static.robots, np.bool_)
         self.running: BoolArray = np.ones(self.static.arenas, np.bool_)
         self.rows_running: BoolArray = np.ones_like(self.alive)
-        self.scene = self._scene_of(tick_s)
+        self.scene = self._scene_of(tick_s, Threads(threads))
         self.sensors = _sensors(scenario, self.scene, groups, needs)
         self._own = CustomActuators(groups, self.scene)
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
@@ -198,7 +203,7 @@ class World:
         self.pose, self.velocity = snapshot(self._physics.state)
         self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
-    def _scene_of(self, tick_s: float) -> Scene:
+    def _scene_of(self, tick_s: float, threads: Threads) -> Scene:
         static, physics = self.static, self._physics
         counts = [group.stop - group.start for group in static.groups]
         radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
@@ -210,6 +215,7 @@ class World:
             boundary=static.boundary,
             obstacles=self.obstacles,
             obstacles_move=static.movable > 0,
+            threads=threads,
             lights=static.lights,
             ground=ground_of(static.floor, static.arena_size_m, static.boundary),
             tick_s=tick_s,

@@ -45,7 +45,7 @@ Runners = Annotated[
 Threads = Annotated[
     int,
     typer.Option(
-        help="Threads of this process for one tick: more change nothing but the speed, of large swarms with signals.",
+        help="Threads of this process for one tick: more change nothing but the speed, of large swarms.",
         metavar="NUMBER",
     ),
 ]

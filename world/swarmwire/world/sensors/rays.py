@@ -6,6 +6,7 @@ too. `RayArraySight` finds the nearest thing on each ray of a group's robots and
 
 # pyright: basic, reportUnknownMemberType=false
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -130,6 +131,7 @@ class RayArraySight:
         reach_m = group.body.radius_m + spec.range_m
         self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
         self._active, self._alive, curve = active, scene.alive, spec.response
+        self._threads = scene.threads
         self._robots = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
         self._obstacles = obstacle_indices_of(scene, reach_m)
         walled, (width, height) = scene.boundary == "walls", scene.size_m
@@ -151,28 +153,54 @@ class RayArraySight:
             np.empty(self._shape[2]),
             np.empty(len(self._obstacles.now().shape), np.int64),
         )
+        # The same with buffers of their own, for another thread.
+        self._other_robots = self._robots._replace(
+            nearby=np.empty_like(self._robots.nearby), nearby_at=np.empty_like(self._robots.nearby_at)
+        )
+        self._other_rays = self._rays._replace(
+            dx=np.empty_like(self._rays.dx),
+            dy=np.empty_like(self._rays.dy),
+            visible_m=np.empty_like(self._rays.visible_m),
+            nearby=np.empty_like(self._rays.nearby),
+        )
 
     def answer(self) -> FloatArray:
         """The noise-free response of each ray, (arenas, n, rays), 0 to 1."""
-        value = np.zeros(self._shape)
-        _look(value, self._robots, self._alive, self._obstacles.now(), self._rays, self._active, True)
-        return value
+        return self._looked(np.zeros(self._shape), answers=True)
 
     def distance_m(self) -> FloatArray:
         """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
-        near = np.full(self._shape, np.inf)
-        _look(near, self._robots, self._alive, self._obstacles.now(), self._rays, self._active, False)
-        return near
+        return self._looked(np.full(self._shape, np.inf), answers=False)
+
+    def _looked(self, value: FloatArray, *, answers: bool) -> FloatArray:
+        """`value`, set by `_look`; each half of the robots in a thread of its own, where that is worth it."""
+        arenas, count, _ = self._shape
+        robots, obstacles, rows = self._robots, self._obstacles.now(), arenas * count
+        what = self._active, answers
+        if not self._threads.are_worth(rows):
+            _look(value, robots, self._alive, obstacles, self._rays, *what, 0, count, True)
+            return value
+        sort(robots.cells, robots.state, robots.running)
+        half = count // 2
+        others = value, self._other_robots, self._alive, obstacles, self._other_rays, *what, half, count, False
+        rest = self._threads.start(partial(_look, *others), rows)
+        _look(value, robots, self._alive, obstacles, self._rays, *what, 0, half, False)
+        rest()
+        return value
 
 
-@kernel(from_python=True)
-def _look(value, robots, alive, obstacles, rays, active, answers):
-    """Set value (arenas, n, rays) of robots with anything near: distances, or with `answers` the responses."""
-    sort(robots.cells, robots.state, robots.running)
+@kernel(from_python=True, nogil=True)
+def _look(value, robots, alive, obstacles, rays, active, answers, first, stop, sorts):
+    """Set value (arenas, n, rays) of robots with anything near: distances, or with `answers` the responses.
+
+    Of each arena only the robots `first` to `stop` - 1 of the group look. With `sorts` the index is filled before.
+    """
+    if sorts:
+        sort(robots.cells, robots.state, robots.running)
     for arena in range(value.shape[0]):
         if not robots.running[arena]:
             continue
-        for i in range(value.shape[1]):
+        for i in range(first, stop):
             own = rays.first + i
             x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
             y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
