@@ -59,6 +59,11 @@ pictures: sync ## draw the pictures under docs/ anew; needs a Vulkan driver
 bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures of that engine
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
+.PHONY: validation
+validation: ## compare the radio with ns-3, whose wheel this installs, and write docs/validation.md
+	@.ci/sync --group validation
+	$(RUN) python -m benchmarks.ns3 --page docs/validation.md
+
 .PHONY: soak
 soak: sync ## fuzz every input (about 4 hours), then random faults, then an hour of a hundred processes
 	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py

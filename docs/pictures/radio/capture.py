@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.ns3_reference import PRESETS, radio_far_apart
+from benchmarks.ns3.configurations import radio_like_ns3
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.draws import derive_key
@@ -22,13 +22,18 @@ SIR_DB = np.arange(-8.0, 12.1, 0.5)
 PAYLOAD_BYTES, ARENAS, FRAMES = 40, 20, 20
 PAIR_NS, LATER_NS = 20_000_000, 50_000  # between two pairs of frames, and between the frames of a pair
 CASES = {"it begins first": -1, "both begin at once": 0, "it begins second": 1}
+TECHNOLOGIES = {
+    "802.15.4": ("802.15.4", 0.25),
+    "802.11a 6 Mbit/s": ("802.11a", 6.0),
+    "802.11b 1 Mbit/s": ("802.11b", 1.0),
+}
 
 
 def draw() -> None:
     """Write capture.svg."""
-    figure, row = panels(len(PRESETS), 2.7)
-    for axes, technology in zip(row, PRESETS, strict=True):
-        radio = replace(radio_far_apart(technology), access=Access("aloha"), send_offset="tick")
+    figure, row = panels(len(TECHNOLOGIES), 2.7)
+    for axes, (technology, kind) in zip(row, TECHNOLOGIES.items(), strict=True):
+        radio = replace(radio_like_ns3(*kind), access=Access("aloha"), send_offset="tick")
         for index, (name, place) in enumerate(CASES.items()):
             received = [share_received(radio, float(sir_db), place) for sir_db in SIR_DB]
             axes.plot(SIR_DB, received, color=line_color(index), lw=1.4, label=name)

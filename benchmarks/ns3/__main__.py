@@ -1,0 +1,144 @@
+"""Run ns-3 and the radio medium beside each other, and compare: `python -m benchmarks.ns3 --help`."""
+
+import hashlib
+import multiprocessing
+import sys
+import tempfile
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, track
+
+from benchmarks.ns3.closed_forms import closed_forms
+from benchmarks.ns3.comparison import Figures, Row, figures_of, filled, recorded, summary, table, write_record
+from benchmarks.ns3.configurations import SECTIONS, Configuration
+from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
+from benchmarks.ns3.speed import speed
+from swarmwire.comms.errors import BadInput
+
+TEACH = """\
+ns-3 and the medium get the same nodes, places and send times, seed by seed; figures
+that differ by more than 0.02 of delivery, 5 % of mean delay or 3 % of throughput are
+misses. The exit status is 1 if a miss has no written reason.
+
+  make validation                                       everything, into docs/validation.md
+  python -m benchmarks.ns3 --quick                      a look: two seeds, less time
+  python -m benchmarks.ns3 --only area --cache runs/ns3 one section; ns-3's part is kept
+  python -m benchmarks.ns3 --recorded                   without ns-3: its recorded figures
+"""
+MISSING = (
+    "ns-3 is not there: `.ci/sync --group validation` brings its wheel (x86-64 Linux, CPython 3.11 to 3.13); "
+    "--recorded does without"
+)
+QUICK = {"seeds": 2, "measured_s": 1.0}
+OTHERS = {"closed-forms": "closed forms and ARGoS's rule", "speed": "simulated over CPU time"}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Compare, print or write the tables; 1 if a miss is not explained."""
+    options = _options(arguments)
+    if not options.recorded and find_spec("ns3") is None:
+        print(MISSING, file=sys.stderr)
+        return 2
+    names: list[str] = options.only or [*SECTIONS, *([] if options.quick or options.recorded else OTHERS)]
+    sections = {name: SECTIONS[name]() for name in names if name in SECTIONS}
+    if options.quick:
+        sections = {name: [replace(each, **QUICK) for each in found] for name, found in sections.items()}
+    every = [each for found in sections.values() for each in found]
+    figures = recorded() if options.recorded else _run(every, Path(options.cache), options.processes)
+    rows = {name: _rows(name, found, figures) for name, found in sections.items()}
+    if options.record:
+        write_record(figures)
+    tables = {name: table(found) for name, found in rows.items()}
+    if not set(SECTIONS) - set(names):
+        tables["summary"] = summary(rows)
+    if "closed-forms" in names:
+        tables["closed-forms"] = closed_forms()
+    if "speed" in names:
+        tables["speed"] = speed(options.build)
+    _show(tables, options.page)
+    return int(any(row.misses and row.reason is None for found in rows.values() for row in found))
+
+
+def _options(arguments: Sequence[str]) -> Namespace:
+    described = [f"  {name:13}{_first_line(make)}" for name, make in SECTIONS.items()]
+    described += [f"  {name:13}{what}" for name, what in OTHERS.items()]
+    parser = ArgumentParser(
+        prog="python -m benchmarks.ns3",
+        description=TEACH,
+        epilog="\n".join(["sections:", *described]),
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--only", nargs="+", metavar="SECTION", choices=[*SECTIONS, *OTHERS], help="these sections")
+    parser.add_argument("--quick", action="store_true", help="2 seeds and 1 s each, without speed and closed forms")
+    folder = Path(tempfile.gettempdir()) / "swarmwire-ns3"
+    parser.add_argument("--cache", metavar="DIR", default=str(folder), help=f"keeps ns-3's results ({folder})")
+    parser.add_argument("--processes", type=int, default=2, metavar="N", help="of ns-3 at a time (2)")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="put the tables between this page's marks")
+    parser.add_argument("--recorded", action="store_true", help="compare with the record instead of running ns-3")
+    parser.add_argument("--record", action="store_true", help="write ns-3's figures as the record that tests use")
+    parser.add_argument("--build", type=Path, metavar="DIR", help="speed: also an ns-3 build with include/ and lib/")
+    options = parser.parse_args(arguments)
+    is_part = options.only and set(SECTIONS) - set(options.only)
+    if options.record and (options.recorded or options.quick or is_part):
+        parser.error("--record: expected all sections with ns-3, without --recorded and --quick")
+    return options
+
+
+def _first_line(make: Callable[[], list[Configuration]]) -> str:
+    return (make.__doc__ or "").partition("\n")[0]
+
+
+def _rows(name: str, configurations: list[Configuration], ns3: dict[Configuration, Figures]) -> list[Row]:
+    shown = track(configurations, f"ours: {name}", console=Console(stderr=True), transient=True)
+    return [Row.of(each, ns3[each], figures_of(each, ours(each))) for each in shown]
+
+
+def _run(configurations: list[Configuration], cache: Path, processes: int) -> dict[Configuration, Figures]:
+    """ns-3's figures of each, from the cache or from child processes: ns-3 is one simulator for a whole process."""
+    cache.mkdir(parents=True, exist_ok=True)
+    files = {each: cache / f"{_fingerprint(each)}.npz" for each in configurations}
+    found = {each: figures_of(each, _read(file)) for each, file in files.items() if file.exists()}
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    spawn = multiprocessing.get_context("spawn")
+    with Progress(*columns, console=Console(stderr=True)) as progress, ProcessPoolExecutor(processes, spawn) as pool:
+        bar = progress.add_task("ns-3", total=len(files), completed=len(found))
+        begun = {pool.submit(theirs, each): each for each in files if each not in found}
+        for done in as_completed(begun):
+            each, received = begun[done], done.result()
+            np.savez_compressed(files[each], packets=received.packets, delay_ns=received.delay_ns)
+            found[each] = figures_of(each, received)
+            progress.update(bar, advance=1, description=f"ns-3: {' '.join(each.cells)}")
+    return found
+
+
+def _fingerprint(configuration: Configuration) -> str:
+    """Of all that ns-3 is given."""
+    given = [NETWORK.read_text(encoding="utf-8"), *map(configuration.ns3_input, range(configuration.seeds))]
+    return hashlib.sha256("\n".join(given).encode()).hexdigest()[:32]
+
+
+def _read(file: Path) -> Received:
+    with np.load(file) as arrays:
+        return Received(arrays["packets"], arrays["delay_ns"])
+
+
+def _show(tables: dict[str, list[str]], page: Path | None) -> None:
+    if page is not None:
+        page.write_text(filled(page, tables), encoding="utf-8")
+        return
+    for name, lines in tables.items():
+        print(f"\n## {name}\n", *lines, sep="\n")
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except BadInput as error:
+        sys.exit(str(error))

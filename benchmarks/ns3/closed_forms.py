@@ -1,0 +1,161 @@
+"""Figures that need no other simulator: formulas, figures that standards and ns-3's own tests state, ARGoS's rule."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.ns3.comparison import THROUGHPUT, figures_of
+from benchmarks.ns3.configurations import Configuration
+from benchmarks.ns3.simulators import ours
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.propagation.decibels import from_db
+from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
+from swarmwire.comms.radio.timing import IEEE_802_11A, ieee80211a_ns, ieee80211b_ns, ieee80211g_ns
+from swarmwire.deploy.scenario_parts import radio_of
+
+LIMIT = 0.03  # of a ratio to the stated figure, where it is a simulation's
+EXACT = 1e-4
+SENDERS, FRAME_BYTES, RATE_HZ, TICKS = 200, 30, 10, 300  # of ALOHA
+ROBOTS, SIDE_M = 200, 12.0  # of ARGoS's rule
+BEGIN, WINDOW_BITS, OCTETS = 16, 6, 512  # of Bianchi: slots of the first window, doublings, payload
+
+
+def closed_forms() -> list[str]:
+    """Lines of Markdown: what, by which source, what it states, what we have."""
+    lines = ["| what | source | stated | ours | verdict |", "| --- " * 5 + "|"]
+    for what, source, stated, found, limit in [*_bit_errors(), *_airtimes(), *_aloha(), *_bianchi(), _argos()]:
+        verdict = "within" if abs(found / stated - 1.0) <= limit else "**miss**"
+        lines.append(f"| {what} | {source} | {stated:.5g} | {found:.5g} | {verdict} |")
+    return lines
+
+
+Line = tuple[str, str, float, float, float]  # what, source, stated, ours, the limit of their ratio
+
+
+def _bit_errors() -> Iterator[Line]:
+    for sinr_db, stated in ((5, 7.386009e-14), (2, 5.131392e-07), (-1, 1.148944e-03), (-4, 3.916346e-02)):
+        found = float(oqpsk_bit_errors(from_db(sinr_db)))
+        yield (
+            f"bit errors of 802.15.4 at {sinr_db} dB",
+            "IEEE 802.15.4-2006, E.4.1.7; ns-3's test",
+            stated,
+            found,
+            EXACT,
+        )
+
+
+def _airtimes() -> Iterator[Line]:
+    source = "ns-3's test of durations"
+    yield "802.11b, 1023 octets at 11M, µs", source, 936, _us(ieee80211b_ns(1023, 11_000_000, short_preamble=False)), 0
+    yield "802.11b, 1024 octets at 1M, µs", source, 8384, _us(ieee80211b_ns(1024, 1_000_000, short_preamble=False)), 0
+    yield "802.11a, 1536 octets at 54M, µs", source, 248, _us(ieee80211a_ns(1536, 54_000_000)), 0
+    yield "802.11g, 1536 octets at 54M, µs", source, 254, _us(ieee80211g_ns(1536, 54_000_000)), 0
+
+
+def _us(ns: float) -> float:
+    return ns / 1000
+
+
+def _aloha() -> Iterator[Line]:
+    for load in (0.1, 0.5, 1.0):
+        stated = load * np.exp(-2.0 * load)
+        yield (
+            f"ALOHA, frames received per airtime at {load:g} begun",
+            "Abramson 1970",
+            stated,
+            aloha(load, TICKS),
+            LIMIT,
+        )
+
+
+def aloha(load: float, ticks: int) -> float:
+    """Frames received per airtime by one listener amidst many equal senders, each of which sends one frame a tick."""
+    bit_rate_bps = round(SENDERS * RATE_HZ * FRAME_BYTES * 8 / load)
+    settings = [f"radio.bit_rate_bps={bit_rate_bps}", "radio.access.method=aloha", "radio.overhead_bytes=0"]
+    settings += ["radio.reception.model=threshold", "radio.reception.min_sinr_db=3"]
+    radio = radio_of("ieee802154", settings)
+    keys = np.array([derive_key("figure of access")], np.uint64)
+    medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
+    sent = SentPackets(np.arange(SENDERS), np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
+    pose = np.zeros((SENDERS + 1, 3))
+    received = 0
+    for tick in range(ticks + 2):
+        at_ns = tick_start_ns(tick, RATE_HZ)
+        received += int(medium.step(at_ns, pose).tally.fates[0, Fate.RECEIVED])
+        if tick < ticks:
+            medium.send(at_ns, tick, sent)
+    return load * received / (SENDERS * ticks)
+
+
+def _bianchi() -> Iterator[Line]:
+    for nodes in (5, 10, 20):
+        one = Configuration("802.11a", 6, nodes, OCTETS, 0.005 * nodes / 20, unicast=True, is_saturated=True, seeds=4)
+        found = float(figures_of(one, ours(one))[THROUGHPUT].mean())
+        what = f"{nodes} stations of 802.11a that always send, throughput each, Mbit/s"
+        yield what, "Bianchi 2000", bianchi_mbps(nodes) / nodes, found / nodes, 2.0 * LIMIT
+
+
+def bianchi_mbps(stations: int) -> float:
+    """Saturation throughput of DCF with acknowledgements, 802.11a at 6 Mbit/s (Bianchi, IEEE J. Sel. Areas Comm. 18).
+
+    A busy slot ends with EIFS after a collision, which lasts as long as SIFS, an acknowledgement and DIFS.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(60):  # tau falls with p, and p rises with tau
+        tau = 0.5 * (low + high)
+        p = 1.0 - (1.0 - tau) ** (stations - 1)
+        grown = p * BEGIN * sum((2.0 * p) ** k for k in range(WINDOW_BITS))
+        low, high = (tau, high) if 2.0 / (1.0 + BEGIN + grown) > tau else (low, tau)
+    idle = (1.0 - tau) ** stations
+    alone = stations * tau * (1.0 - tau) ** (stations - 1)
+    timing, data_us, ack_us = (
+        IEEE_802_11A,
+        _us(ieee80211a_ns(OCTETS + 36, 6_000_000)),
+        _us(ieee80211a_ns(14, 6_000_000)),
+    )
+    busy_us = data_us + _us(timing.sifs_ns) + ack_us + _us(timing.difs_ns)
+    return 8.0 * OCTETS * alone / (idle * _us(timing.slot_ns) + (1.0 - idle) * busy_us)
+
+
+def _argos() -> Line:
+    """The medium beside ARGoS 3's rab_medium: within 3 m, and no other body on the ray between the two."""
+    rng, radius_m = np.random.default_rng(1), load_body("footbot").radius_m
+    xy_m = rng.uniform(-SIDE_M / 2, SIDE_M / 2, (ROBOTS, 2))
+    medium = RadioMedium(
+        radio_of("argos-rab", []),
+        np.array([derive_key("argos")], np.uint64),
+        ROBOTS,
+        (SIDE_M, SIDE_M),
+        obstacle_arrays(((),)),
+        RATE_HZ,
+        radius_m=np.full(ROBOTS, radius_m),
+    )
+    pose = np.column_stack([xy_m, np.zeros(ROBOTS)])
+    medium.step(0, pose)
+    medium.send(0, 0, SentPackets(np.arange(ROBOTS), np.full(ROBOTS, BROADCAST), Payloads.of([bytes(10)] * ROBOTS)))
+    received = medium.step(tick_start_ns(1, RATE_HZ), pose).received
+    linked = np.zeros((ROBOTS, ROBOTS), np.bool_)
+    linked[received.sender, received.receiver] = True
+    agreeing = int((linked == by_argos(xy_m, 3.0, radius_m)).sum()) - ROBOTS
+    what = f"pairs of {ROBOTS} foot-bots that hear one another or not as ARGoS's rule says"
+    return what, "ARGoS 3, rab_medium", ROBOTS * (ROBOTS - 1), agreeing, 0.0
+
+
+def by_argos(xy_m: np.ndarray, range_m: float, radius_m: float) -> np.ndarray:
+    """Who receives of whom, (k, k): nearer than the range, and no third body touches the line between their centres."""
+    way = xy_m[None] - xy_m[:, None]
+    apart_m = np.linalg.norm(way, axis=-1)
+    near = (apart_m < range_m) & (apart_m > 0.0)
+    for a, b in np.argwhere(near):
+        part = np.clip((xy_m - xy_m[a]) @ way[a, b] / apart_m[a, b] ** 2, 0.0, 1.0)
+        off_m = np.linalg.norm(xy_m - xy_m[a] - part[:, None] * way[a, b], axis=1)
+        off_m[[a, b]] = np.inf
+        near[a, b] = off_m.min() > radius_m
+    return near
