@@ -28,42 +28,7 @@ WORDS: dict[str, str] = {  # a regular expression, and the replacement to sugges
 PATTERNS = {
     re.compile(rf"\b(?:{word})\b".replace(" ", r"\s+"), re.IGNORECASE): instead for word, instead in WORDS.items()
 }
-UNWRITTEN: tuple[str, ...] = (  # pages and folders that are still to be rewritten: not checked until then
-    "docs/behaviours",
-    "docs/api/",
-    "docs/campaigns.md",
-    "docs/concepts.md",
-    "docs/control.md",
-    "docs/design.md",
-    "docs/fault-evidence.md",
-    "docs/fleet.md",
-    "docs/getting-started.md",
-    "docs/joining.md",
-    "docs/machines.md",
-    "docs/page.md",
-    "docs/performance.md",
-    "docs/processes.md",
-    "docs/protocol.md",
-    "docs/radio.md",
-    "docs/realtime.md",
-    "docs/release.md",
-    "docs/reliability.md",
-    "docs/report.md",
-    "docs/robots.md",
-    "docs/ros2.md",
-    "docs/run-folder.md",
-    "docs/scenario.md",
-    "docs/security.md",
-    "docs/sensors.md",
-    "docs/sim-to-real.md",
-    "docs/stability.md",
-    "docs/statistics.md",
-    "docs/summary.md",
-    "docs/tuning.md",
-    "docs/ways.md",
-    "comms/swarmwire/comms/radio/",
-    "deploy/swarmwire/deploy/cli/certs.py",
-)
+UNWRITTEN = ("docs/performance.md", "docs/radio.md")  # pages that are still to be rewritten: not checked until then
 
 FENCE = re.compile(r"^ *(```+|~~~+)[^\n]*\n.*?^ *\1 *$", re.DOTALL | re.MULTILINE)
 SPAN = re.compile(r"(`+).+?\1", re.DOTALL)
@@ -74,11 +39,11 @@ ATTRIBUTE = re.compile(r"^ +\w+: ", re.MULTILINE)  # its name, in a docstring
 def prose() -> Iterator[str]:
     """A line for each word in a page, a message, a help text or a public docstring that WORDS replaces."""
     for page in PAGES:
-        if not page.startswith(UNWRITTEN or "\0"):
+        if not page.startswith(UNWRITTEN):
             yield from _problems(page, 1, (ROOT / page).read_text(encoding="utf-8"))
     for file in (file for part in PARTS for file in sorted((ROOT / part / "swarmwire").rglob("*.py"))):
         name = str(file.relative_to(ROOT))
-        if not name.startswith(UNWRITTEN or "\0"):
+        if not name.startswith(UNWRITTEN):
             for line, text in texts_of(file.read_text(encoding="utf-8")):
                 yield from _problems(name, line, text)
 

@@ -30,7 +30,7 @@ class RadioModel(ABC):
         """Robots are at `pose` (rows, 3) from now on, under the active disruption; the array must not change."""
 
     def expect(self, pose: FloatArray) -> None:  # noqa: B027 - a model may have nothing to do
-        """Robots will be at `pose` (rows, 3) once the time that passes next has passed, as `hold` will tell."""
+        """Announce the next positions, `pose` (rows, 3); the next `hold` sets them."""
 
     @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:

@@ -44,7 +44,7 @@ def init_command(
         typer.echo("every member of the network needs a new certificate and the new ca.pem")
     else:
         begin_authority(folder, WallClock())
-    typer.echo(f"written: {folder / 'ca.pem'}, for everybody, and {folder / 'ca.key'}, for nobody else")
+    typer.echo(f"written: {folder / 'ca.pem'}, to share, and {folder / 'ca.key'}, to keep secret")
 
 
 @certs_app.command("issue")

@@ -20,7 +20,7 @@ LATE_S = 0.5  # after the last packet that counts, its reception does too
 
 @dataclass(frozen=True, slots=True)
 class Contention:
-    """What came of it, over all packets handed over after the warm-up."""
+    """The results, over all packets handed over after the warm-up."""
 
     packets: int
     delivery_ratio: float  # receptions / (packets x other nodes)
@@ -39,7 +39,7 @@ def contention(
 ) -> Contention:
     """Each of `nodes` broadcasts so many bytes in each interval (rounded to 1/n s), as the radio's send_offset says.
 
-    An arena per seed. Traffic goes on after the measured time, until its packets have arrived.
+    An arena per seed. Traffic continues after the measured time, until its packets have arrived.
     """
     rate_hz = max(round(1.0 / interval_s), 1)
     rows = nodes * len(seeds)

@@ -270,5 +270,5 @@ class Access:
 
     @property
     def acknowledges(self) -> bool:
-        """Whether senders learn what became of addressed packets."""
+        """Whether senders get a transmit status for each unicast packet."""
         return self.acknowledged and self.method in ("csma-802154", "dcf")

@@ -100,8 +100,8 @@ _GAZEBO: dict[str, Any] = {
     "access": {"method": "none"},
 }
 _SPREAD_AND_RATE = (
-    "the spread of 10 dB stays with the place, where the simulator draws it anew for each packet; what exceeds the bit "
-    "rate waits, where the simulator drops it"
+    "the spread of 10 dB stays with the place, where the simulator draws it again for each packet; what exceeds the "
+    "bit rate waits, where the simulator drops it"
 )
 SIMULATORS: dict[str, Preset] = {
     "gz-rfcomms": Preset(
@@ -244,7 +244,7 @@ OTHER_MEDIA: dict[str, Preset] = {
             "measures": {"range": {"noise_m": 0.002}},
         },
         "messages that overlap are lost; carrier sense is that of IEEE 802.15.4, which gives up after 5 tries, where "
-        "Kilobots go on trying; strength does not fall with distance, and its dBm tell nothing",
+        "Kilobots keep trying; strength does not fall with distance, and its dBm have no meaning",
     ),
     "acoustic": Preset(
         "a small acoustic modem in the sea: 24 to 32 kHz, 640 bit/s, 168 dB re 1 uPa at 1 m (27.2 dBm), 1500 m/s",
@@ -265,7 +265,7 @@ OTHER_MEDIA: dict[str, Preset] = {
         },
         "spherical spreading with absorption and the noise of 5 m/s of wind, without echoes, layers and Doppler shift; "
         "of two frames as strong the first survives, other frames being noise to it; which overlap is decided by when "
-        "they were sent, whatever the distance: only what is received is late",
+        "they were sent, at any distance: only receptions are late",
     ),
 }
 

@@ -153,7 +153,7 @@ class Radio:
 
     @property
     def acknowledges(self) -> bool:
-        """Whether senders learn what became of addressed packets."""
+        """Whether senders get a transmit status for each unicast packet."""
         return self.is_phy and self.access_or_default.acknowledges
 
     @property

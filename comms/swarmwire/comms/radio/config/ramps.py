@@ -1,4 +1,4 @@
-"""Tuning: a radio some of whose numbers change while a run goes on."""
+"""Ramps: changes of a radio's numbers during a run."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
@@ -42,7 +42,7 @@ def number_of(radio: Radio, key: str) -> float:
 
 
 def numbers_of(radio: Radio) -> dict[str, float]:
-    """The numbers of a radio that may change while a run goes on, by their keys within [radio]: "bursts.bad_s"."""
+    """The numbers of a radio that can change during a run, by their keys within [radio]: "bursts.bad_s"."""
     return dict(_numbers(radio, TABLE))
 
 
@@ -52,7 +52,7 @@ def with_number(radio: Radio, key: str, value: float) -> Radio:
 
 
 def check_number(radio: Radio, key: str, value: float) -> None:
-    """Raise BadInput unless the radio has a number at `key` that may change while a run goes on, and become `value`.
+    """Raise BadInput unless the radio has a number at `key` that can change during a run, to `value`.
 
     The fault is under "what" if it is the key's, else under "to".
     """
