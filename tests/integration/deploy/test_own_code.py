@@ -41,7 +41,7 @@ def test_help_waits_for_no_heavy_library():
 def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     _, out, _ = called(monkeypatch, capsys, "robots", "deploy", "--help")
-    assert "unchanged and does not stop the others; to do it again does only what is missing. Robots" in out
+    assert " and does not stop the others; to do it again does only what is missing. Robots" in out
     assert "  swarmwire robots deploy fleet.toml --group red --restart" in out
 
 

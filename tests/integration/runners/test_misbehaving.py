@@ -216,6 +216,6 @@ def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():
         token = world.liveliness().declare_token(Keys("3f2a").world)
         with pytest.raises(BadInput, match=r"--run: expected one of the runs at .*: 3f2a, got 1234"):
             join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), print, thread_server())
-        with pytest.raises(RunnerLost, match="told nothing of its run"):  # this one is asked
+        with pytest.raises(RunnerLost, match="sent no session information"):  # this one is asked
             join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), print, thread_server())
         token.undeclare()

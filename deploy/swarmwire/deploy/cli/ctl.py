@@ -129,7 +129,7 @@ def status_command(context: typer.Context, as_json: AsJson = False) -> None:
         for status, folder in told:
             typer.echo(json.dumps({**status, "folder": folder}))
     elif not told:
-        typer.echo("none of your runs is live on this machine")
+        typer.echo("no run of yours is live on this machine")
     elif len(told) > 1:
         _print_table(told)
     else:

@@ -127,7 +127,7 @@ def test_one_that_was_killed_cannot_be_repeated_without_what_programs_told(scena
     driven(scenario, scripted, tmp_path / "run")
     (tmp_path / "run" / "inputs" / "actions.frames").unlink()
     (tmp_path / "run" / "summary.json").unlink()
-    with pytest.raises(BadInput, match="came from outside"):
+    with pytest.raises(BadInput, match="external inputs"):
         repeat(tmp_path / "run")
 
 
