@@ -1,1 +1,1 @@
-"""The experiments of the founding papers: run, digested and drawn by `python -m docs.experiments`."""
+"""The replicated experiments: run, digested and drawn by `python -m docs.experiments`."""

@@ -51,11 +51,12 @@ class Avoidance(VectorAgent):
 
 
 class ThresholdRule(VectorAgent):
-    """The avoidance rule of the article on testing swarm logic with ROS 2 and ARGoS, by a laser scan.
+    """A threshold rule for avoidance, by a laser scan.
 
-    While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
+    Source: Quizzr, "Testing Decentralized Swarm Logic with ROS2 and ARGoS Simulators" (no author or date),
+    https://quizzr.net/concepts/swarm-simulation-ros2-argos. While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
     `turn_radps`; else it drives straight on at `speed_mps`. Ranges and speeds are the article's, and so is that the
-    rays behind count as those ahead. It has no memory: robots that hold one another on the threshold go to and fro,
+    rays behind count as those ahead. It has no memory: robots that meet on the threshold drive to and fro,
     and one next to a wall, always below it, drives in a circle of back_mps / turn_radps (0.2 m).
     """
 
