@@ -57,7 +57,7 @@ class Aggregation(VectorAgent[Gathering]):
     crowding: float = 2.0  # effect of near neighbours on leaving: 0 none
     return_per_s: float = 1.0  # rate at which a robot that leaves turns back
     approach_m: float = 0.1  # length of a spell towards or away from neighbours
-    spell_m: float = 1.0  # mean length of a spell where nobody is received, exponential
+    spell_m: float = 1.0  # mean length of a spell without reception, exponential
     turn_radps: float = 2.0  # turn rate, on the spot
     detection_threshold: float = (
         0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays

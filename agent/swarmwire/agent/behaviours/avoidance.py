@@ -54,14 +54,16 @@ class ThresholdRule(VectorAgent):
     """A threshold rule for avoidance, by a laser scan.
 
     Source: Quizzr, "Testing Decentralized Swarm Logic with ROS2 and ARGoS Simulators" (no author or date),
-    https://quizzr.net/concepts/swarm-simulation-ros2-argos. While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
-    `turn_radps`; else it drives straight on at `speed_mps`. Ranges and speeds are the article's, and so is that the
-    rays behind count as those ahead. It has no memory: robots that meet on the threshold drive to and fro,
-    and one next to a wall, always below it, drives in a circle of back_mps / turn_radps (0.2 m).
+    https://quizzr.net/concepts/swarm-simulation-ros2-argos.
+
+    While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
+    `turn_radps`; otherwise it drives straight on at `speed_mps`. Ranges and speeds are the article's, and so is that
+    rays behind count as much as those ahead. The rule has no memory: robots that meet on the threshold drive to and
+    fro, and one next to a wall, always below it, drives in a circle of back_mps / turn_radps (0.2 m).
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
-    safe_m: float = 0.5  # least range at which the robot goes on
+    safe_m: float = 0.5  # least range at which the robot drives on
     speed_mps: float = 0.2  # straight ahead
     back_mps: float = 0.1  # backwards, while anything is nearer
     turn_radps: float = 0.5  # turn rate meanwhile, positive to the left
@@ -86,7 +88,7 @@ class ThresholdRuleProximity(ThresholdRule):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    safe_m: float = 0.04  # least distance from the rim at which the robot goes on
+    safe_m: float = 0.04  # least distance from the rim at which the robot drives on
     speed_mps: float = 0.1  # straight ahead
     back_mps: float = 0.05  # backwards, while anything is nearer
     detection_threshold: float = (
