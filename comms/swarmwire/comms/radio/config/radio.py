@@ -220,13 +220,16 @@ def acknowledgement_bytes(radio: Radio) -> int:
     return SHORT_ACKNOWLEDGEMENT if radio.frame == "plain" else LONG_ACKNOWLEDGEMENT
 
 
-def acknowledgement_ns(radio: Radio) -> int:
-    """How long an acknowledgement occupies the medium, in ns.
-
-    IEEE 802.11 sends it at the highest mandatory bit rate that is no higher than that of the frame (2007: 9.6).
-    """
+def acknowledgement_rate_bps(radio: Radio) -> int:
+    """The bit rate of acknowledgements: OFDM's highest mandatory one up to that of the frame (802.11-2007, 9.6)."""
     if radio.frame in ("802.11a", "802.11g"):
-        radio = replace(radio, bit_rate_bps=max(rate for rate in OFDM_MANDATORY_BPS if rate <= radio.bit_rate_bps))
+        return max(rate_bps for rate_bps in OFDM_MANDATORY_BPS if rate_bps <= radio.bit_rate_bps)
+    return radio.bit_rate_bps
+
+
+def acknowledgement_ns(radio: Radio) -> int:
+    """How long an acknowledgement occupies the medium, in ns."""
+    radio = replace(radio, bit_rate_bps=acknowledgement_rate_bps(radio))
     return int(airtime_ns(radio, np.array([acknowledgement_bytes(radio)]))[0])
 
 

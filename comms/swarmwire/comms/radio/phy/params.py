@@ -13,13 +13,14 @@ from swarmwire.comms.radio.config.radio import (
     Radio,
     acknowledgement_bytes,
     acknowledgement_ns,
+    acknowledgement_rate_bps,
     eifs_acknowledgement_ns,
 )
 from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sensitivity_of
 from swarmwire.comms.radio.phy.reception import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.reception.receiver import Receiver, sinr_for_db
+from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
 
 CERTAIN = 1.0 - 1e-12
@@ -64,6 +65,7 @@ class PhyParams(NamedTuple):
     cw_max: int
     receiver: Receiver
     log_success: FloatArray  # by SINR, see `log_success_table`
+    ack_log_success: FloatArray  # the same at the bit rate of acknowledgements
 
 
 def phy_params_of(radio: Radio, robots: int) -> PhyParams:
@@ -119,6 +121,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         cw_max=dcf.cw_max,
         receiver=receiver,
         log_success=log_success_table(receiver),
+        ack_log_success=log_success_table(receiver_of(reception, acknowledgement_rate_bps(radio))),
     )
 
 

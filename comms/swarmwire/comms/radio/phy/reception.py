@@ -98,26 +98,27 @@ def fate_of_frame(params, losses, state, s, i, log_right):
     if u >= math.exp(log_right):
         if u < math.exp(log_right + state.reception[receiver].jam_log):
             return JAMMED
-        alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits))
+        alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits, is_ack))
         return COLLIDED if u < alone else TOO_WEAK
     frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.hold_ns)
     return frame_fate(losses, frame)
 
 
 @kernel()
-def alone_log_success(params, power_mw, bits):
+def alone_log_success(params, power_mw, bits, is_ack):
     """The logarithm of a frame's success probability without interference."""
     if power_mw < params.min_preamble_mw or power_mw < params.min_preamble_sinr * params.noise_mw:
         return bits * LOG_NEVER
     if power_mw >= params.error_free_sinr * params.noise_mw:
         return 0.0
-    return log_success(params.log_success, params.receiver, power_mw / params.noise_mw, bits)
+    table = params.ack_log_success if is_ack else params.log_success
+    return log_success(table, params.receiver, power_mw / params.noise_mw, bits)
 
 
 @kernel(from_python=True)
 def lone_delivery(params, mean_dbm, bits):
     """The success probability of a lone frame of `bits` bits at this power."""
-    return math.exp(alone_log_success(params, from_db(mean_dbm), bits))
+    return math.exp(alone_log_success(params, from_db(mean_dbm), bits, False))
 
 
 @njit()
@@ -179,7 +180,7 @@ def end_frame(params, losses, state, events, s, now_ns):
     if params.method == ALONE:
         for i in range(radio.first_link, radio.weak_link):
             if link[i].frame_fate == RECEIVING:
-                log_right = alone_log_success(params, link[i].power_mw, radio.bits)
+                log_right = alone_log_success(params, link[i].power_mw, radio.bits, False)
                 link[i].frame_fate = fate_of_frame(params, losses, state, s, i, log_right)
         radio.on_air = SILENT
         return
@@ -278,9 +279,10 @@ def end_chunk(params, robot, rx, now_ns):
     if (rx.signal_mw < params.error_free_sinr * noise_mw) & (rx.log_success > LOG_HOPELESS):
         sender = robot[rx.locked_to]
         bits = sender.bits * ((now_ns - rx.since_ns) / sender.airtime_ns)
-        log_right = log_success(params.log_success, params.receiver, rx.signal_mw / noise_mw, bits)
+        table = params.ack_log_success if sender.on_air == ACKNOWLEDGEMENT else params.log_success
+        log_right = log_success(table, params.receiver, rx.signal_mw / noise_mw, bits)
         rx.log_success += log_right
         if rx.jam_mw > 0.0:
             sinr = rx.signal_mw / (params.noise_mw + others_mw)
-            rx.jam_log += log_success(params.log_success, params.receiver, sinr, bits) - log_right
+            rx.jam_log += log_success(table, params.receiver, sinr, bits) - log_right
     rx.since_ns = now_ns

@@ -14,6 +14,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
 from tests.support.comms.radio import METHODS, Run, at, drawing, make_medium, packets, run, scattered, with_access
+from tests.unit.world.scenario.test_bodies import radio_of
 
 ROBOTS = 8
 ACKNOWLEDGING = ("csma-802154", "dcf")
@@ -156,6 +157,16 @@ def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_ac
     # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
     assert abs(received - 150) < 35
     assert abs(acknowledged - 75) < 30
+
+
+def test_an_acknowledgement_is_decoded_at_its_own_bit_rate():
+    """Where half of the frames at 54 Mbit/s are lost, all acknowledgements, at 24 Mbit/s, are right."""
+    radio = radio_of({"preset": "wifi-a-6M", "bit_rate_bps": 54_000_000, "access": {"method": "dcf", "max_retries": 0}})
+    ask = Asking(2)
+    of = run(make_medium(radio, 2), at((0, 0), (37, 0)), lambda _: ask(packets([0], 1, 20)), 300, 3)
+    received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
+    assert 75 < received < 225
+    assert acknowledged == received
 
 
 def test_the_tx_status_comes_in_the_tick_after_it_happened():
