@@ -47,7 +47,11 @@ def defer(params, state, r):
 
 @kernel(inline="always")
 def sense(params, state, events, r, now_ns):
-    """Update carrier sense after a change of the power at the robot; does nothing under other access methods."""
+    """Update carrier sense after a change of the power at the robot; does nothing under other access methods.
+
+    As in ns-3, the sensitivity applies to the sum of all frames on air here, with or without a detected preamble. IEEE
+    802.11-2007, 17.3.10.5, has 20 dB more for frames whose preamble was missed.
+    """
     if params.method == DCF:
         rx = state.reception[r]
         is_energy = (rx.power_mw >= params.cca_sensitivity_mw) | (rx.power_mw + rx.jam_mw >= params.cca_ed_mw)
