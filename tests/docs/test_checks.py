@@ -90,7 +90,6 @@ def test_a_word_that_pages_do_not_use_is_a_problem(
 ):
     monkeypatch.setattr(prose_checks, "ROOT", page.parents[1])
     monkeypatch.setattr(prose_checks, "PAGES", ["docs/page.md"])
-    monkeypatch.setattr(prose_checks, "UNWRITTEN", ("docs/unwritten.md",))
     page.write_text(text)
     found = list(prose_checks.prose())
     assert len(found) == problems
