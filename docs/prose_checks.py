@@ -50,9 +50,10 @@ def texts_of(source: str) -> Iterator[tuple[int, str]]:
     tree = ast.parse(source)
     docstrings = {id(text) for node in ast.walk(tree) if (text := _docstring(node))}
     yield from ((text.lineno, str(text.value)) for text in _public_docstrings(tree))
-    strings = (node for node in ast.walk(tree) if isinstance(node, ast.Constant) and id(node) not in docstrings)
-    for node in strings:
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+    for node in ast.walk(tree):
+        if id(node) in docstrings or not isinstance(node, ast.Constant):
+            continue
+        if isinstance(node.value, str) and " " in node.value:
             yield node.lineno, node.value
 
 
