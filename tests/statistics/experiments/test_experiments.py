@@ -419,7 +419,7 @@ def test_maps_are_drawn_and_cells_told(corners):
     assert len(experiment.draw(corners).axes) == 7  # with the scale
     told = experiment.told(corners).splitlines()
     assert sum(line.startswith("| flocking | ") for line in told) == 5  # four corners, and the whole map
-    assert sum("told 3 s before" in line for line in told) == 2
+    assert sum("sent 3 s before" in line for line in told) == 2
     assert set(CHECKS) <= set(corners)
 
 

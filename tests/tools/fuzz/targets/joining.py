@@ -22,6 +22,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.scenario_file import scenario_from
+from tests.support.agent.hosts import TIMES
 from tests.support.agent.runners import assigned_robots
 from tests.tools.fuzz.mutations import JSON, TEXTS, one_in, pick
 from tests.tools.fuzz.small_run import SCENARIO, small_run
@@ -116,7 +117,9 @@ class Assignments(DocumentTarget):
         run = small_run()
         memory = AgentExecutor(run.parts[0]).memory([group.name for group in run.parts[0].groups])
         memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.whole, encode_memory({})))
-        return [msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one}) for part, one in memories]
+        return [
+            msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one, **TIMES}) for part, one in memories
+        ]
 
     def feed(self, case: bytes) -> None:
         assigned = assigned_robots(case)

@@ -18,7 +18,7 @@ from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime, RealTimeAllocation
 from swarmwire.world.backends.registry import RunnerRegistry
-from tests.support.agent.hosts import PLAYERS
+from tests.support.agent.hosts import PLAYERS, TIMES
 from tests.support.agent.runners import joining
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.small_run import RUNNERS, joined, readings_of, small_run
@@ -150,7 +150,7 @@ class RunnerFrames(FrameTarget):
         self.shapes = _shapes(decoded[0])
         between = encode_packets(11, 1_150_000_000, 3, run.received, run.tx_status)
         end = frames.encode("end", -1, {}, {"why": "it sent far more than it was asked for"})
-        self.robots = msgpack.packb({**run.parts[0].as_mapping(), "v": frames.VERSION, "memory": None})
+        self.robots = msgpack.packb({**run.parts[0].as_mapping(), "v": frames.VERSION, "memory": None, **TIMES})
         return [*run.frames["one"][-3:], between, end]
 
     def feed(self, case: bytes) -> str | None:
