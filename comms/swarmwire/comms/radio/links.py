@@ -8,8 +8,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio import transmissions
-from swarmwire.comms.radio.columns import Column
-from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.radio.transmissions import Column, Transmissions
 
 THE_REST = -1
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)

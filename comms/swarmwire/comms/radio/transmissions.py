@@ -1,18 +1,38 @@
-"""The table of packets at or beyond their sender's radio, and the admission of sent packets to the queues."""
+"""The table of packets at or beyond their sender's radio, and the admission of sent packets to the queues.
+
+The columns of a table are one array, and cross into compiled code as one argument: an argument costs a call from
+Python as much as some ten rows cost the kernel, and a tick of ten robots is mostly calls.
+"""
 
 # pyright: basic, reportUnknownMemberType=false
+
+from typing import Protocol
 
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
-from swarmwire.comms.radio.columns import Column
 
 RECEIVED = int(Fate.RECEIVED)
 
-
 SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(11)
+
+
+class HasTable(Protocol):
+    """An object whose columns are the rows of one array."""
+
+    table: IntArray  # (columns, k)
+
+
+class Column:
+    """A named column of a `table`, (k,): a view, which may be written to."""
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+
+    def __get__(self, of: HasTable, owner: object = None) -> IntArray:
+        return of.table[self._place]
 
 
 class Transmissions:
