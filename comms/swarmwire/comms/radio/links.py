@@ -13,8 +13,8 @@ from swarmwire.comms.radio.transmissions import Column, Transmissions
 THE_REST = -1
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
-
-PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVERS, IN_RANGE, FATE, FINAL_AT = range(8)
+COLUMNS = 8
+PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVERS, IN_RANGE, FATE, FINAL_AT = range(COLUMNS)
 
 
 class Links:
@@ -25,7 +25,7 @@ class Links:
     way".
 
     Attributes:
-        table: (8, k) the columns of whole numbers.
+        table: (COLUMNS, k) the columns of whole numbers.
         rssi_dbm: (k,) strength at the receiver; NaN where there is none.
         given: (k, columns) measurements of the receiver, in the order of the radio's `measures.columns`.
     """
@@ -76,7 +76,7 @@ class Links:
     @classmethod
     def none(cls, columns: int) -> "Links":
         """No links."""
-        return cls(np.empty((8, 0), np.int64), np.empty(0), np.empty((0, columns)))
+        return cls(np.empty((COLUMNS, 0), np.int64), np.empty(0), np.empty((0, columns)))
 
     def __len__(self) -> int:
         return self.table.shape[1]
@@ -102,20 +102,22 @@ class Links:
 
 @njit()
 def _with_the_rest(packet, receiver, packets, in_range):
-    """The table of `Links`, (8, links + packets), of a table of `Transmissions`."""
+    """The table of `Links`, (COLUMNS, links + packets), of a table of `Transmissions`."""
     sender, sequence = packets[transmissions.SENDER], packets[transmissions.SEQUENCE]
     off_air_at_ns, fate = packets[transmissions.OFF_AIR_AT], packets[transmissions.FATE]
     links, count = len(packet), len(sender)
-    table = np.empty((8, links + count), np.int64)
+    table = np.empty((COLUMNS, links + count), np.int64)
     others = packets[transmissions.INTENDED].copy()
     for row in range(links):
         p = packet[row]
         others[p] -= 1
-        table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], receiver[row], sequence[p]
-        table[4, row], table[5, row], table[6, row], table[7, row] = 1, 1, RECEIVED, off_air_at_ns[p]
+        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], receiver[row]
+        table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], 1, 1
+        table[FATE, row], table[FINAL_AT, row] = RECEIVED, off_air_at_ns[p]
     for p in range(count):
         row = links + p
-        table[0, row], table[1, row], table[2, row], table[3, row] = p, sender[p], THE_REST, sequence[p]
-        table[4, row], table[5, row], table[7, row] = others[p], in_range[p], off_air_at_ns[p]
-        table[6, row] = OUT_OF_RANGE if fate[p] == RECEIVED else fate[p]
+        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], THE_REST
+        table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], others[p], in_range[p]
+        table[FATE, row] = OUT_OF_RANGE if fate[p] == RECEIVED else fate[p]
+        table[FINAL_AT, row] = off_air_at_ns[p]
     return table

@@ -15,8 +15,8 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
-from swarmwire.comms.radio import links as L  # noqa: N812 - columns of its table
-from swarmwire.comms.radio import transmissions as T  # noqa: N812
+from swarmwire.comms.radio import links as link
+from swarmwire.comms.radio import transmissions as packet
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
 from swarmwire.comms.radio.transmissions import Transmissions, payload_rows
@@ -146,10 +146,11 @@ def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, those
     for the rest, one for each packet that left its sender's radio.
     """
-    packet_of, sender, receiver = links[L.PACKET], links[L.SENDER], links[L.RECEIVER]
-    fate, final_at_ns = links[L.FATE], links[L.FINAL_AT]
-    arena = packets[T.SENDER] // robots  # of each packet: a division for each link would cost as much as all the rest
-    receivers, reachable = links[L.RECEIVERS], links[L.IN_RANGE]
+    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
+    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
+    # Of each packet: a division for each link would cost as much as all the rest.
+    arena = packets[packet.SENDER] // robots
+    receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]
     received, finished, departed, still_open = (
         np.empty(len(fate), np.int64),
         np.empty(len(fate), np.int64),
@@ -188,8 +189,8 @@ def _received(index, payload, links, first_row):
 
     `first_row` is that of each packet's arena.
     """
-    packet_of, sender, receiver = links[L.PACKET], links[L.SENDER], links[L.RECEIVER]
-    sequence, final_at_ns = links[L.SEQUENCE], links[L.FINAL_AT]
+    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
+    sequence, final_at_ns = links[link.SEQUENCE], links[link.FINAL_AT]
     columns = np.empty((5, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
@@ -205,10 +206,11 @@ def _received(index, payload, links, first_row):
 @njit()
 def _finished(index, links, packets, offset, arena, robots):
     """The integer columns of `ReceptionRecords`, then that of payloads, (13, k)."""
-    packet_of, receiver, receivers = links[L.PACKET], links[L.RECEIVER], links[L.RECEIVERS]
-    fate, final_at_ns = links[L.FATE], links[L.FINAL_AT]
-    sender, to, sequence, tag = packets[T.SENDER], packets[T.TO], packets[T.SEQUENCE], packets[T.TAG]
-    sent_at_ns, on_air_at_ns = packets[T.SENT_AT], packets[T.ON_AIR_AT]
+    packet_of, receiver, receivers = links[link.PACKET], links[link.RECEIVER], links[link.RECEIVERS]
+    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
+    sender, to = packets[packet.SENDER], packets[packet.TO]
+    sequence, tag = packets[packet.SEQUENCE], packets[packet.TAG]
+    sent_at_ns, on_air_at_ns = packets[packet.SENT_AT], packets[packet.ON_AIR_AT]
     columns = np.empty((13, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])
@@ -226,10 +228,10 @@ def _finished(index, links, packets, offset, arena, robots):
 @njit()
 def _departed(index, links, packets, arena, robots):
     """The columns of `TransmissionRecords`, (9, k)."""
-    packet_of, row_of_sender, sequence = links[L.PACKET], links[L.SENDER], links[L.SEQUENCE]
-    receivers, fate = links[L.RECEIVERS], links[L.FATE]
-    to, intended, fate_at_sender = packets[T.TO], packets[T.INTENDED], packets[T.FATE]
-    on_air_at_ns, off_air_at_ns = packets[T.ON_AIR_AT], packets[T.OFF_AIR_AT]
+    packet_of, row_of_sender, sequence = links[link.PACKET], links[link.SENDER], links[link.SEQUENCE]
+    receivers, fate = links[link.RECEIVERS], links[link.FATE]
+    to, intended, fate_at_sender = packets[packet.TO], packets[packet.INTENDED], packets[packet.FATE]
+    on_air_at_ns, off_air_at_ns = packets[packet.ON_AIR_AT], packets[packet.OFF_AIR_AT]
     columns = np.empty((9, len(index)), np.int64)
     for k in range(len(index)):
         row = np.uint64(index[k])

@@ -16,7 +16,8 @@ from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payload
 
 RECEIVED = int(Fate.RECEIVED)
 
-SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(11)
+COLUMNS = 11
+SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(COLUMNS)
 
 
 class HasTable(Protocol):
@@ -57,14 +58,14 @@ class Transmissions:
     tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of the transmit status for the sender, or NOT_MEASURED
 
     def __init__(self, table: IntArray, payloads: Payloads) -> None:
-        """`table` (11, k) holds the columns in their order, `payloads` has k rows."""
+        """`table` (COLUMNS, k) holds the columns in their order, `payloads` has k rows."""
         self.table, self.payloads = table, payloads
 
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
         # Payloads that may be written to, as those of kernels.
-        return cls(np.empty((11, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
+        return cls(np.empty((COLUMNS, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
 
     def __len__(self) -> int:
         return self.table.shape[1]
@@ -169,7 +170,7 @@ class Admission:
 @njit()
 def _admit(sender, to, tx_status_id, data, offset, sent_at_ns, others_alive, epoch, sent_before):
     """Columns and payloads of the packets that are not to NOWHERE; increments `sent_before` (rows,)."""
-    table, index, count = np.empty((11, len(sender)), np.int64), np.empty(len(sender), np.int64), 0
+    table, index, count = np.empty((COLUMNS, len(sender)), np.int64), np.empty(len(sender), np.int64), 0
     for p in range(len(sender)):
         s = sender[p]
         index[count] = p
