@@ -45,7 +45,7 @@ class Scene:
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
     led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
     obstacles_move: bool = False  # some can be pushed: `obstacles` is written to in each tick
-    threads: Threads = Threads()  # noqa: RUF009 - one thread has no state
+    threads: Threads = field(default_factory=Threads)
     own: dict[str, Any] = field(default_factory=dict[str, Any])  # shared by custom sensors and actuators
 
 

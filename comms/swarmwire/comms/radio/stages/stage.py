@@ -1,7 +1,7 @@
 """The interface of a channel stage, and the context from which stages are made."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
@@ -29,7 +29,7 @@ class ChannelContext:
     running: BoolArray  # (arenas,) kept up to date by the medium; other arenas have left the run
     traces: LinkTraces | None = None  # of the radio's trace, where it has one
     is_torus: bool = False  # shortest distances count
-    threads: Threads = Threads()  # noqa: RUF009 - one thread has no state
+    threads: Threads = field(default_factory=Threads)
 
     @property
     def wrap_m(self) -> tuple[float, float]:
