@@ -83,7 +83,7 @@ TARGETS = {
     ),
     "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
     "compile-disk": most(30, "with a disk radio"),
-    "compile-signals": most(30, "with a radio of signals"),
+    "compile-signals": most(30, "with a PHY"),
     "robot-step": most(
         1, "a step on a robot, CPU time of its thread: e-puck2 over TCP, Flocking, own network, 5 received"
     ),

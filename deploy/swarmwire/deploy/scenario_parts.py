@@ -49,7 +49,7 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
     except BadParameter as error:
         raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
     body = bodies_of(scenario, where)[name]
-    of_radio = scenario.radio.tells if scenario.radio else ()
+    of_radio = scenario.radio.needs if scenario.radio else ()
     for need in kind.needs:
         if need.startswith("radio."):
             if need not in of_radio:
@@ -123,7 +123,7 @@ def scenario_traces(scenario: Scenario) -> LinkTraces | None:
         raise BadInput(scenario.source, "radio.trace.file", f"expected a file beside the scenario: there is no {path}")
     traces = read_link_traces(path, scenario.robot_names())
     if traces.rssi_dbm is not None and scenario.radio is not None and not scenario.radio.is_phy:
-        raise BadInput(str(path), "rssi_dbm", "expected a radio with a PHY: a disk knows no strength")
+        raise BadInput(str(path), "rssi_dbm", "expected a radio with a PHY: a unit disk has no signal strength")
     return traces
 
 

@@ -26,7 +26,7 @@ class Event(ABC):
     at_s: float = parameter(help="when it happens", unit="s", at_least=0, at_most=1e9)
     do: str = parameter(help="kind of event")
     needs_radio: ClassVar[bool] = False
-    needs_signals: ClassVar[bool] = False  # needs a radio with a PHY, which has signal strengths
+    needs_phy: ClassVar[bool] = False  # needs a radio with a PHY, which has signal strengths
 
     @property
     def lasts_s(self) -> float | None:
@@ -63,7 +63,7 @@ class Event(ABC):
 
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput, with a key within the event's table, for values that do not fit this radio."""
-        if self.needs_signals and not radio.is_phy:
+        if self.needs_phy and not radio.is_phy:
             raise BadInput("", "do", f"expected a radio with a PHY for {self.do!r}: a disk knows no strength")
 
     def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:  # noqa: B027 - most fit any body

@@ -62,7 +62,7 @@ class Gain(LastingEvent):
     receive_db: float = parameter(
         0.0, help="added to the strength of all that they hear", unit="dB", at_least=-200, at_most=100
     )
-    needs_radio = needs_signals = True
+    needs_radio = needs_phy = True
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput for unknown robots, or if nothing would change."""
@@ -97,7 +97,7 @@ class Jammer(LastingEvent):
     )
     duty: float = parameter(1.0, help="the share of time for which it is on", above=0, at_most=1)
     period_s: float = parameter(0.01, help="time between two starts of a transmission", unit="s", above=0, at_most=1e6)
-    needs_radio = needs_signals = True
+    needs_radio = needs_phy = True
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput for neither or both of place and robots, or unknown robots."""

@@ -168,10 +168,10 @@ class RadioMedium:
         if (self._is_new or self._anyone_out) and (now.anyone_out or self._active.anyone_out):
             self._keep_new(*self._model.disrupt(start_ns, now, self._liveness))
             self._cut_off(start_ns, now)
-        told = self._threads.start(self._final(start_ns), len(self._links))
+        pending = self._threads.start(self._final(start_ns), len(self._links))
         self._hold(pose, radio or self.radio)
         edges = self._model.edges(pose, self._present)
-        final = Results.joined([*self._parts, told()])
+        final = Results.joined([*self._parts, pending()])
         self._parts = []
         return Results(final.received, final.finished, final.departed, final.tx_status, final.tally, edges)
 

@@ -106,7 +106,7 @@ def _preset(name: str, preset: Preset) -> Entry:
         ("longest frame", f"{longest_ms:.3g} ms"),
         *((f"radio.{path}", str(value)) for path, value in _flat(preset.radio)),
     )
-    return Entry(kind="preset", name=name, help=preset.told, facts=facts)
+    return Entry(kind="preset", name=name, help=preset.summary, facts=facts)
 
 
 def _flat(table: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
@@ -174,7 +174,7 @@ def _event(kind: type[Event]) -> Entry:
         help=bounds_of(do).help,
         facts=(
             ("in a scenario", f'do = "{do.default}" in [[events]]'),
-            ("needs a radio", "with signals" if kind.needs_signals else "yes" if kind.needs_radio else "no"),
+            ("needs a radio", "with a PHY" if kind.needs_phy else "yes" if kind.needs_radio else "no"),
         ),
         tables=(ParameterTable("keys", parameters_of_dataclass(kind)),),
         text=flowing(kind.__doc__),

@@ -162,7 +162,7 @@ class RunGateways:
         radio = self._scenario.radio
         if radio is None:
             return None
-        told = radio.max_payload_bytes, radio.measures.columns, radio.tells
+        told = radio.max_payload_bytes, radio.measures.columns, radio.needs
         return BridgedRadio(static.robot_names, static.rate_hz, *told)
 
 

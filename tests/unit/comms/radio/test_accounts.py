@@ -46,7 +46,7 @@ FAR = at((0, 0), (1, 0), (-2.9, 2.4))
 
 
 def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int) -> Run:
-    """Four ticks of random traffic among robots at random places; with signals some are far."""
+    """Four ticks of random traffic among robots at random places; with a PHY some are far."""
     rng = np.random.default_rng(seed)
     medium = make_medium(radio, robots, range(arenas), [OBSTACLES] * arenas)
     pose = scattered(arenas * robots, seed)

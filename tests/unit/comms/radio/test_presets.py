@@ -169,7 +169,7 @@ def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
 
 @pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
 def test_what_is_slow_is_received_later_with_distance(model: str):
-    """150 m at 1500 m/s take 100 ms, 75 m half of it; of the disk and of signals."""
+    """150 m at 1500 m/s take 100 ms, 75 m half of it; of the unit disk and of a PHY."""
     place = at((0, 0), (75, 0), (150, 0))
     radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
     for speed_mps, later_ns in ((None, [0, 0]), (1500.0, [50_000_000, 100_000_000])):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 class Preset(NamedTuple):
     """A kind of radio."""
 
-    told: str  # what it is
+    summary: str
     source: str  # of its figures
     radio: dict[str, Any]  # keys of [radio]
     otherwise: str = ""  # where it is other than what it is named after

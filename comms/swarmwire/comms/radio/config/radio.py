@@ -97,7 +97,7 @@ class Radio:
     )
     queue_lifetime_s: float | None = parameter(
         None,
-        help="of signals: a packet that has waited longer at its sender is dropped when its turn comes, as from a full "
+        help="with a PHY: a packet that has waited longer at its sender is dropped when its turn comes, as from a full "
         "queue; without it none is",
         unit="s",
         above=0,
@@ -115,7 +115,8 @@ class Radio:
     )
     cut_off_db: float = parameter(
         15.0,
-        help="of signals: a robot with a mean strength so far below noise and sensitivity neither hears nor disturbs; "
+        help="with a PHY: a robot with a mean strength so far below noise and sensitivity neither receives nor "
+        "interferes; "
         "less is faster",
         unit="dB",
         at_least=0,
@@ -129,18 +130,18 @@ class Radio:
         at_least=1,
         at_most=3e8,
     )
-    frequency_hz: float = parameter(2.44e9, help="of signals: the carrier", unit="Hz", at_least=1e3, at_most=1e12)
+    frequency_hz: float = parameter(2.44e9, help="with a PHY: the carrier", unit="Hz", at_least=1e3, at_most=1e12)
     log_distance: LogDistance | None = parameter(None, help="of the model log-distance")
     two_ray: TwoRay | None = parameter(None, help="of the model two-ray")
     itu_indoor: ItuIndoor | None = parameter(None, help="of the model itu-indoor")
-    antenna: Antenna | None = parameter(None, help="of signals: power and gain")
-    shadowing: Shadowing | None = parameter(None, help="of signals: what is not modelled varies from place to place")
-    walls: Walls | None = parameter(None, help="of signals: obstacles weaken, where they do not block")
-    bodies: Bodies | None = parameter(None, help="of signals: robots in between weaken")
-    fading: Fading | None = parameter(None, help="of signals: power varies over fractions of a wavelength")
-    noise: Noise | None = parameter(None, help="of signals: the receiver's own noise")
-    reception: Reception | None = parameter(None, help="of signals: when a frame is right")
-    access: Access | None = parameter(None, help="of signals: who may send when, and whether frames collide")
+    antenna: Antenna | None = parameter(None, help="with a PHY: power and gain")
+    shadowing: Shadowing | None = parameter(None, help="with a PHY: what is not modelled varies from place to place")
+    walls: Walls | None = parameter(None, help="with a PHY: obstacles weaken, where they do not block")
+    bodies: Bodies | None = parameter(None, help="with a PHY: robots in between weaken")
+    fading: Fading | None = parameter(None, help="with a PHY: power varies over fractions of a wavelength")
+    noise: Noise | None = parameter(None, help="with a PHY: the receiver's own noise")
+    reception: Reception | None = parameter(None, help="with a PHY: when a frame is right")
+    access: Access | None = parameter(None, help="with a PHY: who may send when, and whether frames collide")
     bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
     trace: Trace | None = parameter(None, help="measured links are replayed")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
@@ -148,7 +149,7 @@ class Radio:
 
     @property
     def is_phy(self) -> bool:
-        """Whether there is a signal with a strength."""
+        """Whether it has a PHY: signals with a strength."""
         return self.model != "unit-disk"
 
     @property
@@ -157,8 +158,8 @@ class Radio:
         return self.is_phy and self.access_or_default.acknowledges
 
     @property
-    def tells(self) -> tuple[str, ...]:
-        """What agents may need of it, by the names that they declare."""
+    def needs(self) -> tuple[str, ...]:
+        """The needs of agents that it meets, by the names that they declare."""
         return (*self.measures.needs, "radio.tx_status") if self.acknowledges else self.measures.needs
 
     @property
@@ -168,7 +169,7 @@ class Radio:
 
     @property
     def loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
-        """Path loss by the signal's model; ValueError for the unit disk."""
+        """The path loss model; ValueError for the unit disk."""
         if self.model == "log-distance":
             return self.log_distance or LogDistance()
         if self.model == "two-ray":
@@ -243,8 +244,8 @@ def eifs_acknowledgement_ns(radio: Radio) -> int:
 # Checks that need more than one key: errors name the key that contradicts another.
 
 
-OF_SIGNALS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
-OF_MODELS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
+PHY_KEYS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
+MODEL_KEYS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
 OFDM_MODELS = ("802.11ag", "802.11ag-nist")
 RECEPTIONS = {"802.11a": OFDM_MODELS, "802.11b": ("802.11b",), "802.11g": OFDM_MODELS}  # beside threshold and table
 RATES_BPS = {
@@ -256,13 +257,13 @@ RATES_BPS = {
 
 def check_radio(radio: Radio, where: str) -> None:
     """Raise BadInput for the first contradiction in a scenario's [radio]."""
-    for name, model in OF_MODELS.items():
+    for name, model in MODEL_KEYS.items():
         if getattr(radio, name) is not None and radio.model != model:
             raise BadInput(where, f"radio.{name}", f'expected model = "{model}" with it, got "{radio.model}"')
     if radio.is_phy:
-        _check_signal(radio, where)
+        _check_phy(radio, where)
     else:
-        _check_disk(radio, where)
+        _check_unit_disk(radio, where)
     if radio.bursts is not None and radio.bursts.loss_bad < radio.bursts.loss_good:
         expected = f"expected at least loss_good, {radio.bursts.loss_good:g}; got {radio.bursts.loss_bad:g}"
         raise BadInput(where, "radio.bursts.loss_bad", expected)
@@ -281,26 +282,26 @@ def unfit_for_torus(radio: Radio) -> str | None:
     return "model" if radio.is_phy else "bodies_block" if radio.bodies_block else None
 
 
-def _check_disk(radio: Radio, where: str) -> None:
+def _check_unit_disk(radio: Radio, where: str) -> None:
     if radio.range_m is None:
         raise BadInput(
             where, "radio.range_m", "is missing; expected a number above 0 (m), as the model unit disk has one"
         )
-    for name in OF_SIGNALS:
+    for name in PHY_KEYS:
         if getattr(radio, name) is not None:
-            raise BadInput(where, f"radio.{name}", "expected a model with signals: a unit disk knows no strength")
+            raise BadInput(where, f"radio.{name}", "expected a model with a PHY: a unit disk has no signal strength")
     if radio.measures.rssi is not None:
-        raise BadInput(where, "radio.measures.rssi", "expected a model with signals: a unit disk knows no strength")
+        raise BadInput(where, "radio.measures.rssi", "expected a model with a PHY: a unit disk has no signal strength")
     if radio.cut_off_db != Radio.cut_off_db:
-        raise BadInput(where, "radio.cut_off_db", "expected a model with signals: a unit disk knows no strength")
+        raise BadInput(where, "radio.cut_off_db", "expected a model with a PHY: a unit disk has no signal strength")
     if radio.queue_lifetime_s is not None:
-        raise BadInput(where, "radio.queue_lifetime_s", "expected a model with signals: a unit disk keeps what waits")
+        raise BadInput(where, "radio.queue_lifetime_s", "expected a model with a PHY: a unit disk keeps what waits")
 
 
-def _check_signal(radio: Radio, where: str) -> None:
+def _check_phy(radio: Radio, where: str) -> None:
     refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
     if radio.bodies_block:
-        raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; signals have radio.bodies")
+        raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; a PHY has radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
         raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
     if radio.access_or_default.method == "dcf" and radio.frame == "plain":

@@ -105,7 +105,7 @@ def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
         )
 
 
-class _Coming(NamedTuple):
+class _Pending(NamedTuple):
     """Pairs that another thread computes."""
 
     pose: FloatArray
@@ -136,9 +136,9 @@ class LinkTable:
         rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 3))
         # Obstacles may be pushed, and measured strengths change by themselves.
-        self._follows_poses = measured is None and self._line_of_sight is None and not propagation.walls
+        self._depends_on_poses_only = measured is None and self._line_of_sight is None and not propagation.walls
         self._is_new, self._running = True, context.running.copy()
-        self._coming: _Coming | None = None
+        self._pending: _Pending | None = None
         self.pairs = self.pairs_at(self.pose)
         self.link, self.places = self._links(np.empty(0, LINK))
 
@@ -154,14 +154,14 @@ class LinkTable:
     def expect(self, pose: FloatArray) -> None:
         """Begin to compute the pairs for a `move` to `pose`, where another thread is free for it."""
         threads, propagation, rows = self._context.threads, self.propagation, len(self.pairs.a)
-        if threads.are_worth(rows) and self._follows_poses and not self._stays(pose):
+        if threads.are_worth(rows) and self._depends_on_poses_only and not self._stays(pose):
             pairs = threads.start(partial(self._pairs_at, pose, propagation), rows)
-            self._coming = _Coming(pose, propagation, pairs)
+            self._pending = _Pending(pose, propagation, pairs)
 
     def _stays(self, pose: FloatArray) -> bool:
         """Whether the links are those of robots at `pose`: nothing on which they depend has changed."""
         return (
-            self._follows_poses
+            self._depends_on_poses_only
             and not self._is_new
             and not self._context.disruption.anything
             and np.array_equal(pose, self.pose)
@@ -183,13 +183,13 @@ class LinkTable:
 
         Where nothing has changed the links stay as they are.
         """
-        coming, self._coming = self._coming, None
-        pairs = coming.pairs() if coming else None
+        pending, self._pending = self._pending, None
+        pairs = pending.pairs() if pending else None
         if self._stays(pose):
             return
         kept = self._keep_on_air(robot, reception)
-        is_fit = coming is not None and coming.pose is pose and coming.propagation is self.propagation
-        self.pose, self.pairs = pose, pairs if pairs is not None and is_fit else self.pairs_at(pose)
+        matches = pending is not None and pending.pose is pose and pending.propagation is self.propagation
+        self.pose, self.pairs = pose, pairs if pairs is not None and matches else self.pairs_at(pose)
         self.link, self.places = self._links(kept)
         self._is_new, self._running = self._context.disruption.anything, self._context.running.copy()
 

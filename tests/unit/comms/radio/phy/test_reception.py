@@ -1,4 +1,4 @@
-"""Reception with signals: which packets arrive, and what is counted."""
+"""Reception with a PHY: which packets arrive, and what is counted."""
 
 from dataclasses import replace
 from typing import Any
