@@ -63,10 +63,10 @@ def _received(robots: int, packets: int) -> ReceivedPackets:
 
 def agent_overhead(name: str, repeats: int) -> None:
     """What the framework costs a robot's step, where one robot is all and where there are many, and a packet read."""
-    told = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
+    details = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
     for robots, ticks, at in ((1, 5000, ""), (100, 100, "-of-100")):
         overhead(WallClock(), robots, PACKETS, ticks // 10)
         found = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(repeats)]
         for part, values in (("step", [one.step_us for one in found]), ("packet", [one.packet_us for one in found])):
-            line = {"robots": robots, **told, **spread(values)}
+            line = {"robots": robots, **details, **spread(values)}
             print_line(f"{name}-{part}{at}", statistics.median(values), f"µs per {part}", line)

@@ -54,13 +54,13 @@ class Word(Message):
 
 
 class Relay(VectorAgent):
-    """Drives in circles, and tells news in one step of ten; whoever hears some passes it on at once, if it may."""
+    """Drives in circles, and sends news in one step of ten; receivers pass it on at once, if they may."""
 
     turn_radps: float = 0.5
     hops: int = 1
 
     def step(self, robots: Robots, state: State) -> None:
-        """Drive, pass on what waited, and now and then tell something."""
+        """Drive, pass on what waited, and now and then send news."""
         self.on_receive(robots, state)
         robots.drive(0.05, self.turn_radps)
         robots.radio.send(Word, rows=robots.draw.uniform("news") < 0.1, hops=self.hops)
@@ -116,10 +116,10 @@ class Boid(Agent):
 
 
 class TimedBoid(Boid):
-    """A boid that tells how much processor time each of its steps took."""
+    """A boid that reports how much processor time each of its steps took."""
 
     def step(self, robot: Robot) -> None:
-        """Step, and tell."""
+        """Step, and report."""
         start_ns = time.thread_time_ns()
         super().step(robot)
         robot.note(value=(time.thread_time_ns() - start_ns) * 1e-9)

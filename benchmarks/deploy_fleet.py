@@ -65,8 +65,8 @@ def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
                 _measure(kind, hosts, environments, found)
             suffix = "" if kind == KINDS[-1] else f"-{kind}"
             for what, values in (("-first", found.first), ("", found.release), ("-again", found.again)):
-                told = {**config, "server": kind, **spread(values)}
-                print_line(f"{name}{suffix}{what}", statistics.median(values), "s", told)
+                details = {**config, "server": kind, **spread(values)}
+                print_line(f"{name}{suffix}{what}", statistics.median(values), "s", details)
 
 
 def facts_here() -> dict[str, object]:

@@ -12,7 +12,7 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
     """Print one line about a run."""
     radio = result.radio
     arenas = {"arenas": len(result.arenas)} if len(result.arenas) > 1 else {}
-    told = {
+    details = {
         "robots": result.robots,
         **arenas,
         "runners": result.runners,
@@ -25,14 +25,14 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
         "collisions": sum(arena.metrics["collisions"].final or 0.0 for arena in result.arenas),
         "wall_contacts": sum(arena.metrics["wall_contacts"].final or 0.0 for arena in result.arenas),
     }
-    print_line(name, value, unit, told)
+    print_line(name, value, unit, details)
 
 
-def print_line(name: str, value: float, unit: str, told: dict[str, Any]) -> None:
+def print_line(name: str, value: float, unit: str, details: dict[str, Any]) -> None:
     """Print a value, its target, and all that it was measured under."""
     target = TARGETS.get(name)
     asked = {"at_most" if target.at_most else "at_least": target.value, "met": target.met_by(value)} if target else {}
-    line = {"name": name, "value": round(value, 3), "unit": unit, **asked, **told, "cpu": cpu()}
+    line = {"name": name, "value": round(value, 3), "unit": unit, **asked, **details, "cpu": cpu()}
     print(json.dumps(line), flush=True)
 
 

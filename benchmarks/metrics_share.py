@@ -49,7 +49,7 @@ def metrics_share(name: str, repeats: int, *, of: str) -> None:
     """Time spent on metrics over that of the whole run, in percent, for a case of `robot_steps`.
 
     Both sets are timed within the same runs, so that what else the machine does falls on all. The radio graph, which
-    the loop makes for whoever looks on, counts as the run's.
+    the loop makes for observers, counts as the run's.
     """
     case = CASES[of]
     scenario = scenario_from({**case.scene(None), "standard_metrics": False}, name)
@@ -60,5 +60,5 @@ def metrics_share(name: str, repeats: int, *, of: str) -> None:
         raise RuntimeError("a metric failed: its cost says nothing")
     for suffix, chosen in SETS.items():
         shares = [observer.share_percent(suffix) for observer in timed]
-        told = {"of": of, "robots": case.robots, "ticks": case.ticks, "metrics": len(Metrics(chosen).metrics)}
-        print_line(f"{name}{suffix}", statistics.median(shares), "% of the run", {**told, **spread(shares)})
+        details = {"of": of, "robots": case.robots, "ticks": case.ticks, "metrics": len(Metrics(chosen).metrics)}
+        print_line(f"{name}{suffix}", statistics.median(shares), "% of the run", {**details, **spread(shares)})

@@ -1,4 +1,4 @@
-"""The medium alone, in times real time: everybody broadcasts in each tick of 0.1 s, moves a little, and hears.
+"""The medium alone, in times real time: every robot broadcasts in each tick of 0.1 s, moves a little, and receives.
 
 What is timed is all that a run asks of the medium in a tick: time passes, poses are held, packets are sent, and the
 radio graph is drawn.
@@ -76,7 +76,7 @@ class Cost:
     """What a tick takes, and what happened in it."""
 
     tick_s: float
-    told: dict[str, Any]
+    details: dict[str, Any]
 
     @property
     def realtime_factor(self) -> float:
@@ -112,7 +112,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
             pose = pose.copy()  # the medium keeps the one that it was given
             pose[:, :2] += rng.normal(0.0, STEP_M, (robots, 2))
     packets = ticks * robots
-    told = {
+    details = {
         "robots": robots,
         "rate_hz": RATE_HZ,
         "payload_bytes": case.payload_bytes,
@@ -127,7 +127,7 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
         "collided": round(float(fates[Fate.COLLIDED]) / packets, 1),
         "ticks": ticks,
     }
-    return Cost(spent_ns * 1e-9 / ticks, told)
+    return Cost(spent_ns * 1e-9 / ticks, details)
 
 
 def boxes(count: int, side_m: float) -> tuple[Obstacle, ...]:
@@ -140,23 +140,23 @@ def boxes(count: int, side_m: float) -> tuple[Obstacle, ...]:
 def scaling() -> tuple[float, dict[str, Any]]:
     """The cost of a link among the most robots over that among the fewest, whichever is dearer on top."""
     costs = [cost(replace(SCALING, robots=robots), ticks=max(10, 20_000 // robots)) for robots in SIZES]
-    links_us = [1e6 * each.tick_s / each.told["robots"] / each.told["in_range"] for each in costs]
-    told = {f"us_per_link_{robots}": round(us, 3) for robots, us in zip(SIZES, links_us, strict=True)}
-    return max(links_us) / min(links_us), {**costs[-1].told, **told}
+    links_us = [1e6 * each.tick_s / each.details["robots"] / each.details["in_range"] for each in costs]
+    details = {f"us_per_link_{robots}": round(us, 3) for robots, us in zip(SIZES, links_us, strict=True)}
+    return max(links_us) / min(links_us), {**costs[-1].details, **details}
 
 
 def air_cost(name: str, repeats: int) -> None:
     """Real-time factor of the medium alone, without robots to act."""
     costs = [cost(CASES[name]) for _ in range(repeats)]
     factors = [each.realtime_factor for each in costs]
-    print_line(name, statistics.median(factors), "x real time", {**costs[0].told, **spread(factors)})
+    print_line(name, statistics.median(factors), "x real time", {**costs[0].details, **spread(factors)})
 
 
 def line_of_sight(name: str, repeats: int) -> None:
     """A tick of the medium on a map of many boxes, each of which may block a link."""
     costs = [cost(LINE_OF_SIGHT) for _ in range(repeats)]
     ticks_ms = [1e3 * each.tick_s for each in costs]
-    print_line(name, statistics.median(ticks_ms), "ms per tick", {**costs[0].told, **spread(ticks_ms)})
+    print_line(name, statistics.median(ticks_ms), "ms per tick", {**costs[0].details, **spread(ticks_ms)})
 
 
 def air_scaling(name: str, repeats: int) -> None:

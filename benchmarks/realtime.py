@@ -21,10 +21,13 @@ def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: f
     scenario = scenario_from(mapping, name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
     results = [run(scenario, runners=runners, realtime=1.0, subtick=subtick_s) for _ in range(repeats)]
-    told = [result.realtime for result in results if result.realtime]
-    delivery = [_ms(of.delivery) for of in told]
-    jitter = [_ms(of.tick_jitter) for of in told]
-    for of, values, last in ((name, delivery, told[-1].delivery), (f"{name}-jitter", jitter, told[-1].tick_jitter)):
+    timings = [result.realtime for result in results if result.realtime]
+    delivery = [_ms(of.delivery) for of in timings]
+    jitter = [_ms(of.tick_jitter) for of in timings]
+    for of, values, last in (
+        (name, delivery, timings[-1].delivery),
+        (f"{name}-jitter", jitter, timings[-1].tick_jitter),
+    ):
         config = {
             "agent": AGENT,
             "subtick_s": subtick_s,
@@ -32,7 +35,7 @@ def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: f
             "p50_ms": round(last.p50_s * MS_PER_S, 3) if last else None,
             "worst_ms": round(last.worst_s * MS_PER_S, 3) if last else None,
             "counted": last.count if last else 0,
-            "missed_ticks": told[-1].missed_ticks,
+            "missed_ticks": timings[-1].missed_ticks,
             "load_average": round(os.getloadavg()[0], 1),  # a p99 of a millisecond is one of a quiet machine
             **spread(values),
         }

@@ -45,9 +45,9 @@ def report_cost(name: str, repeats: int, *, seeds: int) -> None:
             most_mb.append(usage.ru_maxrss / 1e3)
         size_mb = Path(folder, "report.html").stat().st_size / 1e6
     config = {"points": len(LOSSES) * len(COUNTS), "runs": runs, "responses": len(METRICS) + len(TIMES) + 1}
-    told = {**config, "page_mb": round(size_mb, 1)}
-    print_line(name, statistics.median(taken_s), "s", {**told, **spread(taken_s)})
-    print_line(f"{name}-memory", statistics.median(most_mb), "MB", {**told, **spread(most_mb)})
+    details = {**config, "page_mb": round(size_mb, 1)}
+    print_line(name, statistics.median(taken_s), "s", {**details, **spread(taken_s)})
+    print_line(f"{name}-memory", statistics.median(most_mb), "MB", {**details, **spread(most_mb)})
 
 
 def write_campaign(folder: Path, seeds: int) -> int:

@@ -22,8 +22,8 @@ BODIES = {"epuck2": "epuck2", "ros2": "turtlebot"}  # gateway and driver: as the
 
 def robot_step(name: str, repeats: int, *, kind: str) -> None:
     """CPU time of a step (decode, agent, radio, encode), the median of all robots, and the memory of a process."""
-    told = [one for _ in range(repeats) for one in measured(kind)]
-    step_ms, rss_mb = [of["step_ms"] for of in told], [of["rss_mb"] for of in told]
+    figures = [one for _ in range(repeats) for one in measured(kind)]
+    step_ms, rss_mb = [of["step_ms"] for of in figures], [of["rss_mb"] for of in figures]
     config = {
         "driver": kind,
         "robots": ROBOTS,
@@ -32,17 +32,17 @@ def robot_step(name: str, repeats: int, *, kind: str) -> None:
         "radio": "zenoh",
         "neighbours": ROBOTS - 1,
         "tracker": True,
-        "steps": sum(int(of["steps"]) for of in told),
-        "step_p99_ms": round(statistics.median(of["step_p99_ms"] for of in told), 3),
-        "process_ms_per_step": round(statistics.median(of["process_ms"] for of in told), 3),
-        "received_per_step": round(statistics.median(of["received"] for of in told), 2),
+        "steps": sum(int(of["steps"]) for of in figures),
+        "step_p99_ms": round(statistics.median(of["step_p99_ms"] for of in figures), 3),
+        "process_ms_per_step": round(statistics.median(of["process_ms"] for of in figures), 3),
+        "received_per_step": round(statistics.median(of["received"] for of in figures), 2),
     }
     print_line(name, statistics.median(step_ms), "ms per step", {**config, **spread(step_ms)})
     print_line(f"{name}-memory", statistics.median(rss_mb), "MB", {**config, **spread(rss_mb)})
 
 
 def measured(kind: str) -> list[dict[str, float]]:
-    """What each robot's process tells of itself."""
+    """The figures that each robot's process prints."""
     scenario = ROOT / "scenarios" / "robots" / f"flocking-{BODIES[kind]}.toml"
     overrides = [f"robots.flock.count={ROBOTS}", f"duration_s={SECONDS + 10}"]
     with TemporaryDirectory(prefix="sw-", dir="/tmp") as folder:  # paths of sockets are short
@@ -87,7 +87,7 @@ def _told(agent: "subprocess.Popen[str]") -> dict[str, float]:
     if agent.returncode != 0:
         raise RuntimeError("an agent failed: the others' steps say nothing")
     *lines, last = out.splitlines()
-    told: dict[str, float] = json.loads(last)
+    figures: dict[str, float] = json.loads(last)
     ended = lines[-1]  # "…; connections 1, packets_received 745, packets_sent 150"
     counts = dict(item.rsplit(" ", 1) for item in ended.rpartition("; ")[2].split(", "))
-    return told | {"received": int(counts.get("packets_received", "0")) / int(counts["packets_sent"])}
+    return figures | {"received": int(counts.get("packets_received", "0")) / int(counts["packets_sent"])}

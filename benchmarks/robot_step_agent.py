@@ -1,4 +1,4 @@
-"""The agent of one robot as `swarmwire-agent run` has it, whose steps are measured, and told at the end.
+"""The agent of one robot as `swarmwire-agent run` has it, whose steps are measured, and printed at the end.
 
 `python -m benchmarks.robot_step_agent ROBOT.TOML SECONDS [KEY=VALUE …]`; it imports little that the agent does not.
 """
@@ -43,7 +43,7 @@ class MeasuredSteps:
         if len(self.thread_ns) == WARM_UP:
             self._warm_ns = time.process_time_ns()
 
-    def told(self) -> dict[str, float]:
+    def figures(self) -> dict[str, float]:
         """What a step took, in ms: the median and the longest but one in a hundred, and with all threads the mean."""
         steps = sorted(self.thread_ns[WARM_UP:])
         process_ms = (time.process_time_ns() - self._warm_ns) / len(steps) / 1e6
@@ -58,7 +58,7 @@ def main() -> None:
     flags = {key: (key, json.loads(value)) for key, _, value in (text.partition("=") for text in given)}
     plan = robot_config(read_settings(Path(file), flags), file, clock)
     run_robot(plan, clock, StopFlag(), "measured", float(seconds))
-    print(json.dumps(steps.told() | {"rss_mb": most_memory_mb()}), flush=True)
+    print(json.dumps(steps.figures() | {"rss_mb": most_memory_mb()}), flush=True)
 
 
 def most_memory_mb() -> float:

@@ -12,7 +12,7 @@ from swarmwire.world.scenario_file import scenario_from
 
 @dataclass(frozen=True)
 class Case:
-    """A swarm to run, and in what its speed is told: robot-steps per second, or as a multiple of real time."""
+    """A swarm to run, and the unit of its speed: robot-steps per second, or as a multiple of real time."""
 
     robots: int
     ticks: int

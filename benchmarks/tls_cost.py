@@ -65,7 +65,7 @@ class InTurn:
         return actions
 
     def close(self) -> None:
-        """They are closed by whoever opened them."""
+        """They are closed by the code that opened them."""
 
     def counts(self) -> dict[str, int]:
         """Nothing of its own."""
@@ -75,14 +75,14 @@ class InTurn:
 def tls_cost(name: str, repeats: int, *, robots: int, ticks: int) -> None:
     """A tick over TLS in times one over plain TCP, whole ticks of world, radio and runners; the median of all pairs."""
     ratios: list[float] = []
-    told: dict[str, object] = {}
+    details: dict[str, object] = {}
     for _ in range(repeats):
         rest_ms, took_ms = _measured(robots, ticks)
         tick_ms = {kind: rest_ms + took_ms[kind] for kind in KINDS}
         ratios.append(float(np.median(tick_ms["tls"] / tick_ms["tcp"])))
-        told = {f"tick_ms_{kind}": round(statistics.median(tick_ms[kind].tolist()), 3) for kind in KINDS}
-        told["over_unix"] = round(float(np.median(tick_ms["tls"] / tick_ms["unix"])), 3)
-        told["runners_alone"] = round(float(np.median(took_ms["tls"] / took_ms["tcp"])), 3)
+        details = {f"tick_ms_{kind}": round(statistics.median(tick_ms[kind].tolist()), 3) for kind in KINDS}
+        details["over_unix"] = round(float(np.median(tick_ms["tls"] / tick_ms["unix"])), 3)
+        details["runners_alone"] = round(float(np.median(took_ms["tls"] / took_ms["tcp"])), 3)
     config = {
         "robots": robots,
         "runners": robots,
@@ -96,7 +96,7 @@ def tls_cost(name: str, repeats: int, *, robots: int, ticks: int) -> None:
         "physics_steps": 5,
         "certificates": "EC P-256, mutual TLS 1.3 of zenoh, access control for each runner by its common name",
         "beside": "plain TCP on loopback, the same ticks in turn",
-        **told,
+        **details,
     }
     print_line(name, statistics.median(ratios), "times the plain tick", config)
 

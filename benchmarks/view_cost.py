@@ -20,7 +20,7 @@ class Timed(Observer):
     """Observer that records for the viewer, and notes how long that takes in each tick."""
 
     def __init__(self, rrd: Path) -> None:
-        self._clock, self._metrics = WallClock(), Metrics()  # of its own, as observers are not told the run's
+        self._clock, self._metrics = WallClock(), Metrics()  # of its own, as observers do not get the run's
         self._recording = RerunRecording(rrd, self._metrics, self._clock)
         self.at_ns, self.spent_ns, self.own_ns = list[int](), list[int](), list[int]()
         self.end_ns = 0

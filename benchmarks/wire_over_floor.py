@@ -1,7 +1,7 @@
 """A lockstep tick beside its floor: as many processes that only answer, in the same minutes, and the agents' time.
 
 After every few ticks of the run as many bytes go to as many processes, over socket pairs, and come back: the floor.
-Agents tell how much processor time their steps took; the sum of it, shared by the cores, is added to the floor.
+Agents report how much processor time their steps took; the sum of it, shared by the cores, is added to the floor.
 """
 
 import os

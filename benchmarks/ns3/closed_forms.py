@@ -149,7 +149,7 @@ def _argos() -> Line:
 
 
 def by_argos(xy_m: np.ndarray, range_m: float, radius_m: float) -> np.ndarray:
-    """Who receives of whom, (k, k): nearer than the range, and no third body touches the line between their centres."""
+    """Whether j receives from i, (k, k): within the range, with no third body on the line between their centres."""
     way = xy_m[None] - xy_m[:, None]
     apart_m = np.linalg.norm(way, axis=-1)
     near = (apart_m < range_m) & (apart_m > 0.0)

@@ -55,7 +55,7 @@ def figures_of(configuration: Configuration, received: Received) -> Figures:
 
 
 def _intended(configuration: Configuration) -> BoolArray:
-    """Who is to receive of whom, (nodes, nodes)."""
+    """The intended receivers of each sender, (nodes, nodes)."""
     intended = ~np.eye(configuration.nodes, dtype=np.bool_)
     intended[configuration.senders :] = False
     if configuration.places == "line":
@@ -156,7 +156,7 @@ class Row:
 
     @property
     def reason(self) -> str | None:
-        """Why it is off limits; None if it is within them, or nobody knows."""
+        """Why it is off limits; None if it is within them, or there are no limits."""
         title = " ".join(self.configuration.cells)
         return next((REASONS[key] for key in REASONS if self.misses and re.match(key, title)), None)
 
@@ -257,9 +257,9 @@ def _numbers(values: np.ndarray) -> list[float | None]:
     return [round(float(value), DIGITS) if np.isfinite(value) else None for value in values]
 
 
-def _figures(told: dict[str, list[float | None]]) -> Figures:
-    return {name: np.array([np.nan if one is None else one for one in values]) for name, values in told.items()}
+def _figures(columns: dict[str, list[float | None]]) -> Figures:
+    return {name: np.array([np.nan if one is None else one for one in values]) for name, values in columns.items()}
 
 
-def _configuration(told: dict[str, Any]) -> Configuration:
-    return Configuration(**dict(told, size_m=tuple(told["size_m"])))
+def _configuration(fields: dict[str, Any]) -> Configuration:
+    return Configuration(**dict(fields, size_m=tuple(fields["size_m"])))

@@ -64,7 +64,7 @@ class Configuration:
 
     @property
     def where(self) -> str:
-        """The places, and whom packets are for, in words."""
+        """The places, and the receivers of packets, in words."""
         distances = ", ".join(f"{m:g}" for m in self.size_m)
         where = {"spot": "one spot", "line": f"{distances} m", "area": f"{distances} m square"}[self.places]
         return where + (", unicast" if self.unicast else "")
@@ -133,7 +133,7 @@ class Configuration:
         return np.array(by_tick).reshape(self.ticks, self.seeds, self.nodes)[:, :, : self.senders]
 
     def receiver_of(self, sender: int) -> int:
-        """Whom a sender's packets are for; -1: all."""
+        """The receiver of a sender's packets; -1: all."""
         return (sender + 1) % self.nodes if self.unicast else -1
 
     def ns3_input(self, seed: int, walk_m: FloatArray | None = None) -> str:

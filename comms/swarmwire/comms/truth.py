@@ -148,7 +148,7 @@ class ReceptionRecords:
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)
-    final_at_ns: IntArray  # (k,) end of the reception, whatever its fate
+    final_at_ns: IntArray  # (k,) end of the reception, with any fate
     fate: IntArray  # (k,) a Fate
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) class of the message

@@ -170,7 +170,7 @@ class Controls:
             self._asked = self.paused
             if self._pace:
                 if paused_ns or self.speed != self._pace.factor:
-                    self._pace.begin_anew(tick, self.speed or self._pace.factor, paused_ns)
+                    self._pace.restart(tick, self.speed or self._pace.factor, paused_ns)
             elif self.speed is not None:
                 # What one wait was too long may be made up for in the next; more would be a burst beyond the limit.
                 period_ns = round(tick_start_ns(1, self._rate_hz) / self.speed)

@@ -69,7 +69,7 @@ def keep_kernels() -> None:
 
 
 @contextmanager
-def compiling_told(
+def report_compiling(
     console: "Console", after_s: float = COMPILING_S, again_s: float = COMPILING_AGAIN_S
 ) -> Generator[None]:
     """Print a line if kernels are compiled within the context for so long, then how many so far each `again_s`."""
@@ -81,7 +81,7 @@ def compiling_told(
         depth = 0  # compiling one kernel compiles those that it calls
         kernels = 0
         left_s = after_s  # of compiling, before the next line
-        told = False
+        printed = False
 
         def on_start(self, event: event.Event) -> None:
             with lock:
@@ -96,22 +96,24 @@ def compiling_told(
                     self.timer.cancel()
                     self.left_s -= to_s(clock.now_ns() - self.began_ns)
                     if self.left_s <= 0:
-                        self.tell()
+                        self.print_line()
 
         def wait(self) -> None:
-            self.began_ns, self.timer = clock.now_ns(), threading.Timer(self.left_s, self.tell_meanwhile)
+            self.began_ns, self.timer = clock.now_ns(), threading.Timer(self.left_s, self.print_meanwhile)
             self.timer.daemon = True
             self.timer.start()
 
-        def tell_meanwhile(self) -> None:
+        def print_meanwhile(self) -> None:
             with lock:
                 if self.depth > 0 and self.timer is threading.current_thread():  # else it was too late to cancel it
-                    self.tell()
+                    self.print_line()
                     self.wait()
 
-        def tell(self) -> None:
-            console.print(f"{self.kernels} kernels so far" if self.told else COMPILING, soft_wrap=True, highlight=False)
-            self.told, self.left_s = True, again_s
+        def print_line(self) -> None:
+            console.print(
+                f"{self.kernels} kernels so far" if self.printed else COMPILING, soft_wrap=True, highlight=False
+            )
+            self.printed, self.left_s = True, again_s
 
     clock, lock, compiling = WallClock(), threading.Lock(), Compiling()
     event.register(COMPILE, compiling)

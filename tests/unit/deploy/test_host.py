@@ -19,7 +19,7 @@ from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import host
 from swarmwire.deploy.cli import app as cli
-from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, compiling_told, keep_kernels, refusal
+from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, keep_kernels, refusal, report_compiling
 from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
 from tests.support.deploy.runs import called
 
@@ -67,11 +67,11 @@ def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
     out = StringIO()
     console = Console(file=out, width=200)
     one, other = njit(add), njit(add)
-    with compiling_told(console, after_s=0.001):
+    with report_compiling(console, after_s=0.001):
         one(1, 2)
         one(1.0, 2.0)
     assert out.getvalue() == f"{COMPILING}\n"
-    with compiling_told(console, after_s=0.001):
+    with report_compiling(console, after_s=0.001):
         one(3, 4)
     assert out.getvalue() == f"{COMPILING}\n"
     other(1, 2)  # afterwards
@@ -80,7 +80,7 @@ def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
 
 def test_it_is_told_how_far_compiling_has_come():
     out = StringIO()
-    with compiling_told(Console(file=out, width=200), after_s=0.0, again_s=0.0):
+    with report_compiling(Console(file=out, width=200), after_s=0.0, again_s=0.0):
         for _ in range(3):
             njit(add)(1, 2)
     first, *others = out.getvalue().splitlines()
@@ -92,7 +92,7 @@ def test_it_is_told_how_far_compiling_has_come():
 
 def test_what_is_compiled_in_a_moment_is_not_told():
     out = StringIO()
-    with compiling_told(Console(file=out), after_s=1000.0):
+    with report_compiling(Console(file=out), after_s=1000.0):
         njit(add)(1, 2)
     assert out.getvalue() == ""
 

@@ -335,7 +335,7 @@ def test_what_came_while_the_run_was_paused_is_of_the_tick_that_follows() -> Non
     subticks.pass_tick(0, medium, exchange)
     exchange.sends_ns = [clock.time_ns + 500 * MS]
     clock.time_ns += 3000 * MS
-    pace.begin_anew(1, 1.0, 3000 * MS)
+    pace.restart(1, 1.0, 3000 * MS)
     pace.begin()
     subticks.pass_tick(1, medium, exchange)
     assert [put.at_ns for put in medium.puts] == [100 * MS]
@@ -351,7 +351,7 @@ def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> N
         pace.begin()
         pace.hold({0: 0, 3: 1, 7: 2}[work_ms])
     clock.time_ns += 500 * MS
-    pace.begin_anew(3, 1.0, 500 * MS)
+    pace.restart(3, 1.0, 500 * MS)
     pace.begin()
     jitter = pace.jitter.delays()
     assert jitter is not None

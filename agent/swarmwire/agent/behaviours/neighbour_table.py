@@ -15,7 +15,7 @@ NO_ROBOT = -1  # sender in an empty slot
 class Remembered(State):
     """A robot's neighbours, (n, SLOTS); vectors lead from the robot along the axes of the compass.
 
-    An empty slot has the sender `NOBODY`, and is infinitely old.
+    An empty slot has the sender NO_ROBOT, and is infinitely old.
     """
 
     sender: IntColumn = column(NO_ROBOT, width=SLOTS)

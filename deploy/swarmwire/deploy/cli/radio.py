@@ -204,13 +204,13 @@ def _probe_scenario(
     # Imported here: pydantic and numba take a second, which --help should not.
     from rich.console import Console
 
-    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.metrics.drawing.canvas import check_picture
 
     if to is not None:
         check_picture(to)
-    with compiling_told(Console(stderr=True)):
+    with report_compiling(Console(stderr=True)):
         probe = probe_coverage(
             Path(scenario),
             seed=seed,
@@ -240,7 +240,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
     from rich.console import Console
 
     from swarmwire.comms.radio.analysis.contention import contention as contend
-    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.scenario_parts import radio_of
 
     radio = radio_of(preset, settings)
@@ -248,7 +248,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
     most = radio.max_payload_bytes
     if payload_bytes > most:
         raise BadInput("--contention", "", f"expected 0 to {most} bytes, which the radio takes; got {payload_bytes}")
-    with compiling_told(Console(stderr=True)):
+    with report_compiling(Console(stderr=True)):
         found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=measured_s)
     typer.echo(json.dumps(asdict(found)))
 

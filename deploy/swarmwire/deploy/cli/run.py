@@ -119,7 +119,7 @@ def run_shown(
     config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
 ) -> None:
     """Run a scenario into its folder, shown live and afterwards."""
-    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
     from swarmwire.deploy.live.remote_control import Announced
     from swarmwire.deploy.simulation import Simulation, finished
@@ -127,7 +127,7 @@ def run_shown(
     from swarmwire.deploy.terminal.report import print_result
 
     folder = Path(config.out or "")
-    with compiling_told(console):
+    with report_compiling(console):
         simulation = Simulation(config)
         with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
             beside = [(live, "view")] * view + [(page, "page")] * ui
@@ -176,7 +176,7 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.config import Recording, packet_share
-    from swarmwire.deploy.host import compiling_told
+    from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.repetition import CampaignRun, RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.campaign.spec import ABOUT
@@ -195,7 +195,7 @@ def repeat_command(
         repeated = RepeatedRun(folder, runners=runners, out=out, record=record)
     simulation = repeated.simulation
     simulation.watch(run_progress(simulation, console))
-    with leaving_when_hung_up(simulation.interrupt), compiling_told(console):
+    with leaving_when_hung_up(simulation.interrupt), report_compiling(console):
         repetition = repeated.run()
     for arena in repetition.result.arenas:
         console.print(f"seed {arena.seed}: trajectory {arena.trajectory_sha256[:16]}…")

@@ -21,7 +21,7 @@ _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer s
 _FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first
 _CROWD = 200  # robots; in greater swarms trails are of one part and few points
 _CROWD_POINTS = 7
-_NOBODY = np.empty((0, 2, 2))
+_NO_LINES = np.empty((0, 2, 2))
 
 
 def in_range(
@@ -191,13 +191,13 @@ class Swarm:
         self._color(alive, state)
         for layer in self._layers:
             layer.show(position, pose[:, 2].astype(np.float64))
-        self._links.set_segments(_NOBODY if edges is None else link_lines(position, edges, self._static))
+        self._links.set_segments(_NO_LINES if edges is None else link_lines(position, edges, self._static))
         self._links.set_alpha(_link_opacity(0 if edges is None else len(edges)))
         self._show_trails(trail)
 
     def _show_trails(self, trail: AnyArray | None) -> None:
         if trail is None or len(trail) < 2:
-            self._trails.set_segments(_NOBODY)
+            self._trails.set_segments(_NO_LINES)
             return
         points = min(len(trail), _CROWD_POINTS) if self._crowd else len(trail)
         kept = trail[np.round(np.linspace(0, len(trail) - 1, points)).astype(int)]

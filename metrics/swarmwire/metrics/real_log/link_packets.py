@@ -15,7 +15,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.real_log.robot_log import ReceivedPackets, SentPackets
 
-EVERYBODY, NOBODY = -1, -2  # of `to`: all others; a robot that is not of these
+ALL, UNKNOWN = -1, -2  # of `to`: all others; a robot that is not of these
 REORDERED = 50  # numbers that a packet may come late by
 MAX_LOST = 10_000_000
 USUAL = 0.99  # share of packets
@@ -39,7 +39,7 @@ class OwnPackets:
     key: IntArray  # (n,) rising: the number, and which start of the agent it is of
     sequence: IntArray  # (n,)
     sent_s: FloatArray  # (n,) rising, as far as clocks are right
-    to: IntArray  # (n,) a place in the names, EVERYBODY or NOBODY
+    to: IntArray  # (n,) a place in the names, ALL or UNKNOWN
     size_bytes: IntArray  # (n,)
     tag: IntArray  # (n,)
     too_large: BoolArray  # (n,) never on air
@@ -124,13 +124,13 @@ def _columns(
     tags: dict[str, int],
     too_large: BoolArray,
 ) -> tuple[Any, ...]:
-    to = np.array([EVERYBODY if not name else place.get(name, NOBODY) for name in of.to], np.int64)
+    to = np.array([ALL if not name else place.get(name, UNKNOWN) for name in of.to], np.int64)
     tag = np.array([tags.setdefault(name, len(tags)) for name in of.tag], np.int64)
     return of.sequence, sent_s, to, of.size_bytes, tag, too_large
 
 
 def _filled(of: OwnPackets, where: str) -> OwnPackets:
-    """With the packets that nobody received, as if sent evenly between those around them, to everybody."""
+    """With the packets that no robot received, as if sent evenly between those around them, to all."""
     missed = np.where(np.diff(of.key // _EPOCH) == 0, np.diff(of.key) - 1, 0) if len(of.key) else of.key
     if missed.sum() > MAX_LOST:
         raise BadInput(where, "seq", f"leaves {missed.sum()} packets out; expected {MAX_LOST} lost in all at most")
@@ -150,7 +150,7 @@ def _filled(of: OwnPackets, where: str) -> OwnPackets:
         key[order],
         key[order] % _EPOCH,
         sent_s,
-        with_lost(of.to, EVERYBODY),
+        with_lost(of.to, ALL),
         with_lost(of.size_bytes, 0),
         with_lost(of.tag, 0),
         with_lost(of.too_large, 0),
@@ -163,7 +163,7 @@ def _link(sender_node: Node, sender: int, packets: OwnPackets, node: Node, recei
     received = node.received.by_sender.get(sender_node.name, _NOTHING)
     span = node.span_s or _span_s(received.sent_s)
     # Its own log knows whom a packet was meant for; without it all that could be received counts.
-    meant = (packets.to == EVERYBODY) | (packets.to == receiver) | (sender_node.sent is None)
+    meant = (packets.to == ALL) | (packets.to == receiver) | (sender_node.sent is None)
     listened = (packets.sent_s >= span[0]) & (packets.sent_s <= span[1])
     kept = meant & listened & ~packets.too_large
     # Every packet received is among those of its sender.

@@ -12,7 +12,7 @@ from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NO_ROBOT, Boundary, Group, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.real_log.link_packets import (
-    EVERYBODY,
+    ALL,
     LinkPackets,
     Node,
     OwnPackets,
@@ -218,12 +218,12 @@ def _rows(links: LinkPackets, own: tuple[OwnPackets, ...], robots: int, base: Ti
     # Packets that may still have been received after the last tick are not lost.
     late = ~received & (links.sent_s > base.end_s - usual_latency_s(links))
     final_ns[late] = AFTER_ALL_NS
-    everybody = [np.where(of.to[rows] == EVERYBODY, robots - 1, of.to[rows] >= 0) for _, of, rows in large]
+    intended = [np.where(of.to[rows] == ALL, robots - 1, of.to[rows] >= 0) for _, of, rows in large]
     return ReceptionRecords(
         arena=np.zeros(len(to), np.int64),
         sender=with_large(links.sender, [np.full(len(rows), sender) for sender, _, rows in large]),
         receiver=with_large(links.receiver, [zeros + NO_ROBOT]),
-        receivers=with_large(np.ones(len(received), np.int64), everybody),
+        receivers=with_large(np.ones(len(received), np.int64), intended),
         to=to,
         sequence=with_large(links.sequence, [of.sequence[rows] for _, of, rows in large]),
         sent_at_ns=sent_ns,

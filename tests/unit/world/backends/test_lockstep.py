@@ -372,7 +372,7 @@ def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
     pace.begin()
     pace.hold(0)
     clock.time_ns += 3600 * NS_PER_S
-    pace.begin_anew(1, 2.0, 3600 * NS_PER_S)
+    pace.restart(1, 2.0, 3600 * NS_PER_S)
     assert pace.begin() == ORIGIN_NS + 100 * MS  # when it would be without the pause
     pace.hold(1)
     pace.hold(2)

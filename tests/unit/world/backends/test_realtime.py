@@ -315,7 +315,7 @@ def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it
     pace.hold(0)
     assert taken(runners) == ({}, [])
     clock.time_ns += pause_ns
-    pace.begin_anew(1, 1.0, pause_ns)
+    pace.restart(1, 1.0, pause_ns)
     runners.open_tick(1, pace.begin(), one_group(1, ROWS), ReceivedPackets.none(MEASURES))
     assert not runners.losses
     for name in OWN:

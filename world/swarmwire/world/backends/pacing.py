@@ -115,7 +115,7 @@ class Pace:
         first_ns = self.begin() + self._paused_ns if self._first_ns is None else self._first_ns
         return first_ns + round(self._span_ns(tick) / self.factor)
 
-    def begin_anew(self, tick: int, factor: float, paused_ns: int = 0) -> None:
+    def restart(self, tick: int, factor: float, paused_ns: int = 0) -> None:
         """Start a new schedule with this tick, now, after a pause of this length; the lag is reset."""
         self.factor, self._first_tick, self._first_ns = factor, tick, self._clock.now_ns()
         self._next_ns = None
@@ -144,7 +144,7 @@ class Pace:
 
     def _stalled(self, tick: int, for_ns: int) -> None:
         """Continue from here: the stalled time counts as a pause."""
-        self.begin_anew(tick + 1, self.factor, for_ns)
+        self.restart(tick + 1, self.factor, for_ns)
         self.lag_ns = 0
         self._warn(f"the loop stalled for {to_s(for_ns):.1f} s in tick {tick}; the schedule restarts from there")
 

@@ -203,7 +203,7 @@ class GatewayBackend:
         """Restart the schedule if the loop lags by more than a tick."""
         pace = self._pace
         if pace.lag_ns > tick_start_ns(1, self._rate_hz) / pace.factor:
-            pace.begin_anew(tick + 1, pace.factor)
+            pace.restart(tick + 1, pace.factor)
 
     def _gateway_places(self, rows: IntArray) -> IntArray:
         """The indices of these rows (k,) that belong to robots behind gateways."""

@@ -124,7 +124,7 @@ def _refresh_arena(params, state, events, arena, now_ns):
     jam = state.jam
     for i in range(params.robots):
         r = arena * params.robots + i
-        jam_mw = 0.0  # summed anew each time, so that no rounding error accumulates
+        jam_mw = 0.0  # summed again each time, so that no rounding error accumulates
         for j in range(len(jam.arena)):
             if jam.arena[j] == arena and jam.is_on[j]:
                 jam_mw += jam.power_mw[j, i]

@@ -49,9 +49,7 @@ def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
                 chord_m = chord_in_obstacle(ax, ay, dx, dy, length, obstacles, k)
                 if chord_m > 0.0:
                     crossed = _insert(entered, crossed, k, chord_m)
-    for i in range(
-        crossed
-    ):  # in the order of obstacles, whatever their cells, since the last bit of a sum depends on it
+    for i in range(crossed):  # in the order of obstacles, not of their cells, since the last bit of a sum depends on it
         inside_m += entered[i, 1]
     return crossed, inside_m
 

@@ -17,9 +17,9 @@ from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.sensors.simple import BatterySpec
 
 PROXIMITY_FULL = 4095  # 12 bits
-AMBIENT_DARK = 4000  # what the proximity sensors tell of ambient light in the dark
+AMBIENT_DARK = 4000  # reading of ambient light in the dark
 GROUND_BLACK, GROUND_WHITE = 0, 1000  # of robots with uncalibrated ground sensors
-SEES_NOTHING_MM = 8190  # what the time-of-flight sensor tells then
+SEES_NOTHING_MM = 8190  # reading of the time-of-flight sensor then
 DISTANCE_AHEAD_M = 0.035  # of the body's centre: where the time-of-flight sensor sits
 PER_G = 800  # of the accelerometer
 PER_MPS2 = PER_G / 9.80665

@@ -33,7 +33,7 @@ def open_router(endpoint: str) -> tuple[zenoh.Session, str]:
     """
     more: dict[str, object] = {
         "listen": {"endpoints": [endpoint]},
-        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},  # tells the port
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},  # reports the port
     }
     session = zenoh.open(_config("router", more, gossip=True))
     for reply in session.get(f"@/{session.zid()}/router", timeout=2.0):

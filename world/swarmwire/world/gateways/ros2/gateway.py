@@ -76,7 +76,7 @@ class Ros2Gateway(Gateway):
         for base, lives in zip(self._bases, alive, strict=True):
             base.show() if lives else base.hide()
         for place, (broadcaster, rate) in enumerate(zip(self._broadcasters, self._rates, strict=True)):
-            if rate.is_due(time_ns) and broadcaster.is_told(fields):
+            if rate.is_due(time_ns) and broadcaster.is_published(fields):
                 broadcaster.follow(time_ns, fields)
                 for row in np.flatnonzero(alive):
                     self._tell(place, int(row), fields, stamp_ns)

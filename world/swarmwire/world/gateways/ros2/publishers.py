@@ -72,7 +72,7 @@ class Broadcaster(ABC):
     topic: str
     rate_hz: float
 
-    def is_told(self, fields: Fields) -> bool:
+    def is_published(self, fields: Fields) -> bool:
         """Whether there is anything to publish."""
         return any(name in fields for name in self.reads)
 
