@@ -8,6 +8,7 @@ and with the fork server, for any agent.
 import ctypes
 import gc
 import os
+import resource
 import signal
 import socket
 import sys
@@ -41,7 +42,7 @@ from swarmwire.agent.process_frames import (
     write_actions,
 )
 from swarmwire.comms.assignment import Assignment, GroupAssignment, part_of
-from swarmwire.comms.errors import AgentFailed, BadFrame
+from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory, decode_memory, encode_memory
@@ -57,10 +58,11 @@ class ForkServer:
     def __init__(self) -> None:
         """Fork it from this process, which must have no other thread."""
         self._socket, of_server = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        host = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
             self._socket.close()
-            _end_with_parent()
+            _end_with_parent(host)
             _exit_after(lambda: _serve_forks(of_server))
         of_server.close()
 
@@ -73,14 +75,19 @@ class ForkServer:
     ) -> list[socket.socket]:
         """Fork a process for each of these lists of robot rows; returns the sockets to them.
 
-        `memory` is a frame with that of earlier agents; None: the world keeps none.
+        `memory` is a frame with that of earlier agents; None: the world keeps none. BadInput if this process may not
+        open so many files.
         """
         request = {"assignment": assignment.as_mapping(), "rows": [list(of) for of in rows], "memory": memory}
         send(self._socket, (message(FORK, request),))
         sockets: list[socket.socket] = []
         for _ in rows:
-            _, (file,), _, _ = socket.recv_fds(self._socket, 1, 1)
-            sockets.append(socket.socket(fileno=file))
+            _, files, _, _ = socket.recv_fds(self._socket, 1, 1)
+            if not files:  # the system drops what this process has no room for
+                limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+                expected = f"expected fewer than {len(rows)} processes, or a limit above {limit} open files (ulimit -n)"
+                raise BadInput("--processes", "", expected)
+            sockets.append(socket.socket(fileno=files[0]))
         return sockets
 
     def end(self, process: int) -> str:
@@ -130,11 +137,12 @@ def _serve_forks(control: socket.socket) -> None:
 
 def _fork(control: socket.socket, assignment: Assignment, memory: bytes | None) -> int:
     of_host, of_process = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    server = os.getpid()
     pid = os.fork()
     if pid == 0:
         control.close()
         of_host.close()
-        _end_with_parent()
+        _end_with_parent(server)
         with suppress(OSError):  # without memory, the system is to end this process and not the world
             Path("/proc/self/oom_score_adj").write_text("500")
         _exit_after(lambda: serve(of_process, lambda: agents_of(assignment, memory)))
@@ -149,9 +157,9 @@ def _in_words(status: int) -> str:
     return f"ended with exit code {code}" if code >= 0 else f"was ended by {signal.Signals(-code).name}"
 
 
-def _end_with_parent() -> None:
+def _end_with_parent(parent: int) -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() == 1:
+    if os.getppid() != parent:  # it ended before; not 1: in a container, the host itself may be process 1
         os._exit(1)
 
 

@@ -23,7 +23,7 @@ from swarmwire.agent.process_frames import (
     TickCutter,
     content,
     message,
-    receive,
+    receive_part,
     record_fields,
     send,
 )
@@ -46,6 +46,7 @@ class AgentProcess:
     next_tick: Buffers = field(default_factory=list[bytes | memoryview])  # that waits while it is busy
     next_packets: deque[Buffers] = field(default_factory=deque[Buffers])
     fields_known: int = 0  # groups whose fields it has
+    parts: list[bytes] = field(default_factory=list[bytes])  # of a frame that has not arrived whole
 
     @property
     def rows(self) -> IntArray:
@@ -141,9 +142,11 @@ class AgentProcesses:
         for file, _ in self._poll.poll(0, max(len(self._processes), 1)):
             process = self._processes[file]
             try:
-                frame = receive(process.socket)
+                frame = receive_part(process.socket, process.parts)
             except OSError:
                 frame = b""
+            if frame is None:  # its process may freeze before it sends the rest: the others do not wait for it
+                continue
             if not frame:
                 events.append(self.lose(process, ""))
                 continue

@@ -103,6 +103,8 @@ def join(
     BadInput for wrong settings, RunnerLost if the world is not there or refuses the runner.
     """
     settings.check()
+    if processes is not None and processes < 1:
+        raise BadInput("--processes", "", f"expected at least 1, got {processes}")
     runner = settings.runner
     try:
         session = open_runner(settings.endpoint, settings.connect_s, settings.network)

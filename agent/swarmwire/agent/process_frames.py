@@ -17,7 +17,7 @@ statuses, then payloads. Nothing is checked here: both ends are one program on o
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from select import select
+from select import POLLOUT, poll
 from socket import socket
 from struct import Struct
 from typing import Any, NamedTuple
@@ -51,6 +51,7 @@ ANSWER_OF_ONE = Struct("<7q4d")  # ANSWER_HEAD, ROW and COMMAND: the answer of a
 SENT_PACKET = Struct("<4q")  # sender row, to, tx status id or NOT_MEASURED, size in bytes
 KIND = Struct("<q")  # after the bytes of the frame
 MAX_MESSAGE = 1 << 16  # bytes of a message of a socket; a larger frame is several
+SEND_TIMEOUT_MS = 1000  # for a process to read what fills its socket
 NOT_ACTING = -1
 
 
@@ -272,16 +273,26 @@ def frame_kind(frame: bytes) -> int:
 
 def receive(sock: socket) -> bytes:
     """The next frame; empty if the other end is closed."""
+    parts: list[bytes] = []
+    while (frame := receive_part(sock, parts)) is None:
+        pass
+    return frame
+
+
+def receive_part(sock: socket, parts: list[bytes]) -> bytes | None:
+    """Receive one message; returns the frame that it ends, empty if the other end is closed, or None.
+
+    `parts` holds the messages of a frame that is not yet whole.
+    """
     data = sock.recv(MAX_MESSAGE)
-    if len(data) < MAX_MESSAGE:
+    if not data or (not parts and len(data) < MAX_MESSAGE):
         return data
-    parts, missing = [data], KIND.unpack_from(data)[0] - len(data)
-    while missing and data:
-        select([sock], [], [])
-        data = sock.recv(MAX_MESSAGE)
-        parts.append(data)
-        missing -= len(data)
-    return b"".join(parts) if data else b""
+    parts.append(data)
+    if sum(map(len, parts)) < KIND.unpack_from(parts[0])[0]:
+        return None
+    frame = b"".join(parts)
+    parts.clear()
+    return frame
 
 
 def send(sock: socket, buffers: Sequence[bytes | memoryview]) -> None:
@@ -294,7 +305,9 @@ def send(sock: socket, buffers: Sequence[bytes | memoryview]) -> None:
         try:
             sock.send(data[start : start + MAX_MESSAGE])
         except BlockingIOError:
-            select([], [sock], [], 1.0)
+            writable = poll()  # `select` takes no file above 1023, and a host has a socket per robot
+            writable.register(sock, POLLOUT)
+            writable.poll(SEND_TIMEOUT_MS)
             sock.send(data[start : start + MAX_MESSAGE])
 
 

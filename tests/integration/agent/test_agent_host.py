@@ -49,6 +49,21 @@ act_every_ticks = 2
 params = { lane = [0, 1, 2, 3] }
 """
 
+FORKS = """
+{before}
+from contextlib import closing
+
+from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.process_frames import READY, frame_kind, receive
+from tests.support.agent.hosts import assignment, group, spec
+
+with closing(ForkServer()) as server:
+    sockets = server.fork(assignment(group(spec("Counter"), [*range(40)])), [[row] for row in range(40)])
+    assert all(frame_kind(receive(sock)) == READY for sock in sockets)
+"""
+PROCESS_1 = "import os; os.getpid = os.getppid = lambda: 1"  # as in a container whose only program is the host
+FEW_FILES = "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (30, 30))"
+
 
 class AgentHost:
     """An agent host of two processes, with a pipe to its life line."""
@@ -133,6 +148,27 @@ def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[AgentHos
     close_life_line(agent_host)
     assert agent_host.ended()[0] == 0
     assert not folder.exists()
+
+
+def forked(before: str) -> subprocess.CompletedProcess[str]:
+    """A program that forks a process for each of 40 robots, after these lines of Python."""
+    return subprocess.run(
+        [sys.executable, "-c", FORKS.format(before=before)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT_S,
+    )
+
+
+def test_a_host_may_be_process_1() -> None:
+    done = forked(PROCESS_1)
+    assert done.returncode == 0, done.stderr
+
+
+def test_more_processes_than_open_files_are_refused_with_the_limit() -> None:
+    done = forked(FEW_FILES)
+    assert "--processes: expected fewer than 40 processes, or a limit above 30 open files" in done.stderr
 
 
 @pytest.fixture

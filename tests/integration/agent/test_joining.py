@@ -170,6 +170,12 @@ def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict
         join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), print, SERVER)
 
 
+@pytest.mark.parametrize("processes", [0, -1])
+def test_a_number_of_processes_is_at_least_1(processes: int) -> None:
+    with pytest.raises(BadInput, match=f"--processes: expected at least 1, got {processes}"):
+        join(JoinSettings("tcp/127.0.0.1:1"), Arrivals(), print, SERVER, processes)
+
+
 def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:
     certified = Network(ca=Path("ca.pem"), certificate=Path("lab/alice.pem"), key=Path("lab/alice.key"))
     assert JoinSettings("tcp/127.0.0.1:1", network=certified).runner == "alice"

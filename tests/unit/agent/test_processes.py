@@ -1,24 +1,30 @@
 """Robots in processes of their own act as in one process, bit for bit: frames that are cut, steps without arrays."""
 
+import fcntl
+import resource
 import socket
 import threading
-from typing import Any
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.agent_process import ManyRobots, agents_of
+from swarmwire.agent.agent_process import ForkServer, ManyRobots, agents_of
 from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.host_processes import AgentProcesses
 from swarmwire.agent.one_robot import OneRobotAgent
-from swarmwire.agent.process_frames import message, receive, send
+from swarmwire.agent.process_frames import MAX_MESSAGE, READY, message, receive, send
+from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.agent_memory import encode_memory
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
-from tests.support.agent.processes import Processes
+from tests.support.agent.processes import Processes, ThreadServer
 
 ROWS = range(6)
 AGENTS = ("Chatter", "Counter", "Insisting", "VectorInsisting", "VectorCounter")
@@ -139,3 +145,65 @@ def test_a_frame_of_any_size_arrives_whole() -> None:
             sender.start()
             assert receive(theirs) == frame
             sender.join()
+
+
+HIGH_FILE = 1500  # above FD_SETSIZE, the bound of `select`
+
+
+@pytest.fixture
+def many_files() -> Iterator[None]:
+    """This process may open more files than `select` can wait for."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard <= HIGH_FILE:
+        pytest.skip(f"needs a hard limit above {HIGH_FILE} open files, has {hard}")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 2 * HIGH_FILE) if hard == -1 else hard, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+@pytest.mark.usefixtures("many_files")
+def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
+    """A host has a socket per process, and so sockets whose numbers `select` cannot take."""
+    low, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours = socket.socket(fileno=fcntl.fcntl(low, fcntl.F_DUPFD, HIGH_FILE))
+    frame = message(0, b"x" * 1_000_000)
+    with low, ours, theirs:
+        ours.setblocking(False)
+        received: list[bytes] = []
+        receiver = threading.Thread(target=lambda: received.append(receive(theirs)), daemon=True)
+        receiver.start()
+        send(ours, [frame])
+        receiver.join(10.0)
+    assert received == [frame]
+
+
+class Scripted(ThreadServer):
+    """A server whose processes are the other ends of sockets in the test's hands."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.processes: list[socket.socket] = []
+
+    def fork(
+        self, assignment: Assignment, rows: Sequence[Sequence[int]], memory: bytes | None = None
+    ) -> list[socket.socket]:
+        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in rows]
+        self.processes = [of_process for _, of_process in pairs]
+        return [of_host for of_host, _ in pairs]
+
+
+def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
+    server, whole = Scripted(), assignment(group(spec("Echo"), [0, 1]))
+    processes = AgentProcesses(cast("ForkServer", server), whole, 2, None)
+    with closing(processes), server.processes[0] as freezes, server.processes[1] as lives:
+        frame = message(READY, b"x" * 100_000)
+        freezes.send(frame[:MAX_MESSAGE])
+        lives.send(message(READY, None))
+        reading = threading.Thread(target=processes.events, args=(0,), daemon=True)
+        reading.start()
+        reading.join(10.0)
+        assert not reading.is_alive()
+        assert not processes.are_ready
+        freezes.send(frame[MAX_MESSAGE:])
+        processes.events(0)
+        assert processes.are_ready
