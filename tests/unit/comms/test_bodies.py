@@ -53,7 +53,7 @@ def test_a_sheet_that_is_like_another_goes_by_its_own_name_or_its_file_s() -> No
 
 
 def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(BadInput, match=r"body: expected one of epuck, .*; got 'roomba'"):
+    with pytest.raises(BadInput, match=r"body: expected one of crazyflie, epuck, .*; got 'roomba'"):
         load_body("roomba")
 
 

@@ -22,6 +22,8 @@ from swarmwire.comms.sensors.simple import (
     BumperSpec,
     CompassReading,
     CompassSpec,
+    FlowReading,
+    FlowSpec,
     GroundReading,
     GroundSpec,
     OdometryReading,
@@ -51,6 +53,7 @@ class Sensors(Generic[N]):
     camera = SensorProperty(CameraSpec, CameraReading.of, CameraReadings)
     imu = SensorProperty(ImuSpec, ImuReading[float], ImuReading[FloatArray])
     battery = SensorProperty(BatterySpec, BatteryReading[float], BatteryReading[FloatArray])
+    flow = SensorProperty(FlowSpec, FlowReading[float], FlowReading[FloatArray])
 
     @abstractmethod
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:

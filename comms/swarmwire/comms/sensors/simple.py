@@ -1,4 +1,4 @@
-"""Sensors of the robot itself: `battery`, `bumper`, `compass`, `odometry`, `positioning`, and `ground` below it."""
+"""Sensors of the robot itself: `battery`, `bumper`, `compass`, `flow`, `odometry`, `positioning`, `ground` below it."""
 
 from dataclasses import dataclass
 from math import hypot, pi
@@ -127,6 +127,42 @@ class CompassReading(Generic[N]):
     """The heading of the body."""
 
     heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
+
+
+@dataclass(frozen=True)
+class FlowSpec(SensorSpec):
+    """Optical flow and height: velocity over the floor in the body's frame. Readings: forward_mps, left_mps (n,)."""
+
+    truth: ClassVar[str] = "swarmwire.world.sensors.simple:FlowSensor"
+
+    noise_mps: float = parameter(
+        0.0, help="standard deviation of the error along each axis, new in each tick", unit="m/s", at_least=0
+    )
+
+    @classmethod
+    def example(cls) -> Self:
+        """As `SensorSpec.example`."""
+        return cls(noise_mps=0.1)
+
+    def reading_fields(self) -> tuple[Field, ...]:
+        """As `SensorSpec.reading_fields`."""
+        noise, step = Noise("normal", self.noise_mps), self.step
+        return (
+            Field("forward_mps", 0, noise, step, unit="m/s", help="velocity ahead, over the floor"),
+            Field("left_mps", 0, noise, step, unit="m/s", help="velocity to the left, over the floor"),
+        )
+
+    def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
+        """As `SensorSpec.synthetic`."""
+        return tuple(draw(field.name, 0) * 2.0 - 1.0 for field in self.reading_fields())
+
+
+@dataclass(frozen=True)
+class FlowReading(Generic[N]):
+    """The velocity over the floor, in the body's frame."""
+
+    forward_mps: N
+    left_mps: N  # positive to the left
 
 
 @dataclass(frozen=True)

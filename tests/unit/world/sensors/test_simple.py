@@ -14,7 +14,7 @@ from swarmwire.comms.draws import normal, purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.sensors.imu import ImuSpec
-from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec, PositioningSpec
+from swarmwire.comms.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler
@@ -236,6 +236,17 @@ def test_the_error_is_normal_and_keyed_by_robot_tick_and_axis() -> None:
         assert np.allclose(noisy[field], poses[:, axis] + error)
         assert noisy[field].flags.c_contiguous
     assert np.array_equal(looked_at.state[0, :, :3], poses)
+
+
+def test_flow_is_the_velocity_in_the_bodys_frame() -> None:
+    looked_at = scene(np.zeros((2, 3)), GPS)
+    put(looked_at, 0.5 * np.pi, [0.3, 0.1])
+    exact = read(looked_at, GPS, "flow", FlowSpec(), 4)
+    assert exact["flow.forward_mps"] == pytest.approx([0.1, 0.1])  # it looks along +y
+    assert exact["flow.left_mps"] == pytest.approx([-0.3, -0.3])
+    noisy = read(looked_at, GPS, "flow", FlowSpec(noise_mps=0.1), 4)
+    error = 0.1 * normal(7, np.arange(2), 4, 0, purpose("flow.forward_mps noise"))
+    assert noisy["flow.forward_mps"] == pytest.approx(0.1 + error)
 
 
 def test_a_body_without_it_is_refused_to_an_agent_that_needs_it() -> None:

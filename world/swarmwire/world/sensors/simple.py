@@ -1,4 +1,4 @@
-"""Sensors that read the robot's own state: battery, bumper, compass, positioning, odometry and ground colour."""
+"""Sensors that read the robot's own state: battery, bumper, compass, positioning, flow, odometry and ground colour."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -17,6 +17,7 @@ from swarmwire.comms.sensors.simple import (
     BatterySpec,
     BumperSpec,
     CompassSpec,
+    FlowSpec,
     GroundSpec,
     OdometrySpec,
     PositioningSpec,
@@ -68,6 +69,17 @@ class PositioningSensor(BuiltInSensor[PositioningSpec]):
         """The position of every robot of the group."""
         state = self.scene.state[:, self.group.start : self.group.stop]
         return state[:, :, 0].copy(), state[:, :, 1].copy()
+
+
+class FlowSensor(BuiltInSensor[FlowSpec]):
+    """Sensor `flow`: forward_mps, left_mps (n,), the velocity in the body's frame; normal noise, new in every tick."""
+
+    def truth(self, tick: int) -> tuple[FloatArray, ...]:
+        """The velocity of every robot of the group."""
+        state = self.scene.state[:, self.group.start : self.group.stop]
+        heading, vx, vy = state[:, :, 2], state[:, :, 3], state[:, :, 4]
+        cos, sin = np.cos(heading), np.sin(heading)
+        return cos * vx + sin * vy, cos * vy - sin * vx
 
 
 class OdometrySensor(BuiltInSensor[OdometrySpec]):
