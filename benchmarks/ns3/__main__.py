@@ -21,6 +21,7 @@ from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
 from benchmarks.ns3.speed import speed
 from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.atomic import atomic_write
 
 TEACH = """\
 ns-3 and the medium get the same nodes, places and send times, seed by seed; figures
@@ -115,11 +116,15 @@ def _run(configurations: list[Configuration], cache: Path, processes: int) -> di
     with Progress(*columns, console=Console(stderr=True)) as progress, ProcessPoolExecutor(processes, spawn) as pool:
         bar = progress.add_task("ns-3", total=len(files), completed=len(found))
         begun = {pool.submit(theirs, each): each for each in files if each not in found}
-        for done in as_completed(begun):
-            each, received = begun[done], done.result()
-            np.savez_compressed(files[each], packets=received.packets, delay_ns=received.delay_ns)
-            found[each] = figures_of(each, received)
-            progress.update(bar, advance=1, description=f"ns-3: {' '.join(each.cells)}")
+        try:
+            for done in as_completed(begun):
+                each, received = begun[done], done.result()
+                with atomic_write(files[each]) as aside:  # a half of a file would be read in the next comparison
+                    np.savez_compressed(aside, packets=received.packets, delay_ns=received.delay_ns)
+                found[each] = figures_of(each, received)
+                progress.update(bar, advance=1, description=f"ns-3: {' '.join(each.cells)}")
+        finally:  # after Ctrl-C or an error the pool would run all that is left, for hours
+            pool.shutdown(wait=False, cancel_futures=True)
     return found
 
 

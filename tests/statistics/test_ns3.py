@@ -2,11 +2,14 @@
 
 import multiprocessing
 import re
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from functools import partial
 from importlib.util import find_spec
 from itertools import groupby, pairwise
 from math import comb, exp, hypot, log10
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +30,7 @@ from benchmarks.ns3.comparison import (
     table,
 )
 from benchmarks.ns3.configurations import SECTIONS, Configuration
-from benchmarks.ns3.simulators import ours, theirs
+from benchmarks.ns3.simulators import Received, ours, theirs
 from swarmwire.comms.errors import BadInput
 
 RECORD = recorded()
@@ -151,6 +154,49 @@ def test_the_command_compares_with_the_record_without_ns3(
     assert command.main(["--only", "distance", "--recorded"]) == 0
     out = capsys.readouterr().out
     assert out.count("| 802.15.4 0.25M |") == len([one for one in SECTIONS["distance"]() if one.standard == "802.15.4"])
+
+
+def test_an_interrupted_comparison_keeps_no_half_of_a_file_and_runs_nothing_more(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    begun: list[Configuration] = []
+
+    def ns3(one: Configuration) -> Received:
+        begun.append(one)
+        counts = np.zeros((one.seeds, one.nodes, one.nodes), np.int64)
+        return Received(counts, counts)
+
+    def interrupted(file: Path, **_: np.ndarray) -> None:
+        file.write_bytes(b"PK")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "find_spec", lambda _: True)
+    monkeypatch.setattr(command, "theirs", ns3)
+    monkeypatch.setattr(command, "ProcessPoolExecutor", OneAtATime)
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        command.main(["--only", "distance", "--cache", str(tmp_path)])
+    assert list(tmp_path.iterdir()) == []
+    assert len(begun) < len(SECTIONS["distance"]())
+
+
+class OneAtATime(Executor):
+    """A pool that does the first task at once, and the rest at its end unless they are cancelled."""
+
+    def __init__(self, *_: object) -> None:
+        self._left: list[tuple[Future[Received], Callable[[], Received]]] = []
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Received] = Future()
+        if not self._left:
+            future.set_result(fn(*args, **kwargs))
+        self._left.append((future, partial(fn, *args, **kwargs)))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        for future, work in self._left:
+            if not future.done() and not (cancel_futures and future.cancel()):
+                future.set_result(work())
 
 
 def test_a_part_is_not_recorded(capsys: pytest.CaptureFixture[str]):
