@@ -59,6 +59,16 @@ def _delay(sender, receiver, final_at_ns, order, first):
             final_at_ns[now] = max(final_at_ns[now], final_at_ns[previous])
 
 
+def _check(radio: Radio, traces: LinkTraces | None, boundary: Boundary) -> None:
+    """ValueError for a radio without what its model needs, or that does not fit the boundary."""
+    if not radio.is_phy and radio.range_m is None:
+        raise ValueError("range_m: expected a range, as a unit disk has one")
+    if (radio.trace is None) != (traces is None):
+        raise ValueError("traces: expected the content of the radio's trace file, and None without one")
+    if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
+        raise ValueError(f"{unfit}: expected a unit disk without bodies_block on a torus")
+
+
 class RadioMedium:
     """The emulated medium of every arena of a world; robot row r is robot r % robots of arena r // robots.
 
@@ -100,12 +110,7 @@ class RadioMedium:
         without `range_m`, a trace without its file or the other way round, or a radio that `unfit_for_torus` refuses on
         a torus.
         """
-        if not radio.is_phy and radio.range_m is None:
-            raise ValueError("range_m: expected a range, as a unit disk has one")
-        if (radio.trace is None) != (traces is None):
-            raise ValueError("traces: expected what the file of the radio's trace holds, and nothing without one")
-        if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
-            raise ValueError(f"{unfit}: expected a unit disk without bodies_block on a torus")
+        _check(radio, traces, boundary)
         rows = len(keys) * robots
         self.radio, self._robots = radio, robots
         self._disruption = Disruption.none(rows)  # of the last `step`
@@ -114,18 +119,10 @@ class RadioMedium:
         robot_antennas = antennas or Antennas.alike(robots)
         self._running: BoolArray = np.ones(len(keys), np.bool_)
         obstacle_indices = ObstacleIndices(obstacles, size_m, 0.0, obstacles_move=obstacles_move)
+        self._threads = Threads(threads)
         arena_facts = keys, robots, obstacle_indices, size_m, radii_m
-        context = ChannelContext(
-            radio,
-            *arena_facts,
-            self._active,
-            robot_antennas,
-            self._running,
-            traces,
-            boundary == "torus",
-            Threads(threads),
-        )
-        self._threads = context.threads
+        state = self._active, robot_antennas, self._running
+        context = ChannelContext(radio, *arena_facts, *state, traces, boundary == "torus", self._threads)
         period_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, keys, period_ticks, rate_hz)
         self._model: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
