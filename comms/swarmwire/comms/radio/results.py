@@ -13,7 +13,7 @@ from operator import add
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet
@@ -29,15 +29,21 @@ NO_EDGES = np.empty((0, 2), np.int64)
 def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
     """The rows of `index` (k,), at least one, sorted by (receiver, received_at, sender); stable, (k,)."""
     order = index.view(np.uint64)
-    for k in range(1, len(order)):
-        if sender[order[k]] < sender[order[k - 1]]:  # seldom: packets of a tick are sorted by sender
-            order = _counting_sort(order, sender, rows)
-            break
+    if not _rises(order, received_at_ns):
+        order = _counting_sort(order, *_time_parts(order, received_at_ns))
     # Roughly by time, then by receiver: the insertion sort then moves almost nothing.
-    order = _counting_sort(order, *_time_parts(order, received_at_ns))
     order = _counting_sort(order, receiver, rows)
-    _insertion_sort(order, receiver, received_at_ns)
+    _insertion_sort(order, receiver, received_at_ns, sender)
     return order.view(np.int64)
+
+
+@njit()
+def _rises(order, at_ns):
+    """Whether rows in this order never go back in time, as the events of a PHY."""
+    k = 1
+    while k < len(order) and at_ns[order[k - 1]] <= at_ns[order[k]]:
+        k += 1
+    return k >= len(order)
 
 
 @njit()
@@ -73,14 +79,21 @@ def _time_parts(order, at_ns):
 
 
 @njit()
-def _insertion_sort(order, receiver, at_ns):
-    """Sort rows that are grouped by receiver by time within each group; in place, stable."""
+def _insertion_sort(order, receiver, at_ns, sender):
+    """Sort rows that are grouped by receiver by (time, sender) within each group; in place, stable."""
     for k in range(1, len(order)):
-        value, place = order[k], k
-        while place > 0 and receiver[order[place - 1]] == receiver[value] and at_ns[order[place - 1]] > at_ns[value]:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = value
+        row, place = order[k], np.uint64(k)
+        while place > 0 and _precedes(row, order[place - np.uint64(1)], receiver, at_ns, sender):
+            order[place] = order[place - np.uint64(1)]
+            place -= np.uint64(1)
+        order[place] = row
+
+
+@kernel()
+def _precedes(row, other, receiver, at_ns, sender):
+    if receiver[row] != receiver[other] or at_ns[row] > at_ns[other]:
+        return False
+    return at_ns[row] < at_ns[other] or sender[row] < sender[other]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,23 +164,20 @@ def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
     # Of each packet: a division for each link would cost as much as all the rest.
     arena = packets[packet.SENDER] // robots
     receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]
-    received, finished, departed, still_open = (
-        np.empty(len(fate), np.int64),
-        np.empty(len(fate), np.int64),
-        np.empty(len(fate), np.int64),
-        np.empty(len(fate), np.int64),
-    )
-    h, f, d, o = 0, 0, 0, 0
-    for row in range(len(fate)):
+    # Each row of `kinds` begins with the links of one kind.
+    kinds = np.empty((4, len(fate)), np.int64)
+    received, finished, departed, still_open = kinds
+    h, f, d, o = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
+    for row in range(np.uint64(len(fate))):
         # Branchless: write first, then advance if it counts.
         received[h], finished[f], departed[d], still_open[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
-        h += final & (fate[row] == RECEIVED)
-        f += final & (fate[row] != OUT_OF_RANGE)
-        d += final & (receiver[row] == THE_REST)
-        o += not final
-        here = arena[packet_of[row]]
-        fates[here, fate[row]] += final * receivers[row]
+        h += np.uint64(final & (fate[row] == RECEIVED))
+        f += np.uint64(final & (fate[row] != OUT_OF_RANGE))
+        d += np.uint64(final & (receiver[row] == THE_REST))
+        o += np.uint64(not final)
+        here = np.uint64(arena[np.uint64(packet_of[row])])
+        fates[here, np.uint64(fate[row])] += final * receivers[row]
         in_range[here] += final * reachable[row]
     index = received[:h]
     if h > 0:

@@ -52,7 +52,8 @@ class RadioGraph:
         Measured values are those at `hold_ns`.
         """
         links, rows, disruption = self._links, len(pose), self._disruption
-        pairs = links.pairs if np.array_equal(pose, links.pose) else links.pairs_at(pose)
+        is_held = pose is links.pose or np.array_equal(pose, links.pose)
+        pairs = links.pairs if is_held else links.pairs_at(pose)
         by_power = not (self._jam.anything or self._losses.varies)
         send_dbm, receive_dbi = links.propagation.send_dbm, links.propagation.receive_dbi
         min_dbm = self._min_dbm if by_power else -math.inf

@@ -75,7 +75,12 @@ class PacketTable:
     def add(self, taken: Transmissions, radio: Radio, robots: int) -> None:
         """Append packets that radios admitted; each arena has `robots` robots."""
         self.queued = self.queued.followed_by(taken)
-        self.table = np.concatenate([self.table, packet_rows(taken, radio, robots)])
+        waiting, table = (
+            len(self.table),
+            np.empty(len(self.queued), PACKET),
+        )  # np.concatenate compares each field's type
+        table[:waiting], table[waiting:] = self.table, packet_rows(taken, radio, robots)
+        self.table = table
 
     def by_sender(self, rows: int) -> tuple[IntArray, IntArray]:
         """Packet indices sorted by sender, then by order of sending; and each robot's first one, (rows + 1,)."""
