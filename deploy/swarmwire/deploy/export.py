@@ -69,11 +69,14 @@ def _write_arena(run: Path, to: Path, options: ExportOptions) -> str:
     from swarmwire.metrics.drawing.animation import FilmFigure
     from swarmwire.metrics.drawing.canvas import check_picture
     from swarmwire.metrics.drawing.film import film_of
+    from swarmwire.metrics.drawing.packets import packets_of
     from swarmwire.metrics.run_folder.reader import RunFolder
 
-    film = film_of(RunFolder(run), options.arena or 0, str(run))
+    folder = RunFolder(run)
+    film = film_of(folder, options.arena or 0, str(run))
     check_picture(to)
-    figure = FilmFigure(film, PICTURE_SIZE_PX if options.size_px is None else options.size_px, options.metrics)
+    size_px = PICTURE_SIZE_PX if options.size_px is None else options.size_px
+    figure = FilmFigure(film, size_px, options.metrics, packets=packets_of(folder, film))
     figure.save(film.index_at(_time_s(options.at_s, film)), to)
     return ""
 
@@ -125,11 +128,14 @@ def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: Expor
     from swarmwire.metrics.atomic import check_output_path, output_file
     from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
     from swarmwire.metrics.drawing.film import film_of, footage
+    from swarmwire.metrics.drawing.packets import packets_of
     from swarmwire.metrics.run_folder.reader import RunFolder
 
-    film = film_of(RunFolder(run), options.arena or 0, str(run))
+    folder = RunFolder(run)
+    film = film_of(folder, options.arena or 0, str(run))
     check_output_path(to, (f".{kind}",))
-    figure = FilmFigure(film, FILM_SIZE_PX[kind] if options.size_px is None else options.size_px, options.metrics)
+    size_px = FILM_SIZE_PX[kind] if options.size_px is None else options.size_px
+    figure = FilmFigure(film, size_px, options.metrics, packets=packets_of(folder, film))
     times = options.from_s, options.until_s, options.frames_per_s, options.speed
     shown = footage(film.time_s, film.static.rate_hz, *times, DEFAULT_FRAMES_PER_S[kind])
     console = options.console

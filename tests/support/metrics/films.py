@@ -75,6 +75,9 @@ class Folder:
         self.path, self.static = path, static or two_groups()
         self.measured: dict[str, MetricInfo] = {}
 
+    def files(self, name: str) -> list[Path]:
+        return list(self.path.glob(f"{name}.parquet"))
+
     def ticks(self, arena: int | None = None) -> pl.DataFrame:
         whole = self.path / "ticks.parquet"
         frame = pl.read_parquet(whole if whole.exists() else self.path / "ticks" / "part-*.parquet")

@@ -64,7 +64,7 @@ def test_the_summary_tells_what_happened_when_and_to_whom(local, tmp_path):
     expected = {"at_s": 0.6, "tick": 6, "do": "kill", "part": "", "ended": False, "singly": False, "robots": killed}
     assert told[1] == expected
     assert len(killed) == 4
-    assert [len(event["robots"]) for event in told if event["do"] == "partition"] == [10, 10]
+    assert [len(event["robots"]) for event in told if event["do"] == "partition"] == [20, 20]
 
 
 def test_fates_add_up_and_each_disruption_has_its_own(local):

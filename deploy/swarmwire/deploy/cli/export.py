@@ -64,9 +64,10 @@ def export_command(
 ) -> None:
     """Export a run as a picture, a film, a capture of its radio or a table; the suffix of the file decides.
 
-    Pictures and films need no screen. They show the arena, and metrics beside it; lines join robots that are in radio
-    range and sight of one another, regardless of partitions and failed radios. A capture needs a run with packets
-    recorded (--packets all).
+    Pictures and films need no screen. They show the arena, and metrics beside it. If the run recorded packets
+    (--packets all), lines are the packets that ended in the tick, each in the colour of its fate: received, lost,
+    partitioned, … Without, lines join robots that are in radio range and sight of one another. A capture needs
+    recorded packets.
 
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4

@@ -21,6 +21,7 @@ from swarmwire.metrics.drawing.canvas import (
 )
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.metrics_strip import MetricStrip, choose
+from swarmwire.metrics.drawing.packets import PacketEnds, PacketLines, packet_entries
 from swarmwire.metrics.drawing.scene import (
     add_legend,
     columns_in,
@@ -51,22 +52,29 @@ class FilmFigure:
     """A figure that draws any tick of a film. Fixed parts are drawn once and kept as pixels."""
 
     def __init__(
-        self, film: Film, size_px: int, metrics: Sequence[str] | None = None, trail_s: float = TRAIL_S
+        self,
+        film: Film,
+        size_px: int,
+        metrics: Sequence[str] | None = None,
+        trail_s: float = TRAIL_S,
+        packets: PacketEnds | None = None,
     ) -> None:
         """A figure whose longer side has this many pixels, with these metrics beside the arena (None: default).
 
-        A trail shows the path of each robot over the last `trail_s`.
+        A trail shows the path of each robot over the last `trail_s`. With `packets`, lines are those that ended since
+        the tick before; without, they join robots in range and sight.
         BadInput for a metric that was not recorded, or a size out of bounds.
         """
-        self._film, static, self._trail_s = film, film.static, trail_s
+        self._film, static, self._trail_s, self._packets = film, film.static, trail_s, packets
         names = choose(film.metrics, metrics)
-        entries = _entries(film)
+        entries = _entries(film, packets)
         columns = columns_in(entries, _LEGEND_WIDTH_IN)
         layout = lay_out(static.arena_size_m, _STRIP_IN if names else 0.0, -(-len(entries) // columns), axes_in=0.0)
         self._figure = figure = new_figure(layout.width_in, layout.height_in, size_px)
         axes = add_arena_axes(figure, layout, static.arena_size_m)
         self._movable = draw_scenery(axes, static, film.arena)
         self._swarm = Swarm(axes, static)
+        self._lines = PacketLines(axes, static)
         self._state = _colored(film)
         draw_scale_bar(axes, static.arena_size_m, self._swarm.enlargement)
         title = f"{static.name}, seed {static.seeds[film.arena]}" if static.arenas > 1 else static.name
@@ -76,7 +84,13 @@ class FilmFigure:
         add_legend(figure, entries, layout.left, layout.below_top(0.34), columns)
         self._strip = MetricStrip(figure, layout, film, names) if names else None
         pushed = [self._movable] if static.movable else []
-        self._moving = [*pushed, *self._swarm.artists, self._time, *(self._strip.artists if self._strip else ())]
+        self._moving = [
+            *pushed,
+            *self._lines.artists,
+            *self._swarm.artists,
+            self._time,
+            *(self._strip.artists if self._strip else ()),
+        ]
         self._still: Any = None  # pixels of the fixed parts
 
     def frame(self, index: int) -> ByteArray:
@@ -111,7 +125,9 @@ class FilmFigure:
             place_movable(self._movable, movable)
         edges: IntArray | None = None
         static = film.static
-        if static.range_m is not None:
+        if self._packets is not None:
+            self._lines.show(pose[:, :2], *self._packets.of(index))
+        elif static.range_m is not None:
             torus_m = static.arena_size_m if static.boundary == "torus" else None
             edges = in_range(pose[:, :2], alive, static.range_m, (*static.fixed(film.arena), *movable), torus_m)
         state = None if self._state is None else self._state[index]
@@ -146,7 +162,7 @@ def _frequent(film: Film) -> tuple[str, ...]:
     return tuple(film.state_names[i] for i in most)
 
 
-def _entries(film: Film) -> list[Any]:
+def _entries(film: Film, packets: PacketEnds | None) -> list[Any]:
     static = film.static
     entries = group_entries(static, filled=film.state is None)
     if film.state is not None:
@@ -157,7 +173,9 @@ def _entries(film: Film) -> list[Any]:
         entries.append(dead_entry())
     if static.movable:
         entries.append(movable_entry())
-    if static.range_m is not None:
+    if packets is not None:
+        entries += packet_entries(packets.fates)
+    elif static.range_m is not None:
         entries.append(link_entry(static.range_m))
     return entries
 

@@ -10,6 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import ByteArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
+from swarmwire.comms.packets import Fate
 from swarmwire.metrics.atomic import check_output_path, output_file
 
 Color = tuple[int, int, int]  # red, green, blue, 0 to 255
@@ -52,6 +53,23 @@ STATE_COLORS: tuple[Color, ...] = (
     (157, 117, 93),
 )
 OTHER_STATE: Color = (205, 208, 214)  # of robots in none of the states that have a colour
+FATE_COLORS: dict[Fate, Color] = {
+    Fate.RECEIVED: (86, 180, 233),
+    Fate.BLOCKED: (240, 180, 60),
+    Fate.LOST: (235, 85, 75),
+    Fate.QUEUE_FULL: (160, 140, 250),
+    Fate.TOO_LARGE: (205, 205, 110),
+    Fate.IN_FLIGHT: (0, 200, 140),
+    Fate.SENDER_DEAD: (125, 125, 135),
+    Fate.RECEIVER_DEAD: (175, 175, 185),
+    Fate.BLACKOUT: (190, 95, 235),
+    Fate.PARTITIONED: (255, 130, 195),
+    Fate.TOO_WEAK: (200, 155, 95),
+    Fate.COLLIDED: (255, 120, 40),
+    Fate.BURST: (175, 45, 85),
+    Fate.CHANNEL_BUSY: (150, 170, 60),
+    Fate.JAMMED: (120, 85, 205),
+}  # out of range has no colour: such receivers are counted, never listed
 
 _SHADE = 0.58  # how dark a colour's outline is beside it
 ROW_IN = 0.185

@@ -33,8 +33,9 @@ def in_range(
 ) -> IntArray:
     """Pairs (e, 2) of robots alive that are no farther apart than the range, with no obstacle between their centres.
 
-    That is the radio graph of most runs. A run folder holds no links, so partitions, failed radios and radios that
-    need no line of sight are not regarded. `torus_m` are the sides of a torus, whose distances are the shortest.
+    That is the radio graph of most runs. It is geometry: partitions, failed radios and radios that need no line of
+    sight are not regarded; recorded packets show those (`packets_of`). `torus_m` are the
+    sides of a torus, whose distances are the shortest.
     """
     living = np.flatnonzero(alive)
     place = position_m[living].astype(np.float64)
@@ -132,8 +133,11 @@ class Swarm:
     the others, the highest on top, and cast a shadow.
     """
 
-    def __init__(self, axes: Any, static: Static) -> None:
-        """Add the collections, empty, to axes in m."""
+    def __init__(self, axes: Any, static: Static, least: float = _LEAST) -> None:
+        """Add the collections, empty, to axes in m.
+
+        `least` is the least radius of a disc, as a share of the arena's longer side.
+        """
         from matplotlib.collections import LineCollection
 
         self._static = static
@@ -143,7 +147,7 @@ class Swarm:
         altitude_m = np.repeat([group.body.altitude_m for group in static.groups], count)
         self._fill = np.array([rgb(color) for color, group in by_group for _ in range(group.start, group.stop)])
         self._rim = np.array([shade(color) for color, group in by_group for _ in range(group.start, group.stop)])
-        self.enlarged = max(1.0, _least_radius_m(static) / float(radius_m.mean()))
+        self.enlarged = max(1.0, _least_radius_m(static, least) / float(radius_m.mean()))
         self._crowd = static.robots > _CROWD
         fading = _FADING[-1:] if self._crowd else _FADING
         self._fading = np.array(fading)
@@ -229,8 +233,8 @@ def _state_fill(state: IntArray) -> FloatArray:
     return colors[np.where((state >= 0) & (state < last), state, last)]
 
 
-def _least_radius_m(static: Static) -> float:
-    return min(_LEAST, _CROWDED / float(np.sqrt(static.robots))) * max(static.arena_size_m)
+def _least_radius_m(static: Static, least: float) -> float:
+    return min(least, _CROWDED / float(np.sqrt(static.robots))) * max(static.arena_size_m)
 
 
 def _link_opacity(links: int) -> float:

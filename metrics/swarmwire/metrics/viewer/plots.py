@@ -11,16 +11,16 @@ import rerun as rr
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
-from swarmwire.metrics.drawing.canvas import Color
+from swarmwire.metrics.drawing.canvas import FATE_COLORS, Color
 from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.style import FATES, MARK, SERIES
+from swarmwire.metrics.viewer.style import MARK, SERIES
 
 _WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
 _OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
 _EVENT_MARK = 1.04  # where the mark of an event stands among the shares: above them all
-_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATES}
+_FATES = {fate: FATE_NAMES[fate].replace("_", " ") for fate in FATE_COLORS}
 _PLOTS = {"m": "distances", "s": "times", "bit/s": "rates"}  # by a metric's unit; the others are shares or numbers
 
 
@@ -70,7 +70,7 @@ class RerunPlots:
         self._robots = static.robots
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
         self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
-        fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATES.items()}
+        fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATE_COLORS.items()}
         self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
         self._series["packets"] = RerunSeries("plots/packets", fates)
         self._occurred: set[str] = set()  # fates

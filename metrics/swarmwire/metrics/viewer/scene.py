@@ -11,11 +11,11 @@ from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.geometry.ground import ground_of, shades_over
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
-from swarmwire.metrics.drawing.canvas import robot_color
+from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import RerunSelected
-from swarmwire.metrics.viewer.style import FATES, LIGHT, WALL, RerunClasses, packed, shown
+from swarmwire.metrics.viewer.style import LIGHT, WALL, RerunClasses, packed, shown
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
@@ -36,7 +36,7 @@ LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes an
 THINNED_LINKS_EVERY_TICKS = 10
 _LINK_COLOR = (130, 145, 180, 50)
 _LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
-for _fate, _color in FATES.items():
+for _fate, _color in FATE_COLORS.items():
     _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 
 

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import Color, robot_color
 
@@ -22,18 +21,6 @@ SERIES: tuple[Color, ...] = (
     (204, 121, 167),
     (180, 180, 190),
 )
-FATES: dict[Fate, Color] = {
-    Fate.RECEIVED: (86, 180, 233),
-    Fate.BLOCKED: (240, 180, 60),
-    Fate.LOST: (235, 85, 75),
-    Fate.QUEUE_FULL: (160, 140, 250),
-    Fate.TOO_LARGE: (205, 205, 110),
-    Fate.IN_FLIGHT: (0, 200, 140),
-    Fate.SENDER_DEAD: (125, 125, 135),
-    Fate.RECEIVER_DEAD: (175, 175, 185),
-    Fate.BLACKOUT: (190, 95, 235),
-    Fate.PARTITIONED: (255, 130, 195),
-}  # out of range is no colour: such receivers are counted, never listed
 
 _LAST_LETTER = "\u024f"  # of Latin with its extensions
 DEAD_CLASS = 0

@@ -11,12 +11,13 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
+from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import check_recording
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
-from swarmwire.metrics.viewer.style import DEAD, FATES, packed
+from swarmwire.metrics.viewer.style import DEAD, packed
 from tests.support.clocks import StillClock
 from tests.support.metrics.recordings import class_names, column, moving, record, series
 from tests.support.metrics.truths import edges, static, tally, truth, watch
@@ -176,7 +177,7 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
     position_m = first.pose[3:, :2].astype(np.float32)
     assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
     colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
-    assert [color >> 8 for color in colors] == [packed(FATES[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
+    assert [color >> 8 for color in colors] == [packed(FATE_COLORS[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
 
 
 def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
