@@ -7,10 +7,9 @@ swarmwire() { .ci/uv run --no-sync swarmwire "$@"; }
 runs="$(mktemp -d)"
 trap 'rm -rf "$runs"' EXIT
 swarmwire run scenarios/flocking-disrupted.toml --quiet --select flock-8 --out "$runs/flocking-disrupted"
-swarmwire run scenarios/split.toml --quiet --out "$runs/split"
+swarmwire run scenarios/split.toml --quiet --no-rrd --packets all --out "$runs/split"
 swarmwire run scenarios/pso.toml --quiet --out "$runs/pso"
 swarmwire export "$runs/flocking-disrupted" --kind viewer --at 30 --to docs/rerun.png
-swarmwire export "$runs/flocking-disrupted" --to docs/demo.gif
 swarmwire export "$runs/split" --at 35 --to docs/split.png
 swarmwire export "$runs/pso" --at 55 --to docs/pso.png
 swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"
@@ -21,6 +20,7 @@ done
 swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
 swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
+.ci/uv run --no-sync python -m docs.pictures.hero
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages
