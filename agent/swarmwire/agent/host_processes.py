@@ -1,7 +1,8 @@
 """The agent processes of a host: each gets its part of a tick, and answers; one that is gone or silent is lost alone.
 
-A process has at most one frame to answer, so no socket fills up. A tick for a process that is still busy waits, and is
-replaced by the next; in lockstep that does not happen. `AgentProcesses` has no network: the host carries its frames.
+A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
+order, and a tick among them is replaced by the next; in lockstep that does not happen. `AgentProcesses` has no network:
+the host carries its frames.
 """
 
 import select
@@ -33,6 +34,13 @@ from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Readings
 
 
+class Waiting(NamedTuple):
+    """A frame that waits for its process."""
+
+    buffers: Buffers
+    is_tick: bool  # else packets between two
+
+
 @dataclass(eq=False)
 class AgentProcess:
     """One process as its host sees it."""
@@ -43,8 +51,7 @@ class AgentProcess:
     busy_since_ns: int | None = None  # unanswered since; None: it waits for a frame
     is_ready: bool = False
     in_step: bool = False  # whether the unanswered frame is a tick
-    next_tick: Buffers = field(default_factory=list[bytes | memoryview])  # that waits while it is busy
-    next_packets: deque[Buffers] = field(default_factory=deque[Buffers])
+    waiting: deque[Waiting] = field(default_factory=deque[Waiting])  # while it is busy
     fields_known: int = 0  # groups whose fields it has
     parts: list[bytes] = field(default_factory=list[bytes])  # of a frame that has not arrived whole
 
@@ -123,7 +130,8 @@ class AgentProcesses:
         ):
             if buffers and process.socket.fileno() >= 0:
                 asked.append(process)
-                process.next_tick = buffers
+                process.waiting = deque(frame for frame in process.waiting if not frame.is_tick)
+                process.waiting.append(Waiting(buffers, is_tick=True))
                 self._send_next(process, now_ns)
         return asked
 
@@ -133,7 +141,7 @@ class AgentProcesses:
             self._by_number, self._cutter.packets(tick, at_ns, received, tx_status), strict=True
         ):
             if buffers and process.socket.fileno() >= 0:
-                process.next_packets.append(buffers)
+                process.waiting.append(Waiting(buffers, is_tick=False))
                 self._send_next(process, now_ns)
 
     def events(self, now_ns: int) -> list[Answer | Lost]:
@@ -159,8 +167,7 @@ class AgentProcesses:
             if kind == ACTIONS:
                 events.append(Answer(process, tick, process.in_step, frame))
             process.is_ready = True
-            if process.next_tick or process.next_packets:
-                self._send_next(process, now_ns)
+            self._send_next(process, now_ns)
         return events
 
     def silent(self, now_ns: int, timeout_ns: int) -> list[AgentProcess]:
@@ -188,15 +195,9 @@ class AgentProcesses:
 
     def _send_next(self, process: AgentProcess, now_ns: int) -> None:
         """Send the next frame, if the process waits for one."""
-        if process.busy_since_ns is not None or not process.is_ready:
+        if process.busy_since_ns is not None or not process.is_ready or not process.waiting:
             return
-        buffers: Buffers = []
-        if process.next_packets:
-            buffers, process.in_step = process.next_packets.popleft(), False
-        elif process.next_tick:
-            buffers, process.next_tick, process.in_step = process.next_tick, [], True
-        if not buffers:
-            return
+        buffers, process.in_step = process.waiting.popleft()
         process.busy_since_ns = now_ns
         try:
             if process.fields_known < len(self._fields):

@@ -17,7 +17,18 @@ from swarmwire.agent.agent_process import ForkServer, ManyRobots, agents_of
 from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.host_processes import AgentProcesses
 from swarmwire.agent.one_robot import OneRobotAgent
-from swarmwire.agent.process_frames import MAX_MESSAGE, READY, message, receive, send
+from swarmwire.agent.process_frames import (
+    FIELDS,
+    HEAD,
+    MAX_MESSAGE,
+    PACKETS,
+    READY,
+    TICK,
+    message,
+    receive,
+    send,
+    write_actions,
+)
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
@@ -207,3 +218,26 @@ def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
         freezes.send(frame[MAX_MESSAGE:])
         processes.events(0)
         assert processes.are_ready
+
+
+def test_frames_wait_for_a_busy_process_in_their_order_and_only_the_newest_tick() -> None:
+    """Packets of tick 3 come after its step: else the agent's time would go back."""
+    server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
+    processes = AgentProcesses(cast("ForkServer", server), whole, 1, None)
+    received = received_from(words(1), [0])
+    with closing(processes), server.processes[0] as process:
+        process.send(message(READY, None))
+        processes.events(0)
+        for tick in (1, 2):
+            processes.tick(tick, 0, {"flock": readings(tick, [0])}, SILENCE, NO_TX_STATUSES)
+        processes.packets(2, 0, 0, received, NO_TX_STATUSES)
+        processes.tick(3, 0, {"flock": readings(3, [0])}, SILENCE, NO_TX_STATUSES)
+        processes.packets(3, 0, 0, received, NO_TX_STATUSES)
+        kinds: list[tuple[int, int]] = []
+        while len(kinds) < 4:
+            _, kind, tick, *_ = HEAD.unpack_from(receive(process))
+            if kind != FIELDS:
+                kinds.append((kind, tick))
+                process.send(write_actions(tick, Actions.joined([]), {}))
+                processes.events(0)
+    assert kinds == [(TICK, 1), (PACKETS, 2), (TICK, 3), (PACKETS, 3)]
