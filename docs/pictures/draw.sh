@@ -6,10 +6,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 swarmwire() { .ci/uv run --no-sync swarmwire "$@"; }
 runs="$(mktemp -d)"
 trap 'rm -rf "$runs"' EXIT
-swarmwire run scenarios/flocking-disrupted.toml --quiet --select flock-8 --out "$runs/flocking-disrupted"
+swarmwire run scenarios/flocking-disrupted.toml --quiet --out "$runs/flocking-disrupted"
 swarmwire run scenarios/split.toml --quiet --no-rrd --packets all --out "$runs/split"
 swarmwire run scenarios/pso.toml --quiet --out "$runs/pso"
-swarmwire export "$runs/flocking-disrupted" --kind viewer --at 30 --to docs/rerun.png
+swarmwire export "$runs/flocking-disrupted" --kind viewer --at 35 --to docs/rerun.png
 swarmwire export "$runs/split" --at 35 --to docs/split.png
 swarmwire export "$runs/pso" --at 55 --to docs/pso.png
 swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"

@@ -32,7 +32,7 @@ from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.live.following import Live, forget_live
 from swarmwire.deploy.runners import local_endpoint
 from swarmwire.metrics.measure import Measured
-from swarmwire.metrics.viewer.selection import selected_robot
+from swarmwire.metrics.viewer.selection import living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
 FRAMES_PER_S = 30
@@ -102,7 +102,8 @@ class Sampling:
         few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
         shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
         if static.robots > SMALL:
-            shown = replace(shown, readings=readings_within(shown.readings, slice(self._selected, self._selected + 1)))
+            index = living_robot(static, self._selected, shown.alive)
+            shown = replace(shown, readings=readings_within(shown.readings, slice(index, index + 1)))
         self._serial += 1
         return ObservedTick(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
 

@@ -27,7 +27,7 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
     """
     wide = static.arena_size_m[0] / static.arena_size_m[1]
     arena_share = _ARENA_SHARE * min(max(wide, _MIN_ARENA_SHARE / _ARENA_SHARE), 1.0)
-    side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.65, 1.1, 1.25])
+    side = rrb.Vertical(_legend(), _close_up(static, selected), _about(), row_shares=[0.5, 1.2, 1.2])
     plots = rrb.Vertical(*_plots(static))
     if wide < _NARROW:
         middle, right = _arena(static), rrb.Vertical(plots, _events(), row_shares=_ROWS)
@@ -73,7 +73,7 @@ def _close_up(static: Static, selected: str) -> Any:
     return rrb.Spatial2DView(
         origin=f"/{EYE}",
         contents=["/world/**", "- /world/trails", "- /world/links", "- /world/lost_packets"],
-        name=f"Robot {selected}",
+        name="Selected robot",
         background=_GROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=[-half_m, half_m], y_range=[-half_m, half_m]),
     )
@@ -140,7 +140,7 @@ def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> 
         "",
         f"{groups} in {size} m, {static.rate_hz} ticks per second",
         "",
-        " ".join([f"The ring marks {selected}.", *_drawn(static, selected)]),
+        " ".join(["The ring and the name mark the selected robot.", *_drawn(static, selected)]),
     ]
     if static.range_m is not None:
         often = "" if links_every_ticks == 1 else f" (every {links_every_ticks} ticks)"

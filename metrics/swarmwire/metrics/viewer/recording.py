@@ -39,7 +39,8 @@ class RerunRecording(Observer):
         Rows are written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
-        of the first group that has rays or photocells. A subclass with another target has no path.
+        of the first group that has rays or photocells. While it is dead, the next one alive of its group is shown. A
+        subclass with another target has no path.
         """
         self._what = f"recording {path.name}" if path else "live view"
         VIEW.need(self._what)

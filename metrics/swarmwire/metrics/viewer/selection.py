@@ -5,15 +5,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.truth import Group, Static, Truth
+from swarmwire.comms.truth import NO_ROBOT, Group, Static, Truth
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import LIGHT, MARK, packed
 
 _FRAME = "world/selected"  # moves with the robot, axes as the arena's
+_NAME = f"{_FRAME}/name"
 EYE = f"{_FRAME}/eye"  # a view from there has y pointing up
 _HITS: NDArray[np.uint32] = np.array(
     [packed((120, 125, 145), 150), packed(MARK, 255), packed((255, 60, 50), 255)], np.uint32
@@ -25,6 +26,9 @@ _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
 _DRAWN = ("proximity.value", "light.value")  # sensors
 _RING_HEADINGS = 0.9  # radius of the ring in lengths of the heading's arrow
 _ORDER = 5.0
+_RADIO_SHARE = 0.5  # of the radio's range: half the width of the close-up,
+_LEAST_NEAR, _MOST_NEAR = 3.0, 8.0  # but so many times as far as its rays reach, at least and at most
+_NAME_BELOW = 1.5  # where the name stands below the robot, in radii of the ring
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 65)
 
 
@@ -43,14 +47,28 @@ def selected_robot(static: Static, name: str | None, where: str) -> str:
     return static.robot_names[0]
 
 
+def living_robot(static: Static, selected: int, alive: BoolArray) -> int:
+    """The index of the selected robot; while it is dead, of the next one alive in its group, if there is one.
+
+    `alive` (robots,) is of one arena.
+    """
+    group = _group(static, selected)
+    in_turn = (*range(selected, group.stop), *range(group.start, selected))
+    return next((index for index in in_turn if alive[index]), selected)
+
+
 def close_up_m(static: Static, selected: str) -> float:
-    """Half the width of the close-up of a robot."""
+    """Half the width of the close-up of a robot: its rays are seen, and neighbours by radio unless these are far."""
     body = _group(static, static.robot_names.index(selected)).body
-    return 3.0 * (body.radius_m + (body.proximity.range_m if body.proximity else 2.0 * body.radius_m))
+    near_m = body.radius_m + (body.proximity.range_m if body.proximity else 2.0 * body.radius_m)
+    radio_m = 0.0 if static.range_m is None else _RADIO_SHARE * static.range_m
+    return float(np.clip(radio_m, _LEAST_NEAR * near_m, _MOST_NEAR * near_m))
 
 
 class RerunSelected:
-    """The selected robot of one arena. Its rays end where the reading says that something is, noise and all.
+    """The selected robot of one arena, or while it is dead the next one alive in its group.
+
+    Its rays end where the reading says that something is, noise and all.
 
     Of the rays that see more than noise could feign, those on which a robot stands are red, the others white.
     Bars outwards from the rim show how much light each photocell sees. Between a robot's turns these are what it
@@ -60,9 +78,9 @@ class RerunSelected:
     def __init__(self, static: Static, arena: int, selected: str, radius_m: FloatArray, heading_m: FloatArray) -> None:
         """Follow this robot; radius_m and heading_m (robots,) are how large robots are drawn, and their arrows."""
         self._static, self._arena = static, arena
-        self._index = static.robot_names.index(selected)
-        self._row = arena * static.robots + self._index
-        self._group, self._ring_m = _group(static, self._index), _RING_HEADINGS * float(heading_m[self._index])
+        self._selected = static.robot_names.index(selected)
+        self._index: int = NO_ROBOT  # of the robot that is shown; none yet
+        self._group, self._ring_m = _group(static, self._selected), _RING_HEADINGS * float(heading_m[self._selected])
         self._radius_m = radius_m
         self._sensed: dict[str, FloatArray] = {}
         self._sees = False  # whether any sensor reads more than 0
@@ -81,6 +99,8 @@ class RerunSelected:
         marks = rr.LineStrips2D(circles, radii=thin, colors=colors, draw_order=_ORDER)
         rec.log(f"{_FRAME}/marks", marks, static=True)
         rec.log(EYE, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+        look = rr.Points2D.from_fields(radii=rr.Radius.ui_points(0.0), colors=packed(MARK, 255), show_labels=True)
+        rec.log(_NAME, look, static=True)
         rays = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.8), draw_order=_ORDER)
         rec.log(f"{_FRAME}/rays", rays, static=True)
 
@@ -88,6 +108,7 @@ class RerunSelected:
         """Add a tick; unless `full`, rays without a hit are not updated."""
         import rerun as rr
 
+        self._select(rows, truth)
         x_m, y_m, heading_rad = truth.pose[self._row].tolist()
         rows.add(_FRAME, rr.Transform3D.columns, translation=[[x_m, y_m, 0.0]])
         self._remember(truth)
@@ -109,6 +130,17 @@ class RerunSelected:
         if len(lines) or self._drawn:
             rows.add(f"{_FRAME}/rays", rr.LineStrips2D.columns, strips=lines, colors=np.concatenate(colors))
         self._drawn = len(lines) > 0
+
+    def _select(self, rows: RerunRows, truth: Truth) -> None:
+        """Show the selected robot, or one alive in its place, and its name."""
+        import rerun as rr
+
+        first = self._arena * self._static.robots
+        index = living_robot(self._static, self._selected, truth.alive[first : first + self._static.robots])
+        if index != self._index:
+            self._index, self._row, self._sensed = index, first + index, {}
+            below = np.array([[0.0, -_NAME_BELOW * self._ring_m]], np.float32)
+            rows.add(_NAME, rr.Points2D.columns, positions=below, labels=[self._static.robot_names[index]])
 
     def _remember(self, truth: Truth) -> None:
         """Keep the robot's readings of this tick; a dead robot has none."""

@@ -273,7 +273,7 @@ def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, siz
     of = replace(static(2, radio=radio), arena_size_m=size_m)
     record(tmp_path / "run.rrd", of, moving(of, 1))
     names = view_names(tmp_path / "run.rrd")
-    assert "Robot flock-0" in names
+    assert "Selected robot" in names
     assert len(names) == (11 if radio else 8)
 
 

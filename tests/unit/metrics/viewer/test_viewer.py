@@ -11,7 +11,7 @@ from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.layout import about
 from swarmwire.metrics.viewer.rows import ROW_BYTES, RerunRows
-from swarmwire.metrics.viewer.selection import selected_robot
+from swarmwire.metrics.viewer.selection import living_robot, selected_robot
 from tests.support.metrics.recordings import column, record
 from tests.support.metrics.truths import static, truth
 
@@ -117,12 +117,29 @@ def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
         record(tmp_path / "run.rrd", static(2), [], selected="nobody")
 
 
+def test_while_the_selected_robot_is_dead_the_next_one_alive_of_its_group_is_shown(tmp_path):
+    of = static(3)
+    pose = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    lives = [[True, True, True], [True, False, True], [True, False, False], [False, False, False], [True, True, True]]
+    seen = [truth(of, tick, pose=pose, alive=np.array(alive)) for tick, alive in enumerate(lives)]
+    record(tmp_path / "run.rrd", of, seen, selected="flock-1")
+    moved = column(tmp_path / "run.rrd", "/world/selected", "Transform3D:translation")
+    assert [row[0][0] for row in moved.values()] == [1.0, 2.0, 0.0, 1.0, 1.0]
+    names = column(tmp_path / "run.rrd", "/world/selected/name", "Points2D:labels")
+    assert names == {0: ["flock-1"], 1: ["flock-2"], 2: ["flock-0"], 3: ["flock-1"]}
+
+
+def test_a_robot_of_another_group_never_takes_the_place_of_a_dead_one():
+    mixed = replace(static(4), groups=(Group("a", EPUCK, 0, 2), Group("b", EPUCK, 2, 4)))
+    assert living_robot(mixed, 1, np.array([False, False, True, True])) == 1
+    assert living_robot(mixed, 3, np.array([True, True, True, False])) == 2
+
+
 @pytest.mark.parametrize(
     ("body", "rays", "light"), [("epuck", True, True), ("kilobot", False, True), ("point", False, False)]
 )
 def test_rays_and_light_are_told_of_only_if_the_selected_body_has_them(body, rays, light):
     text = about(static(body=load_body(body)), 0, "flock-1", 1)
-    assert "flock-1" in text
     assert ("rays" in text, "light" in text) == (rays, light)
 
 
