@@ -168,7 +168,7 @@ def _exit_after(work: Callable[[], None]) -> NoReturn:
     try:
         work()
         code = 0
-    except BaseException:  # noqa: BLE001 - the last frame of this process: whatever it is, show it and end
+    except BaseException:  # noqa: BLE001 - the last frame of this process: show any error and end
         traceback.print_exc()
     finally:
         sys.stdout.flush()

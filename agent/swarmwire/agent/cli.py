@@ -168,7 +168,7 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
 
     settings = _settings(parsed, needs_agent=False)
     driver, _ = driver_of(settings, _where(parsed), WallClock())
-    if parsed.standby:  # started by the guard: the agent is dead, whoever holds its lock
+    if parsed.standby:  # started by the guard: the agent is dead, whichever process holds its lock
         if not _is_requested():
             return ENDED
     elif (holder := RobotLock(settings.driver.name, driver, WallClock()).stopped_by_holder()) is not None:

@@ -354,13 +354,13 @@ def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
 
 def failed(robots: list[str], error: BaseException, context: StepContext | None = None) -> AgentFailed:
     """The failure of an agent: its time, and the traceback of the agent's own lines."""
-    told = traceback.TracebackException.from_exception(error)
+    shown = traceback.TracebackException.from_exception(error)
     modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
     agents = [place for place, name in enumerate(modules) if not _is_machinery(name)]
     if agents:  # what called the agent, and what it called, is no line of the agent's
-        told.stack = traceback.StackSummary.from_list(told.stack[agents[0] : agents[-1] + 1])
+        shown.stack = traceback.StackSummary.from_list(shown.stack[agents[0] : agents[-1] + 1])
     when = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
-    return AgentFailed(robots_text(robots), "".join(told.format()) + when)
+    return AgentFailed(robots_text(robots), "".join(shown.format()) + when)
 
 
 def _is_machinery(module: str) -> bool:

@@ -70,7 +70,7 @@ class _Medium:
         self._outstanding = TxStatuses.joined([self._outstanding, new])
 
     def tx_status(self, tick: int) -> TxStatuses:
-        """As from the radio medium: also for robots that are missing, and for those that started anew since."""
+        """As from the radio medium: also for robots that are missing, and for those that started again since."""
         arrives = _uniform(self._key, tick, "learning", (len(self._outstanding),)) < STATUS_SHARE
         now, self._outstanding = (self._outstanding.select(np.flatnonzero(mask)) for mask in (arrives, ~arrives))
         return now

@@ -126,7 +126,7 @@ class Backends:
 
     def _changed(self, change: RunnerEvent) -> None:
         self.changed(change)
-        if change.what != "lost":  # which is told with what people can do
+        if change.what != "lost":  # which `lost` reports, with a remedy
             self.say(str(change))
 
     def _refused(self, runner: str, why: str) -> None:

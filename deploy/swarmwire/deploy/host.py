@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KERNEL_CACHE = "NUMBA_CACHE_DIR"
 CODE = Path(__file__).parent
 COMPILE = "numba:compile"  # numba's event, which it does not raise for kernels that it finds compiled
-COMPILING_S = 2.0  # of compiling, before people are told of it
+COMPILING_S = 2.0  # of compiling, before a line about it
 COMPILING_AGAIN_S = 10.0  # from one line to the next
 COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 

@@ -43,7 +43,7 @@ class Guarded(Observer):
             return call()
         except KeyboardInterrupt:
             raise
-        except BaseException as error:  # noqa: BLE001 - the run goes on; rich exits where nobody reads, polars panics
+        except BaseException as error:  # noqa: BLE001 - the run continues; rich exits without a reader, polars panics
             if not self.failed:
                 self._say(f"observer {self.name} failed:{_why(error)}")
             self.failed = True
@@ -52,8 +52,8 @@ class Guarded(Observer):
 
 def _why(error: BaseException) -> str:
     """In a line, if the machine or the input is at fault; else with the traceback."""
-    told = str(error) if isinstance(error, SwarmwireError) else refusal(error)
-    return f" {told}; the run continues without it" if told else f"\n{traceback.format_exc()}"
+    text = str(error) if isinstance(error, SwarmwireError) else refusal(error)
+    return f" {text}; the run continues without it" if text else f"\n{traceback.format_exc()}"
 
 
 class TooLarge(Observer):

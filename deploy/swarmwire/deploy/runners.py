@@ -16,8 +16,8 @@ from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
-STALE_S = 60.0  # of a socket at which nobody listens: one that was just made may be about to
-ANSWER_S = 0.5  # of the system, for whoever listens
+STALE_S = 60.0  # of a socket without a listener: one that was just made may be about to
+ANSWER_S = 0.5  # of the system, for the listener
 SOCKET = "world"  # in a private directory
 MAX_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
 

@@ -19,9 +19,9 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 
-RUNS = b"."  # what the agent tells: its process runs
+RUNS = b"."  # heartbeat: its process runs
 STOPPED = b"S"  # it runs, and its motors were stopped for good
-NOTHING = b""  # it has told nothing yet, and no motor moves
+NOTHING = b""  # no heartbeat yet, and no motor moves
 CLOSED = b"E"  # the motors are off, and the driver is closed
 GRACE_S = 3.0  # from the first signal to the end; systemd waits longer
 GO = b"!"  # to the process that stands by
@@ -54,12 +54,12 @@ def guard(agent: list[str], stop: list[str], silent_s: float, pipe_option: str, 
     stopped = _stopped(standby, stop)
     fault = fault or f"its process ended ({_how(code)})"
     sys.stderr.write(f"guard: the agent is gone: {fault}; the motors {'were' if stopped else 'could not be'} stopped\n")
-    # Whoever starts anew what failed must not do so after an emergency stop.
+    # A service manager that restarts failed programs must not do so after an emergency stop.
     return ENDED if last == STOPPED else FAILED
 
 
 def _stopped(standby: "list[subprocess.Popen[bytes]]", stop: list[str]) -> bool:
-    """Whether the motors were stopped, by whoever stood by, or, if that failed, by another."""
+    """Whether the motors were stopped, by the process that stood by, or, if that failed, by another."""
     for one in standby:
         one.communicate(GO)
         if one.returncode == 0:
@@ -68,12 +68,12 @@ def _stopped(standby: "list[subprocess.Popen[bytes]]", stop: list[str]) -> bool:
 
 
 def _standing_by(stop: list[str]) -> "subprocess.Popen[bytes]":
-    """What stops the motors when it is told to, out of reach of a terminal's signals."""
+    """The process that stops the motors on request, out of reach of a terminal's signals."""
     return subprocess.Popen(stop, stdin=subprocess.PIPE, process_group=0)
 
 
 def _watch(beats: int, silent_s: float, begin: Callable[[], None]) -> tuple[str, bytes]:
-    """What is wrong, if the agent's process still runs, and what it told last; returns at its end.
+    """What is wrong, if the agent's process still runs, and its last heartbeat; returns at its end.
 
     `begin` is called when the first heartbeat comes.
     """
@@ -84,12 +84,12 @@ def _watch(beats: int, silent_s: float, begin: Callable[[], None]) -> tuple[str,
         if not ready:
             left = f"it was done {allowed_s:g} s ago, and something of it still ran"
             return left if last == CLOSED else f"it has been frozen for {allowed_s:g} s", last
-        told = os.read(beats, 4096)
-        if not told:
+        received = os.read(beats, 4096)
+        if not received:
             return "", last
         if last == NOTHING:
             begin()
-        last = told[-1:]
+        last = received[-1:]
 
 
 def _kill(child: "subprocess.Popen[bytes]") -> None:
@@ -111,7 +111,7 @@ def _pass_on_signals(child: "subprocess.Popen[bytes]") -> None:
     for number in PASSED_ON:
         signal.signal(number, pass_on)
     signal.signal(signal.SIGALRM, kill)
-    signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # a guard that sleeps guards nobody
+    signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # a stopped guard protects nothing
 
 
 def _how(code: int) -> str:

@@ -121,7 +121,7 @@ def _write(out: TextIO, line: str) -> None:
     try:
         out.write(line)
         out.flush()
-    except (OSError, ValueError):  # a pipe that nobody reads, a full disk; a file that was closed
+    except (OSError, ValueError):  # a pipe without a reader, a full disk; a file that was closed
         with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
             os.dup2(nowhere.fileno(), out.fileno())  # also for buffered text, which Python would write at exit
 

@@ -39,7 +39,7 @@ class RobotLock:
     """The lock of one robot, identified by its driver and address."""
 
     def __init__(self, kind: str, driver: Driver, clock: Clock) -> None:
-        """`kind` is the driver's name; the clock is the wall clock, whatever the pace of the robot."""
+        """`kind` is the driver's name; the clock is the wall clock, at any pace of the robot."""
         digest = hashlib.sha256(driver.target.encode()).hexdigest()[:16]
         self._path, self._clock = _folder() / f"{kind}-{digest}.lock", clock
         self._description = f"the robot at {driver.address or driver.target}"

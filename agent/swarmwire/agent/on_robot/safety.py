@@ -109,7 +109,7 @@ class Motors:
             return
 
     def _stop_or_raise(self) -> None:
-        """Motors off at once; DriverLost if the robot is out of reach, so that nobody takes it for stopped."""
+        """Motors off at once; DriverLost if the robot is out of reach, since it may still move."""
         self._driver.stop()
         if not self.reachable:
             raise DriverLost(OUT_OF_REACH)
@@ -188,7 +188,7 @@ class Heartbeats:
     """
 
     def __init__(self, pipe: int | None, stopped: Callable[[], bool], orphaned: Callable[[], None]) -> None:
-        """`stopped` is whether the emergency stop is latched; `orphaned` is called once nobody reads the pipe."""
+        """`stopped` is whether the emergency stop is latched; `orphaned` is called once the pipe has no reader."""
         self._pipe, self._stopped, self._orphaned = pipe, stopped, orphaned
 
     def __call__(self) -> None:

@@ -104,5 +104,5 @@ class ControlPoint:
                 query.reply_err(f"expected {ESTOP} or {STATUS}")
         except zenoh.ZError:
             raise
-        except Exception as error:  # noqa: BLE001 - whatever it is, the operator must learn that it did not work
+        except Exception as error:  # noqa: BLE001 - any error: the operator must learn that it did not work
             query.reply_err(f"failed: {error}")
