@@ -10,6 +10,7 @@ from typing import Any
 
 import asyncssh
 
+from swarmwire.agent.on_robot.safety import STOP_REQUESTED
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.wire.access_control import access_control
 from swarmwire.comms.wire.keys import SwarmKeys
@@ -35,7 +36,10 @@ Said = dict[str, str]  # by robot: "" if it is confirmed, else why not
 
 
 async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
-    """Start robots' agents, each by its current release; running agents do not change."""
+    """Start robots' agents, each by its current release; running agents do not change.
+
+    An agent that still runs after an emergency stop is a failure: only its end clears the latch.
+    """
 
     async def before(session: HostSession, _: list[Robot]) -> None:
         session.need_manager()
@@ -48,6 +52,8 @@ async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         if state["current"] is None:
             raise HostFailed("there is no release to start", "swarmwire robots deploy")
+        if state["ActiveState"] == "active" and (state["status"] or {}).get("state") == STOP_REQUESTED:
+            raise HostFailed("an emergency stop keeps its motors off", "swarmwire robots stop, then start")
         if state["ActiveState"] == "active":
             return Result(robot.name, True, f"runs already: {state['running'] or state['current']}")
         watcher.step(robot.name, "start")

@@ -252,6 +252,17 @@ def test_a_started_robot_runs_its_current_release_until_it_is_stopped(robots, ho
     assert runs(robots)["unit"] == "inactive (dead)"
 
 
+def test_a_start_does_not_pass_an_emergency_stop_off_as_running(robots, host):
+    robots("start")
+    status = {"state": "estop", "tick": 43, "late_ticks": 0, "charge": None}  # confirmed over the network: it runs on
+    (host.root / "flock-0" / "log" / "flock-0-status.json").write_text(json.dumps(status))
+    code, lines = robots("start")
+    assert code == 1
+    assert lines[0] == "flock-0 failed: an emergency stop keeps its motors off; swarmwire robots stop, then start"
+    assert robots("stop")[0] == 0
+    assert robots("start") == (0, [f"flock-0 started: {host.current('flock-0')}"])
+
+
 def test_units_outlive_the_connection_that_started_them(robots, host):
     assert not (host.home / ".linger").exists()
     robots("start")
