@@ -21,6 +21,7 @@ from docs.fault_checks import fault_tables
 from docs.pictures.radio.__main__ import FIGURES
 from docs.prose_checks import prose
 from docs.protocol_checks import protocol_page
+from docs.reference import filled
 from swarmwire.agent import behaviours
 from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import SwarmwireError
@@ -87,7 +88,7 @@ def behaviour_pages() -> Problems:
     for name, kind in classes.items():
         page, text = f"docs/behaviours/{name}.md", _text(f"docs/behaviours/{name}.md")
         pictures = [f"{name}.png", f"{name}-degradation.svg"]
-        named = (f"```{{reference}} behaviour {kind}\n", f"uv run swarmwire run scenarios/behaviours/{name}.toml\n")
+        named = (f"<!-- reference: behaviour {kind} -->\n", f"uv run swarmwire run scenarios/behaviours/{name}.toml\n")
         if re.findall(r"^!\[.+\]\((.+)\)$", text, re.MULTILINE) != pictures or not all(part in text for part in named):
             yield f"{page}: expected {', '.join(pictures)} and {' and '.join(map(str.strip, named))}"
         groups = tomllib.loads(_text(f"scenarios/behaviours/{name}.toml"))["robots"].values()
@@ -132,13 +133,22 @@ def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
 
 
 def pictures() -> Problems:
-    """The page about the radio shows each of its figures once; pictures are small enough to be kept with the code."""
-    shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", _text("docs/radio.md"), re.MULTILINE)
+    """The pages about the radio show each of their figures once; pictures are small enough to be kept with the code."""
+    texts = _text("docs/radio.md") + _text("docs/radio-reception.md")
+    shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", texts, re.MULTILINE)
     if not sorted(shown) == sorted(FIGURES) == sorted(path.stem for path in (ROOT / "docs" / "radio").iterdir()):
-        yield f"docs/radio.md: expected each figure once: {sorted(FIGURES)}"
+        yield f"docs/radio*.md: expected each figure once: {sorted(FIGURES)}"
     for path in (file for folder in ("radio", "behaviours") for file in (ROOT / "docs" / folder).iterdir()):
         if path.suffix in {".svg", ".png"} and path.stat().st_size > MAX_BYTES:
             yield f"{path.relative_to(ROOT)}: expected at most {MAX_BYTES} bytes"
+
+
+def generated_tables() -> Problems:
+    """The tables that `docs.reference` writes are those of the code."""
+    for page in PAGES:
+        text = _text(page)
+        if filled(text, page) != text:
+            yield f"{page}: its generated tables are out of date: python -m docs.reference"
 
 
 def benchmark_rows() -> Problems:
@@ -183,6 +193,7 @@ CHECKS: tuple[Callable[[], Problems], ...] = (
     behaviour_pages,
     experiment_pages,
     pictures,
+    generated_tables,
     benchmark_rows,
     fleet_keys,
     robot_bytes,

@@ -1,16 +1,16 @@
-"""How Sphinx builds the site: `make docs`. The reference is made from the code at each build; none of it is kept."""
+"""How Sphinx builds the site: `make docs`. It makes the Python API from docstrings; pages hold all other tables."""
 
 import sys
 import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]  # the tables, and the list of what is public
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]  # the extension, and the list of what is public
 
 project = "swarmwire"
 release = version = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design", "reference"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design", "docstrings"]
 exclude_patterns = ["_build", "_ext"]
 
 html_theme = "furo"

@@ -23,7 +23,7 @@ DELIVERY, DELAY, THROUGHPUT = "delivery", "mean delay, ms", "throughput, Mbit/s"
 LIMITS = {DELIVERY: 0.02, DELAY: 0.05, THROUGHPUT: 0.03}  # absolute; relative; relative
 REASONS = {  # why rows are misses, by what their first cells match
     r"802.11a 54M .* 40 m square": "where more than half of short frames are lost the union bound of `802.11ag` is "
-    "pessimistic, by up to 1 dB: [the receiver](radio.md#noise-and-reception)",
+    "pessimistic, by up to 1 dB: [the receiver](radio-reception.md#noise-and-reception)",
     r"802.15.4 .* one spot, unicast": "a node of ns-3 that acknowledges while it waits for the channel restarts its "
     "channel access, and one that waits for an acknowledgement meanwhile takes it for lost (lr-wpan-mac.cc, "
     "PdDataIndication, marked there as open); here the backoff continues: IEEE 802.15.4-2006, 7.5.6.4, asks for "

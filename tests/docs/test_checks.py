@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 from docs import checks, fault_checks, prose_checks, protocol_checks
+from docs.reference import filled
+from swarmwire.comms.errors import BadInput
 
 
 @pytest.fixture
@@ -32,6 +34,17 @@ def test_a_page_that_is_listed_twice_or_not_at_all_is_a_problem(page: Path):
     assert len(list(checks.contents())) == 1
     index.write_text("page")
     assert len(list(checks.contents())) == 1
+
+
+def test_a_generated_table_that_is_out_of_date_is_a_problem(page: Path):
+    page.write_text("<!-- reference: fates -->\n<!-- /reference -->\n")
+    assert len(list(checks.generated_tables())) == 1
+    page.write_text(filled(page.read_text(), "docs/page.md"))
+    assert "| `received` |" in page.read_text()
+    assert list(checks.generated_tables()) == []
+    page.write_text("<!-- reference: no-such-table -->\n<!-- /reference -->\n")
+    with pytest.raises(BadInput, match="expected one of"):
+        list(checks.generated_tables())
 
 
 @pytest.mark.parametrize(

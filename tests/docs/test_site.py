@@ -67,16 +67,16 @@ def keys_of(schema: dict[str, Any]) -> Iterator[str]:
         yield from definition.get("properties", ())
 
 
-def test_the_scenario_page_names_every_key_and_choice(site):
-    named = code(site, "scenario")
+def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
+    named = code(site, "scenario") | code(site, "radio-keys")
     headed = {name.strip("[]").split(".")[0] for name in named if name.startswith("[")}  # [time], [robots.GROUP], …
     assert set(keys_of(scenario_schema())) <= named | headed
     assert {"time", "physics", "arena", "robots", "radio", "events", "run"} <= headed
     assert {'shape = "polygon"', 'how = "grid"', '"walls"', '"open"'} <= named
 
 
-def test_the_scenario_page_tells_every_tables_rows_once(site):
-    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario"), re.DOTALL)
+def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario") + page(site, "radio-keys"), re.DOTALL)
     texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
     assert sum("probability that a packet within reach is lost" in text.lower() for text in texts) == 1
     assert sum("drawn; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
@@ -111,8 +111,8 @@ def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
     assert "{}" not in page(site, "bodies"), "an empty table is no figure"
 
 
-def test_the_summary_page_names_every_metric_fate_and_key(site):
-    named = code(site, "summary")
+def test_the_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
+    named = code(site, "summary") | code(site, "metrics")
     assert {*METRICS, *(fate.name.lower() for fate in Fate)} <= named
     for fate in Fate:
         assert fate.meaning[1:] in html.unescape(page(site, "summary"))
@@ -132,9 +132,9 @@ def test_every_behaviour_has_a_page_that_names_its_parameters(site):
         assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named
 
 
-def test_the_radio_page_names_every_preset_with_its_source(site):
-    told = html.unescape(page(site, "radio"))
-    assert set(PRESETS) <= code(site, "radio")
+def test_the_page_of_radio_keys_names_every_preset_with_its_source(site):
+    told = html.unescape(page(site, "radio-keys"))
+    assert set(PRESETS) <= code(site, "radio-keys")
     for preset in PRESETS.values():
         # Quotation marks may be typeset.
         assert all(part in told for part in preset.source.split("'"))

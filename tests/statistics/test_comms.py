@@ -60,13 +60,13 @@ def test_delivery_and_delay_are_those_of_ns_3(
 ):
     found = contention(radio, nodes, payload_bytes, interval_s, seeds=range(1, 6), measured_s=2.0)
     assert found.packets == 5 * nodes * 2.0 / interval_s
-    assert found.delivery_ratio == pytest.approx(delivery, abs=0.03)
+    assert found.pdr == pytest.approx(delivery, abs=0.03)
     assert found.mean_delay_s == pytest.approx(delay_ms / 1e3, rel=0.15)
 
 
 def test_all_who_send_at_once_by_dcf_collide():
     found = contention(replace(DCF_B, send_offset="tick"), 5, 128, 0.1, seeds=[1])
-    assert (found.delivery_ratio, found.mean_delay_s) == (0.0, None)
+    assert (found.pdr, found.mean_delay_s) == (0.0, None)
 
 
 @pytest.mark.parametrize(

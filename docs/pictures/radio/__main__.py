@@ -1,4 +1,4 @@
-"""Draws the figures of docs/radio.md: `python -m docs.pictures.radio [NAME ...]`, all of them without a name."""
+"""Draws the figures of the pages about the radio: `python -m docs.pictures.radio [NAME ...]`, all without a name."""
 
 import sys
 

@@ -62,7 +62,7 @@ def _curve(
 ) -> None:
     """Our delivery over the number of nodes."""
     radio = replace(radio_like_ns3(*kind), access=Access(method))
-    found = [contention(radio, nodes, payload_bytes, interval_s, SEEDS).delivery_ratio for nodes in NODES]
+    found = [contention(radio, nodes, payload_bytes, interval_s, SEEDS).pdr for nodes in NODES]
     axes.plot(NODES, found, color=line_color(index), lw=1.4, label=name)
 
 

@@ -47,12 +47,12 @@ def coverage(*arguments: str | Path) -> dict[str, Any]:
 
 def test_contention_costs_delivery_and_time():
     few, many = (contention("ieee802154", "--contention", f"{nodes},20,0.1") for nodes in (2, 40))
-    assert few["delivery_ratio"] > 0.95 > many["delivery_ratio"]
+    assert few["pdr"] > 0.95 > many["pdr"]
     assert few["mean_delay_s"] < many["mean_delay_s"]
 
 
 def test_values_of_the_radio_may_be_set():
-    assert contention("ideal", "--contention", "3,20,0.1", "--set", "radio.loss=1.0")["delivery_ratio"] == 0.0
+    assert contention("ideal", "--contention", "3,20,0.1", "--set", "radio.loss=1.0")["pdr"] == 0.0
 
 
 def test_a_disk_covers_its_circle_from_the_place_or_the_robot():

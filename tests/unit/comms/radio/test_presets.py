@@ -196,27 +196,27 @@ def test_advertisements_collide_as_in_pure_aloha():
     """9 others, each on air 376 us in 10 ms: received if none starts 376 us before or after; 800 packets x 9."""
     found = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
     assert found.packets == 800
-    assert found.delivery_ratio == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
+    assert found.pdr == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
 
 
 def test_kilobots_listen_before_they_send():
     """20 in one spot, twice a second, as Kilobots do: without carrier sense a fifth would be lost."""
     found = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
     blind = in_one_spot(replace(preset("kilobot"), access=Access("aloha")), 20, 11, 0.5, runs=20)
-    assert blind.delivery_ratio == pytest.approx((1.0 - 2.0 * 3.2 / 500.0) ** 19, abs=0.05)
-    assert found.delivery_ratio > 0.95
+    assert blind.pdr == pytest.approx((1.0 - 2.0 * 3.2 / 500.0) ** 19, abs=0.05)
+    assert found.pdr > 0.95
     assert found.access_failure_share == 0.0
 
 
 @pytest.mark.parametrize("name", GAZEBO)
 def test_simulated_radios_never_disturb_one_another(name: str):
-    assert in_one_spot(replace(preset(name), send_offset="tick"), 10, 100, 0.1, runs=1).delivery_ratio == 1.0
+    assert in_one_spot(replace(preset(name), send_offset="tick"), 10, 100, 0.1, runs=1).pdr == 1.0
 
 
 def test_modems_that_call_at_once_hear_nothing_of_each_other():
     together = in_one_spot(replace(preset("acoustic"), send_offset="tick"), 2, 4, 1.0, runs=2)
-    assert together.delivery_ratio == 0.0
-    assert 0.2 < in_one_spot(preset("acoustic"), 2, 4, 1.0, runs=20).delivery_ratio < 0.6
+    assert together.pdr == 0.0
+    assert 0.2 < in_one_spot(preset("acoustic"), 2, 4, 1.0, runs=20).pdr < 0.6
 
 
 @pytest.mark.parametrize("name", NEW)

@@ -23,7 +23,7 @@ class Contention:
     """The results, over all packets handed over after the warm-up."""
 
     packets: int
-    delivery_ratio: float  # receptions / (packets x other nodes)
+    pdr: float  # receptions / (packets x other nodes)
     mean_delay_s: float | None  # from handing over to hearing; None if nothing was received
     access_failure_share: float  # packets given up for want of a free channel
 

@@ -16,7 +16,7 @@ from swarmwire.deploy.catalogue.schema import Entry, Parameter
 from swarmwire.deploy.cli.app import app
 
 NOTHING = "–"
-SCENARIOS = Path(__file__).parents[3] / "scenarios" / "behaviours"
+SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"
 SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
 CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
 KEYS = ("key", "unit", "value", "default", "meaning")
@@ -70,14 +70,10 @@ def behaviour_table() -> str:
 
 
 def behaviour_details(name: str) -> str:
-    """One behaviour: its docstring, needs and parameters; other pages can name its class."""
-    from swarmwire.agent import behaviours
-
+    """One behaviour: its docstring, needs and parameters."""
     of = next(of for of in entries("behaviours") if of.name == name)
-    module = getattr(behaviours, name).__module__
-    target = f"```{{py:class}} swarmwire.agent.behaviours.{name}\n:canonical: {module}.{name}\n:no-typesetting:\n```\n"
     facts = "".join(f"- {title}: {_setting(text)}\n" for title, text in of.facts)
-    return "\n".join([target, facts, text_of(of), "", *_tables(of, set())])
+    return "\n".join([facts, text_of(of), "", *_tables(of, set())])
 
 
 def page_of(name: str) -> str:

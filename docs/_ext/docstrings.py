@@ -1,4 +1,4 @@
-"""How autodoc reads this project: docstrings in Markdown, comments behind fields, and short names of array types."""
+"""A Sphinx extension: autodoc reads docstrings in Markdown, comments behind fields, and short names of array types."""
 
 import re
 import sys
@@ -13,6 +13,7 @@ from sphinx.domains.python import PyAttribute, PyFunction, PyMethod, PyProperty
 from sphinx.domains.python._object import PyObject
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
+from sphinx.util.typing import ExtensionMetadata
 
 from swarmwire.comms.config import bounds_of
 
@@ -27,13 +28,15 @@ ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[~?typing\.Any, \.\.\.\], ~?numpy\.
 ARRAY_LIKE = re.compile(r"~?numpy\._typing\._array_like\._Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]")
 
 
-def extend(app: Sphinx) -> None:
+def setup(app: Sphinx) -> ExtensionMetadata:
     """Let autodoc read docstrings and comments as this project writes them, and shorten the types of arrays."""
+    app.setup_extension("sphinx.ext.autodoc")
     app.connect("builder-inited", _read_field_comments)
     app.connect("autodoc-process-docstring", _prepare)
     kinds: dict[str, Any] = {"attribute": _Attribute, "function": _Function, "method": _Method, "property": _Property}
     for name, kind in kinds.items():
         app.add_directive_to_domain("py", name, kind, override=True)
+    return {"version": "1", "parallel_read_safe": True}
 
 
 def _prepare(_app: Sphinx, what: str, name: str, _of: Any, _options: Any, lines: list[str]) -> None:

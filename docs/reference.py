@@ -1,0 +1,44 @@
+"""Writes the generated tables into the pages: `python -m docs.reference`. `make docs-check` finds those out of date.
+
+A table stands between two comments, `<!-- reference: NAME -->` or `<!-- reference: NAME PART -->` and
+`<!-- /reference -->`. NAME is one of `reference_tables.TABLES`, PART the path of a scenario's table or the class of a
+behaviour.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+from docs.reference_tables import TABLES
+from swarmwire.comms.errors import BadInput
+from tests.docs.pages import PAGES
+
+ROOT = Path(__file__).parents[1]
+PLACE = re.compile(r"(^<!-- reference: ([^\n]+) -->\n)(.*?)(^<!-- /reference -->$)", re.DOTALL | re.MULTILINE)
+
+
+def filled(text: str, page: str) -> str:
+    """The text of a page with its tables as they are now; BadInput for a table that does not exist."""
+
+    def table(found: re.Match[str]) -> str:
+        name, *part = found[2].split()
+        if name not in TABLES:
+            raise BadInput(page, found[0].partition("\n")[0], f"expected one of {', '.join(TABLES)}")
+        return f"{found[1]}\n{TABLES[name](*part).strip()}\n\n{found[4]}"
+
+    return PLACE.sub(table, text)
+
+
+def main() -> int:
+    """Write the pages whose tables changed, and print their names."""
+    for page in PAGES:
+        before = (ROOT / page).read_text(encoding="utf-8")
+        after = filled(before, page)
+        if after != before:
+            (ROOT / page).write_text(after, encoding="utf-8")
+            sys.stdout.write(f"written: {page}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
