@@ -14,12 +14,16 @@ from swarmwire.agent.on_robot.safety import Watchdog
 from swarmwire.comms.clock import to_s
 from tests.support.clocks import until
 from tests.support.robots.faulty_link import Before, ByteByByte, CutAfter, FaultyLink, Late, Nothing
-from tests.support.robots.rig import OwnWireRig, Rig, made_up_readings, opened, readings, sense_until_lost
+from tests.support.robots.rig import Fields, OwnWireRig, Rig, made_up_readings, opened, readings, sense_until_lost
 from tests.support.robots.rigs import ON_ONE_RIG, RIGS
 
 SLACK_S = 2.0  # of a machine that is busy
 OWN = [name for name, kind in RIGS.items() if issubclass(kind, OwnWireRig)]
 ON_OWN_WIRE = pytest.mark.parametrize("rig", OWN, indirect=True)
+
+THAT_ROLL = pytest.mark.parametrize(
+    "rig", [name for name, kind in RIGS.items() if not kind.counts_steps], indirect=True
+)
 
 
 def with_sensor(name: str) -> pytest.MarkDecorator:
@@ -62,7 +66,7 @@ def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig
     assert sensed["compass.heading_rad"][0] == pytest.approx(heading_rad, abs=1e-5)
 
 
-@with_sensor("odometry")
+@THAT_ROLL
 @ON_ONE_RIG
 @given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
 def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list[tuple[float, float]]) -> None:
@@ -136,7 +140,7 @@ def test_nobody_at_the_address_is_told_at_once(rig: Rig) -> None:
 
 def test_a_robot_that_dies_is_lost_in_time_and_found_again_when_it_lives(connected: Rig) -> None:
     connected.publish(readings(0.0))
-    connected.driver.sense(frozenset({"odometry"}))
+    connected.driver.sense(frozenset({"imu"}))
     connected.publish(readings(0.0), alive=False)
     began_ns = connected.clock.now_ns()
     sense_until_lost(connected)
@@ -166,18 +170,23 @@ def test_a_robot_that_is_revived_is_at_rest(connected: Rig) -> None:
     connected.until_told(0.0, 0.0)
 
 
+@THAT_ROLL
 def test_odometry_goes_on_after_the_gateway_was_closed_and_opened_again(connected: Rig) -> None:
-    connected.come_back(readings(0.0))
+    connected.come_back(rolled(0.0))
     far_m = 0.8 * connected.farthest_m
-    connected.come_back(readings(far_m))
+    connected.come_back(rolled(far_m))
     connected.gateway.close()
     sense_until_lost(connected)
 
     connected.reopen()
-    connected.publish(readings(far_m + 0.01))  # it rolled on for a moment
+    connected.publish(rolled(far_m + 0.01))  # it rolled on for a moment
     connected.driver.open()
-    connected.come_back(readings(far_m + 0.01))
-    connected.come_back(readings(2.0 * far_m))
+    connected.come_back(rolled(far_m + 0.01))
+    connected.come_back(rolled(2.0 * far_m))
+
+
+def rolled(travel_m: float) -> Fields:
+    return {"odometry.left_m": np.array([travel_m]), "odometry.right_m": np.array([travel_m])}
 
 
 def test_a_driver_that_reconnects_has_its_robot_at_rest_first(connected: Rig) -> None:
@@ -248,8 +257,8 @@ def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
 @ON_OWN_WIRE
 def test_answers_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers = ByteByByte()
-    for travel_m in (0.1, 0.2, 0.3):
-        rig.come_back(readings(travel_m))
+    for turn_radps in (0.1, 0.2, 0.3):
+        rig.come_back(readings(turn_radps))
 
 
 @ON_OWN_WIRE
@@ -298,8 +307,8 @@ def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_co
     rig.come_back(readings(0.1))
     link.answers = late = Late()
     rig.publish(readings(0.2))
-    before = rig.driver.sense(frozenset({"odometry"}))
-    assert before["odometry.left_m"] == pytest.approx(0.1, abs=1e-3)
+    before = rig.driver.sense(frozenset({"imu"}))
+    assert before["imu.turn_radps"] == pytest.approx(0.1, abs=1e-3)
     assert rig.driver.counts()["late_answers"] >= 1
     late.let_go.set()
     rig.come_back(readings(0.2))

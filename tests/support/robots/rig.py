@@ -48,6 +48,7 @@ class Rig(ABC):
             reading may be.
         limits: by "sensor.field", the least and the greatest that the wire can tell; others have none.
         speed_resolution: the same of commands, in m/s and rad/s.
+        counts_steps: whether the robot counts the steps of its commands, whatever odometry is published.
         farthest_m: how far a wheel may roll in a tick for the wire to tell it.
         silent_s: drivers that are made call a robot lost that is silent for so long; long, for machines are busy.
         connect_s: drivers that are made wait so long for their robot.
@@ -56,6 +57,7 @@ class Rig(ABC):
     resolution: ClassVar[dict[str, float]]
     limits: ClassVar[dict[str, tuple[float, float]]] = {}
     speed_resolution: ClassVar[tuple[float, float]]
+    counts_steps: ClassVar[bool] = False
     farthest_m: ClassVar[float] = 3.0
 
     @classmethod
@@ -179,9 +181,13 @@ class OwnWireRig(Rig):
         """Where a TCP proxy has to connect to."""
 
 
-def readings(travel_m: float) -> Fields:
-    """Odometry of wheels that rolled so far."""
-    return {"odometry.left_m": np.array([travel_m]), "odometry.right_m": np.array([travel_m])}
+def readings(turn_radps: float) -> Fields:
+    """The IMU of a robot that turns at this rate."""
+    return {
+        "imu.forward_mps2": np.zeros(1),
+        "imu.left_mps2": np.zeros(1),
+        "imu.turn_radps": np.array([turn_radps]),
+    }
 
 
 def opened(driver: Driver) -> bool:

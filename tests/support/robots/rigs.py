@@ -66,13 +66,13 @@ class Epuck2Rig(OwnWireRig):
         "imu.turn_radps": (-250 * pi / 180, 250 * pi / 180 * 32767 / 32768),
     }
     speed_resolution: ClassVar[tuple[float, float]] = (ROUNDED * STEP_M, 2 * ROUNDED * STEP_M / 0.053)
-    stream: ClassVar[bool] = False
+    counts_steps: ClassVar[bool] = True
 
     def made_body(self) -> Body:
         return load_body("epuck2")
 
     def made_gateway(self, address: str) -> Gateway:
-        options = Epuck2GatewayOptions(stream=self.stream, north_deg=30.0)
+        options = Epuck2GatewayOptions(north_deg=30.0)
         return Epuck2Gateway(["a-0", "a-1"], self.body, address, options, self.clock)
 
     def made_driver(self, address: str) -> Driver:
@@ -86,12 +86,6 @@ class Epuck2Rig(OwnWireRig):
     def address_of_link(self) -> tuple[str, int]:
         host, _, port = self.address.partition(":")
         return host, int(port)
-
-
-class StreamingEpuck2Rig(Epuck2Rig):
-    """A robot that goes on to answer the last command, as the firmware of the radio module does."""
-
-    stream: ClassVar[bool] = True
 
 
 class Ros2Rig(Rig):
@@ -168,7 +162,6 @@ class StampedRmwRig(RmwRig):
 
 RIGS: dict[str, type[Rig]] = {
     "epuck2": Epuck2Rig,
-    "epuck2 that streams": StreamingEpuck2Rig,
     "ros2 behind a bridge": Ros2Rig,
     "ros2 by rmw_zenoh": RmwRig,
     "ros2 by rmw_zenoh, stamped": StampedRmwRig,

@@ -1,22 +1,19 @@
 """The gateway against a program that knows only the fact sheet."""
 
-import asyncio
 import socket
-from asyncio import Transport
-from collections import Counter
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from math import inf, nan, pi
 
 import numpy as np
 import pytest
 
+from swarmwire.agent.drivers.driver import DriverLost
+from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.epuck2.commands import RobotCommand
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
-from swarmwire.world.gateways.epuck2.emulated_robot import Connection, EmulatedRobot
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from tests.support.clocks import until
 from tests.support.robots.epuck2 import SENSORS, command, read
@@ -70,8 +67,6 @@ def test_readings_stand_where_the_fact_sheet_says(gateway: Epuck2Gateway) -> Non
         "light.value": three([0.0, 1.0, 0.5, 0, 0, 0, 0, 0]),
         "ground.shade": three([0.0, 0.5, 1.0]),
         "scan.range_m": three([0.535]),
-        "odometry.left_m": three(40_000 * STEP_M),
-        "odometry.right_m": three(-7 * STEP_M),
         "imu.forward_mps2": three(9.80665),
         "imu.left_mps2": three(-9.80665 / 2),
         "imu.turn_radps": three(-pi / 4),
@@ -88,7 +83,6 @@ def test_readings_stand_where_the_fact_sheet_says(gateway: Epuck2Gateway) -> Non
     assert told["ambient"] == (4000, 0, 2000, 4000, 4000, 4000, 4000, 4000)
     assert told["ground"] == (0, 500, 1000)
     assert told["tof"] == 500
-    assert told["steps"] == (40_000 - 65_536, -7)
     assert told["acc"] == (-400, 800, 800)
     assert told["acceleration"] == pytest.approx(1200.0)
     assert told["inclination"] == pytest.approx(np.degrees(np.arccos(800 / 1200)), abs=1e-3)
@@ -110,29 +104,48 @@ def test_what_no_sense_tells_is_as_of_a_robot_at_rest(gateway: Epuck2Gateway) ->
 
 
 def test_a_reading_that_is_lost_leaves_the_number_before(gateway: Epuck2Gateway) -> None:
-    for travel_m, volts, range_m in ((0.5, 4.0, 0.3), (nan, nan, inf)):
+    for turn_radps, volts, range_m in ((0.5, 4.0, 0.3), (nan, nan, inf)):
         fields = {
-            "odometry.left_m": three(travel_m),
-            "odometry.right_m": three(travel_m),
+            "imu.forward_mps2": three(0.0),
+            "imu.left_mps2": three(0.0),
+            "imu.turn_radps": three(turn_radps),
             "battery.voltage_v": three(volts),
             "scan.range_m": three([range_m]),
         }
         gateway.publish(0, fields, ALIVE)
     with program(gateway) as robot:
         told = read(SENSORS, exchanged(robot, command())[1:])
-    assert told["steps"] == (round(0.5 / STEP_M),) * 2
+    assert told["gyro"][2] == round(np.degrees(0.5) * 32768 / 250)
     assert told["battery"] == round(4.0 * 819.2)
     assert told["tof"] > 2000
 
 
-def test_each_command_has_the_answer_that_it_asks_for(gateway: Epuck2Gateway) -> None:
-    gateway.publish(0, {}, ALIVE)
+@pytest.mark.parametrize(
+    ("request_bits", "parts"),
+    [(0, {0: 3}), (1, {0: 1}), (2, {0: 2}), (3, {0: 1, 38401: 2})],
+    ids=["none", "one", "two", "both"],
+)
+def test_the_last_command_is_answered_again_and_again(
+    gateway: Epuck2Gateway, request_bits: int, parts: dict[int, int]
+) -> None:
+    size = {3: 1, 1: 38401, 2: 105}
     with program(gateway) as robot:
-        assert exchanged(robot, command(request=0), 1) == b"\x03"
-        assert exchanged(robot, command(request=2))[0] == 2
-        image = exchanged(robot, command(request=3), 38401 + 105)
-    assert (image[0], image[38401]) == (1, 2)
-    assert gateway.counts() == {"images_without_camera": 1}
+        robot.sendall(command(request=request_bits))
+        for _ in range(5):
+            answer = received(robot, sum(size[first] for first in parts.values()))
+            assert {at: answer[at] for at in parts} == parts
+
+
+def test_a_program_that_reads_slowly_finds_no_old_reading(gateway: Epuck2Gateway) -> None:
+    """It reads one part for each command, half of what a robot answers."""
+    with program(gateway) as robot:
+        for tenth_s in range(1, 40):
+            gateway.publish(tenth_s, {"scan.range_m": three([0.035 + 0.01 * tenth_s])}, ALIVE)
+            robot.sendall(command(request=3))
+            if received(robot, 1) == b"\x01":
+                received(robot, 38400)
+            else:
+                assert read(SENSORS, received(robot, 104))["tof"] >= 10 * (tenth_s - 2)
 
 
 def test_speeds_are_clipped_wheel_by_wheel_as_the_firmware_does(gateway: Epuck2Gateway) -> None:
@@ -157,21 +170,60 @@ def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) 
     assert dict(zip(later.place.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
 
 
+def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2Gateway) -> None:
+    at_a_wall = {"odometry.left_m": three(0.0), "odometry.right_m": three(0.0)}
+    with program(gateway) as robot:
+        exchanged(robot, command(left=1000, right=-2000))
+        gateway.publish(0, at_a_wall, ALIVE)
+        gateway.take()
+        gateway.publish(20 * NS_PER_S, at_a_wall, ALIVE)
+        until(lambda: steps(robot) == (20_000, -22_000))  # the firmware's limit is 1100 steps/s
+        gateway.publish(40 * NS_PER_S, at_a_wall, ALIVE)
+        until(lambda: steps(robot) == (40_000 - 65_536, -44_000 + 65_536))
+
+
 def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gateway) -> None:
-    travel = {"odometry.left_m": three(1.0), "odometry.right_m": three(1.0)}
-    gateway.publish(0, travel, ALIVE)
     with program(gateway) as robot:
         exchanged(robot, command(settings=4, left=0, right=100))
         assert not gateway.take().drive.any()
-        gateway.publish(1, travel, ALIVE)
-        assert read(SENSORS, exchanged(robot, command())[1:])["steps"] == (0, 100)
+        gateway.publish(1, {}, ALIVE)
+        until(lambda: steps(robot) == (0, 100))
 
 
-def test_the_robots_own_avoidance_is_refused_and_counted(gateway: Epuck2Gateway) -> None:
+def test_a_robot_that_was_switched_on_counts_from_0(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
-        exchanged(robot, command(settings=2, left=100, right=100))
-    assert gateway.take().linear_mps[0] == pytest.approx(100 * STEP_M)
-    assert gateway.counts() == {"avoidance_refused": 1}
+        exchanged(robot, command(left=100, right=100))
+    gateway.take()
+    gateway.publish(NS_PER_S, {}, np.array([False, True, True]))
+    gateway.publish(2 * NS_PER_S, {}, ALIVE)
+    with program(gateway) as robot:
+        assert read(SENSORS, exchanged(robot, command())[1:])["steps"] == (0, 0)
+
+
+def steps(robot: socket.socket) -> tuple[int, int]:
+    """The counters in the next answer."""
+    return read(SENSORS, exchanged(robot, command(left=1000, right=-2000))[1:])["steps"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "count"),
+    [
+        ({"settings": 1}, "calibration_refused"),
+        ({"settings": 2}, "avoidance_refused"),
+        ({"leds": 0b010000}, "body_led_refused"),
+        ({"leds": 0b100000}, "front_led_refused"),
+        ({"sound": 4}, "sound_refused"),
+    ],
+)
+def test_what_it_does_not_do_is_counted_once_a_robot_and_the_rest_applies(
+    gateway: Epuck2Gateway, asked: dict[str, int], count: str
+) -> None:
+    for which in (0, 1):
+        with program(gateway, which) as robot:
+            for _ in range(3):
+                exchanged(robot, command(left=100, right=100, **asked))
+    assert gateway.take().linear_mps[:2] == pytest.approx([100 * STEP_M] * 2)
+    assert gateway.counts() == {count: 2}
 
 
 def test_what_is_no_command_is_counted_and_hung_up_on(gateway: Epuck2Gateway) -> None:
@@ -214,6 +266,15 @@ def test_a_program_that_is_kept_waiting_is_counted(gateway: Epuck2Gateway) -> No
             until(lambda: gateway.counts() == {"clients_kept_waiting": 1})
 
 
+def test_a_driver_names_the_reason_why_another_program_keeps_it_from_stopping_a_robot(gateway: Epuck2Gateway) -> None:
+    with program(gateway) as other:
+        exchanged(other, command(left=100, right=100))
+        driver = Epuck2Driver(gateway.addresses[0], BODY, Epuck2Options(connect_s=0.2), WallClock())
+        with pytest.raises(DriverLost, match="obeys one program at a time, so end any other one, or switch"):
+            driver.open()
+        assert gateway.take().linear_mps[0] == pytest.approx(100 * STEP_M)
+
+
 def test_programs_that_wait_in_vain_are_dropped(gateway: Epuck2Gateway) -> None:
     with program(gateway) as served:
         exchanged(served, command())
@@ -221,62 +282,6 @@ def test_programs_that_wait_in_vain_are_dropped(gateway: Epuck2Gateway) -> None:
         until(lambda: gateway.counts().get("connections_dropped") == 2)
         for one in waiting:
             one.__exit__(None, None, None)
-
-
-def test_a_program_that_reads_no_answers_is_hung_up_on(gateway: Epuck2Gateway) -> None:
-    with program(gateway) as robot, suppress(ConnectionError):
-        while "unread_answers" not in gateway.counts():
-            robot.sendall(100 * command(request=1))
-
-
-def test_nothing_is_written_to_a_program_that_has_left_and_it_is_counted_once() -> None:
-    told, counts, transport = [], Counter[str](), Gone(after=2)
-    robot = EmulatedRobot(told.append, lambda: b"answer", counts)
-    connection = Connection(robot)
-    connection.connection_made(transport)
-    connection.data_received(20 * command(left=5, request=2))
-    robot.tell_unasked()
-    assert transport.written == [b"answer"] * 2
-    assert len(told) == 20  # the last one may be to halt
-    assert counts == {"left_unanswered": 1}
-
-
-class NoSocket:
-    """Takes any option."""
-
-    def setsockopt(self, *_: int) -> None:
-        """As a socket does."""
-
-
-class Gone(Transport):
-    """A transport that is lost after some answers."""
-
-    def __init__(self, after: int) -> None:
-        super().__init__({"socket": NoSocket()})
-        self._after, self.written = after, list[bytes]()
-
-    def is_closing(self) -> bool:
-        return len(self.written) >= self._after
-
-    def write(self, data) -> None:
-        self.written.append(bytes(data))
-
-    def get_write_buffer_size(self) -> int:
-        return 0
-
-    def resume_reading(self) -> None:
-        """It is never read."""
-
-
-def test_a_robot_that_streams_repeats_its_answer_with_each_new_reading() -> None:
-    gateway = a_gateway(stream=True)
-    gateway.addresses = gateway.open()
-    with closing(gateway), program(gateway) as robot:
-        gateway.publish(0, {"scan.range_m": three([0.535])}, ALIVE)
-        exchanged(robot, command())
-        for i in range(1, 4):
-            gateway.publish(i, {"scan.range_m": three([0.535 + 0.1 * i])}, ALIVE)
-            assert read(SENSORS, received(robot, 105)[1:])["tof"] == 500 + 100 * i
 
 
 def test_a_taken_address_is_refused_and_leaves_nothing_open(gateway: Epuck2Gateway) -> None:
@@ -295,24 +300,3 @@ def test_an_address_that_cannot_be_one_is_refused(address: str) -> None:
 def test_hosts_or_ports_count_up() -> None:
     with closing(a_gateway("127.0.1.*:0")) as gateway:
         assert [address.partition(":")[0] for address in gateway.open()] == ["127.0.1.1", "127.0.1.2", "127.0.1.3"]
-
-
-def test_a_program_that_has_gone_is_written_no_answer_and_its_commands_are_told(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    told: list[RobotCommand] = []
-    robot = EmulatedRobot(told.append, lambda: b"", Counter())
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        theirs = socket.create_connection(server.getsockname())
-        ours, _ = server.accept()
-
-    async def serve() -> None:
-        transport, connection = await asyncio.get_running_loop().create_connection(lambda: Connection(robot), sock=ours)
-        transport.abort()
-        for _ in range(10):  # asyncio complains of the sixth write
-            connection.data_received(RobotCommand(7, 7).encoded())
-
-    with theirs:
-        asyncio.run(serve())
-    assert [command.left for command in told] == [7] * 10
-    assert not caplog.records

@@ -1,6 +1,8 @@
 """Protocols of robots at both ends: the e-puck2's commands and answers, ROS 2's messages."""
 
+import socket
 from collections import Counter
+from contextlib import closing
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +20,8 @@ from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
 from swarmwire.comms.robots.ros2.links import Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
-from swarmwire.world.gateways.epuck2.emulated_robot import Connection
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
+from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.base import CommandInbox
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
@@ -28,34 +30,10 @@ from tests.tools.fuzz.mutations import mutated_bytes, pick
 from tests.tools.fuzz.target import ByteTarget
 from tests.tools.fuzz.targets.radio import CLOCK, Payload
 
+MAX_CHUNKS = 100  # that a robot is sent
 CHUNK_BYTES = (1, 7, 21, 64, 1 << 20)
 EPUCK2 = load_body("epuck2")
 UTC_NS = 1_767_225_600_000_000_000
-
-
-class Transport:
-    """In place of asyncio's: it keeps what is written."""
-
-    def __init__(self) -> None:
-        self.written, self.closed = b"", False
-
-    def write(self, data: bytes) -> None:
-        self.written += data
-
-    def abort(self) -> None:
-        self.closed = True
-
-    def is_closing(self) -> bool:
-        return self.closed
-
-    def get_write_buffer_size(self) -> int:
-        return 0
-
-    def resume_reading(self) -> None:
-        pass
-
-    def pause_reading(self) -> None:
-        pass
 
 
 class Epuck2Commands(ByteTarget):
@@ -72,20 +50,27 @@ class Epuck2Commands(ByteTarget):
 
     def feed(self, case: bytes) -> str | None:
         gateway = Epuck2Gateway(["a-0"], EPUCK2, "", Epuck2GatewayOptions(), CLOCK)
-        robot, transport = gateway._robot(0), Transport()
-        connection: Any = Connection(robot)
-        connection.transport = transport
-        robot.on_connect(connection)
-        for chunk in chunks(case):
-            if transport.closed:
-                break
-            robot.on_receive(connection, chunk)
-        robot.on_disconnect(connection)
+        robot, answers, hung_up = gateway._robot(0), Answers(), False
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            client = socket.create_connection(server.getsockname())
+            robot.connect(server.accept()[0])
+        with client, closing(UnreadBytes()) as unread:
+            for chunk in chunks(case)[:MAX_CHUNKS]:
+                try:
+                    client.sendall(chunk)
+                    robot.do_pass(unread)
+                    robot.do_pass(unread)
+                    list(answers.fed(client.recv(1 << 16, socket.MSG_DONTWAIT)))
+                except BlockingIOError:  # it has said nothing
+                    continue
+                except ConnectionError:
+                    hung_up = True
+                    break
+        robot.hang_up()
         commands = gateway.take()
         if not (np.isfinite(commands.linear_mps).all() and np.isfinite(commands.angular_radps).all()):
             raise AssertionError("a speed that is not finite")
-        list(Answers().fed(transport.written))
-        return "hung up" if transport.closed else None
+        return "hung up" if hung_up else None
 
 
 class Epuck2Answers(ByteTarget):

@@ -14,7 +14,6 @@ from swarmwire.comms.robots.epuck2.commands import (
     ALL_DARK,
     MAX_STEPS_PER_S,
     Answers,
-    Commands,
     Lights,
     RobotCommand,
     body_speeds,
@@ -64,13 +63,6 @@ def test_the_layout_of_the_sensors_is_the_fact_sheets_offset_by_offset() -> None
     ]
     assert ours == theirs
     assert SENSORS.itemsize == 104
-
-
-@given(commands=st.lists(COMMANDS, max_size=5), cuts=st.lists(st.integers(0, 105)))
-def test_commands_are_read_however_they_are_cut(commands: list[RobotCommand], cuts: list[int]) -> None:
-    sent, stream = b"".join(command.encoded() for command in commands), Commands()
-    assert [command for piece in cut(sent, cuts) for command in stream.fed(piece)] == commands
-    assert not stream.begun
 
 
 @given(headers=st.lists(st.sampled_from([1, 2, 3]), max_size=4), cuts=st.lists(st.integers(0, 80_000)))

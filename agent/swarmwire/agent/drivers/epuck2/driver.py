@@ -123,7 +123,10 @@ class Epuck2Driver(Driver):
             self._exchange(link, options.connect_s + CALIBRATION_S, RobotSettingsBits.CALIBRATE)
             self._calibrate = False
         if not self._exchange(link, options.connect_s):
-            raise self._lose(DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer"))
+            one = "it obeys one program at a time, so end any other one, or switch the robot off"
+            raise self._lose(
+                DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer: {one}")
+            )
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
         """As `Driver.sense`."""
@@ -165,6 +168,7 @@ class Epuck2Driver(Driver):
         if link is None:
             return
         try:
+            link.drain()  # these answers are older than the command
             self._send_command(link, 0, 0, STOP)
             # Closing with unread answers resets the connection, which may discard the command.
             self._receive_owed(link, self._options.answer_s, reading=False)

@@ -31,6 +31,7 @@ STEPS_PER_TURN = 1000
 M_PER_STEP = pi * 0.04 / STEPS_PER_TURN  # wheels of 40 mm
 MAX_STEPS_PER_S = 1100  # the firmware's limit of a wheel
 COUNT = 8  # LEDs
+BODY_LED, FRONT_LED = 1 << 4, 1 << 5  # bits of `Lights.switched`
 RED = 0xFF0000
 BRIGHTEST = 100  # of red, green and blue on the wire; above it a component keeps its value
 # Sensors of a body that an e-puck2 can read.
@@ -49,9 +50,14 @@ def wheel_steps(linear_mps: float, angular_radps: float, wheel_base_m: float) ->
     return round(left * scale), round(right * scale)
 
 
+def limited(steps_per_s: int) -> int:
+    """The speed of a wheel within the firmware's limit."""
+    return max(-MAX_STEPS_PER_S, min(MAX_STEPS_PER_S, steps_per_s))
+
+
 def body_speeds(left: int, right: int, wheel_base_m: float) -> tuple[float, float]:
     """Speed in m/s and turn rate to the left in rad/s at these steps/s, within the firmware's limit."""
-    left, right = (max(-MAX_STEPS_PER_S, min(MAX_STEPS_PER_S, steps)) for steps in (left, right))
+    left, right = limited(left), limited(right)
     return 0.5 * (left + right) * M_PER_STEP, (right - left) * M_PER_STEP / wheel_base_m
 
 
@@ -181,32 +187,6 @@ class Answers:
             payload = bytes(rest[1:end])
             del rest[:end]
             yield Answer(header, payload)
-
-
-class Commands:
-    """A parser of the commands in a program's byte stream, however the stream is cut; no I/O."""
-
-    def __init__(self) -> None:
-        self._rest = bytearray()
-
-    @property
-    def begun(self) -> bool:
-        """Whether a part of a command has come."""
-        return bool(self._rest)
-
-    def fed(self, data: bytes) -> Iterator[RobotCommand]:
-        """The commands that are complete with these bytes; BadFrame at an invalid one, and the rest is lost."""
-        rest = self._rest
-        rest += data
-        while len(rest) >= COMMAND_BYTES:
-            packet = bytes(rest[:COMMAND_BYTES])
-            del rest[:COMMAND_BYTES]
-            try:
-                command = RobotCommand.decoded(packet)
-            except BadFrame:
-                rest.clear()
-                raise
-            yield command
 
 
 def _header(first: int) -> Header:

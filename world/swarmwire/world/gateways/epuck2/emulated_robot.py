@@ -1,20 +1,35 @@
-"""The TCP side of emulated e-puck2s: the address of each, its connections, and the server thread of a group."""
+"""The TCP side of emulated e-puck2s: the address of each, its connections, and the thread of a group.
 
-import asyncio
+A robot's radio module has one task, whose loop does one thing in each pass and then sleeps (`socket_e-puck2.c` of its
+firmware): it reads a command without waiting, or sends one part of the answer to the last command that it read. So it
+repeats that answer until there is another command.
+
+A client that reads more slowly finds ever older answers in the buffers of a real connection. Here an answer waits until
+the client has read those before, so that the buffers of this machine, which are larger than a robot's, delay nothing.
+"""
+
+import selectors
 import socket
+import termios
+from array import array
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
+from fcntl import ioctl
 from threading import Event, Thread
-from typing import cast
 
+from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.epuck2.commands import Commands, RobotCommand
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, PORT, Header, PacketRequest
+from swarmwire.comms.robots.epuck2.commands import RobotCommand
+from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PAYLOAD_BYTES, PORT, Header, PacketRequest
+from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 
 MAX_HOSTS = 254  # of a network of the last byte
 MAX_WAITING = 4  # connections; beyond that the oldest is dropped
-MAX_UNREAD_BYTES = 1 << 20  # of answers; a client beyond that reads none
 BACKLOG = 16
+PASS_NS = to_ns(0.01)  # the task sleeps for ten ticks of 1 ms
+FLUSH_COMMANDS = 5  # if so many have come, all but the last are dropped
+SEND_BUFFER_BYTES = 5744  # of the module's TCP; with more, a slow client on another machine would read older answers
 _BLACK_IMAGE = bytes([Header.IMAGE]) + bytes(PAYLOAD_BYTES[Header.IMAGE])
 _EMPTY = bytes([Header.EMPTY])
 WHERE = "gateway epuck2"
@@ -41,32 +56,7 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
     return [(host, first + i if first else 0) for i in range(robots)]
 
 
-# `Connection` and `EmulatedRobot` run in the thread of the `Server`.
-
-
-class Connection(asyncio.Protocol):
-    """One connection; its robot decides when it is read."""
-
-    def __init__(self, robot: "EmulatedRobot") -> None:
-        self._robot = robot
-        self.commands = Commands()
-        self.unanswered = False  # whether an answer was lost, since the connection was gone
-        self.transport: asyncio.Transport
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As asyncio has it."""
-        self.transport = cast("asyncio.Transport", transport)
-        # asyncio leaves that out for sockets that it has not made itself, and an answer could wait for 40 ms.
-        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._robot.on_connect(self)
-
-    def data_received(self, data: bytes) -> None:
-        """As asyncio has it."""
-        self._robot.on_receive(self, data)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """As asyncio has it."""
-        self._robot.on_disconnect(self)
+# `EmulatedRobot` runs in the thread of the `Server`.
 
 
 class EmulatedRobot:
@@ -76,151 +66,161 @@ class EmulatedRobot:
     """
 
     def __init__(
-        self, on_command: Callable[[RobotCommand], None], answer: Callable[[], bytes], counts: Counter[str]
+        self, on_command: Callable[[RobotCommand], None], sensors: Callable[[], bytes], counts: Counter[str]
     ) -> None:
-        self._on_command, self._answer, self._counts = on_command, answer, counts
-        self._served: Connection | None = None
-        self._waiting: deque[Connection] = deque()
-        self._request: PacketRequest | None = None  # of the last command of the one that is served
+        """`sensors` returns the newest answer with sensors, its first byte included."""
+        self._on_command, self._sensors, self._counts = on_command, sensors, counts
+        self._waiting: deque[socket.socket] = deque()
         self._alive = True
+        self._serve(None)
 
-    def on_connect(self, connection: Connection) -> None:
+    def connect(self, client: socket.socket) -> None:
         """Serve a new connection, or let it wait."""
-        self._waiting.append(connection)
-        if self._alive and self._served is None:
-            self._serve_next()
-        else:
-            # Not at once: before Python 3.11.5 a transport begins to read after it is made, paused or not.
-            asyncio.get_running_loop().call_soon(self._keep_waiting, connection)
-            self._counts["clients_kept_waiting"] += self._served is not None
-            if len(self._waiting) > MAX_WAITING:
-                self._counts["connections_dropped"] += 1
-                self._waiting.popleft().transport.abort()
-
-    def _keep_waiting(self, connection: Connection) -> None:
-        if connection in self._waiting:
-            connection.transport.pause_reading()
-
-    def on_receive(self, connection: Connection, data: bytes) -> None:
-        """Execute the commands in this data and answer them, also if the client does not wait for the answers."""
-        try:
-            for command in connection.commands.fed(data):
-                self._request = command.request
-                self._on_command(command)
-                self._reply(connection, command.request)
-        except BadFrame as bad:
-            self._counts[bad.fault] += 1
-            connection.transport.abort()
-
-    def on_disconnect(self, connection: Connection) -> None:
-        """Forget a lost connection; the robot keeps its last command."""
-        if connection.commands.begun:
-            self._counts["half_commands"] += 1
-        if connection in self._waiting:
-            self._waiting.remove(connection)
-        elif connection is self._served:
-            self._served = None
-            if self._alive:
-                self._serve_next()
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._client is not None:
+            self._counts["clients_kept_waiting"] += 1
+        self._waiting.append(client)
+        if len(self._waiting) > MAX_WAITING:
+            self._counts["connections_dropped"] += 1
+            self._waiting.popleft().close()
 
     def live(self, alive: bool) -> None:
         """Set whether the robot is alive."""
         if alive and not self._alive:
             self.hang_up()
-        elif self._alive and not alive and self._served is not None:
-            self._served.transport.pause_reading()
         self._alive = alive
-
-    def tell_unasked(self) -> None:
-        """Answer the last command once more, unless the last answer is still unread."""
-        connection, request = self._served, self._request
-        if connection and request is not None and self._alive and not connection.transport.get_write_buffer_size():
-            self._reply(connection, request)
 
     def hang_up(self) -> None:
         """Drop all connections."""
-        for connection in (*self._waiting, *([self._served] if self._served else [])):
-            connection.transport.abort()
+        for client in (*self._waiting, *([self._client] if self._client else [])):
+            client.close()
         self._waiting.clear()
-        self._served = None
+        self._serve(None)
 
-    def _serve_next(self) -> None:
-        if self._waiting:
-            self._served, self._request = self._waiting.popleft(), None
-            self._served.transport.resume_reading()
+    def do_pass(self, unread: UnreadBytes) -> None:
+        """One pass of the task; the robot keeps its last command when a connection is lost."""
+        if self._client is None and self._waiting and self._alive:
+            self._serve(self._waiting.popleft())
+        client = self._client
+        if client is None or not self._alive:
+            return
+        try:
+            if not (self._unsent or self._parts):
+                self._read(client)
+                if self._command is not None and not self._begun and not unread.of(client):
+                    self._parts.extend(_parts_of(self._command.request))
+                return
+            if not self._unsent:
+                self._unsent = memoryview(self._part(self._parts.popleft()))
+            while self._unsent:
+                self._unsent = self._unsent[client.send(self._unsent) :]
+        except BlockingIOError:  # as long as the client does not read, the robot waits
+            return
+        except BadFrame as bad:
+            self._counts[bad.fault] += 1
+            self._lose(client)
+        except OSError:
+            self._lose(client)
 
-    def _reply(self, connection: Connection, request: PacketRequest) -> None:
-        if connection.transport.is_closing():  # asyncio would complain of each answer
-            self._counts["left_unanswered"] += not connection.unanswered
-            connection.unanswered = True
-            return
-        if connection.transport.get_write_buffer_size() > MAX_UNREAD_BYTES:
-            self._counts["unread_answers"] += 1
-            connection.unanswered = True
-            connection.transport.abort()
-            return
-        image = b""
-        if request & PacketRequest.IMAGE:
-            self._counts["images_without_camera"] += 1
-            image = _BLACK_IMAGE
-        packet = self._answer() if request & PacketRequest.SENSORS else b"" if request else _EMPTY
-        connection.transport.write(image + packet)  # at once: it could be gone after the first half
+    def _serve(self, client: socket.socket | None) -> None:
+        self._client = client
+        self._begun = b""  # of a command, of which the rest is still to come
+        self._command: RobotCommand | None = None  # the last of this connection
+        self._parts: deque[Header] = deque()  # of the answer, still to be sent
+        self._unsent = memoryview(b"")  # of the part that is being sent
+
+    def _lose(self, client: socket.socket) -> None:
+        if self._begun:
+            self._counts["half_commands"] += 1
+        client.close()
+        self._serve(None)
+
+    def _read(self, client: socket.socket) -> None:
+        """Read a command if one has come; ConnectionError if the client has left."""
+        if not self._begun:
+            self._flush(client)
+        with suppress(BlockingIOError):
+            data = client.recv(COMMAND_BYTES - len(self._begun))
+            if not data:
+                raise ConnectionResetError
+            self._begun += data
+        if len(self._begun) == COMMAND_BYTES:
+            packet, self._begun = self._begun, b""
+            self._command = RobotCommand.decoded(packet)
+            self._on_command(self._command)
+
+    def _flush(self, client: socket.socket) -> None:
+        """Drop commands if many have come: all whole ones but the last, or all of them before a part of another."""
+        waiting = array("i", [0])
+        ioctl(client, termios.FIONREAD, waiting)
+        whole, more = divmod(waiting[0], COMMAND_BYTES)
+        if whole >= FLUSH_COMMANDS:
+            dropped = whole if more else whole - 1
+            client.recv(dropped * COMMAND_BYTES)
+            self._counts["commands_flushed"] += dropped
+
+    def _part(self, header: Header) -> bytes:
+        return {Header.IMAGE: _BLACK_IMAGE, Header.EMPTY: _EMPTY}.get(header) or self._sensors()
+
+
+def _parts_of(request: PacketRequest) -> list[Header]:
+    """The parts of an answer, in their order."""
+    image = [Header.IMAGE] if request & PacketRequest.IMAGE else []
+    sensors = [Header.SENSORS] if request & PacketRequest.SENSORS else []
+    return [*image, *sensors] or [Header.EMPTY]
 
 
 class Server:
     """A thread that serves the connections of all emulated e-puck2s of a group, from its creation until `close`."""
 
-    def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]]) -> None:
-        """BadInput if an address is in use or not permitted."""
-        self._robots = robots
+    def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]], clock: Clock) -> None:
+        """The robots' passes are by the clock. BadInput if an address is in use or not permitted."""
+        self._robots, self._clock = robots, clock
         self._sockets = _listening(addresses)
         self.addresses: list[tuple[str, int]] = [listening.getsockname()[:2] for listening in self._sockets]
-        self._loop = asyncio.new_event_loop()
-        self._ended = asyncio.Event()
-        self._serving = Event()
+        self._alive: deque[Sequence[bool]] = deque()  # which robots are, not yet set
+        self._ended = Event()
         self._thread = Thread(target=self._run, name="epuck2 gateway", daemon=True)
         self._thread.start()
-        self._serving.wait()
 
     def live(self, alive: Sequence[bool]) -> None:
         """Set which robots are alive."""
-        self._loop.call_soon_threadsafe(self._live, alive)
-
-    def tell_unasked(self) -> None:
-        """Send the newest readings to all connected clients."""
-        self._loop.call_soon_threadsafe(self._tell_unasked)
+        self._alive.append(alive)
 
     def close(self) -> None:
         """Close all connections, and free the addresses."""
-        self._loop.call_soon_threadsafe(self._ended.set)
+        self._ended.set()
         self._thread.join()
 
-    def _live(self, alive: Sequence[bool]) -> None:
-        for robot, is_alive in zip(self._robots, alive, strict=True):
-            robot.live(is_alive)
-
-    def _tell_unasked(self) -> None:
-        for robot in self._robots:
-            robot.tell_unasked()
-
     def _run(self) -> None:
-        try:
-            with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-                runner.run(self._serve())
-        finally:
-            self._serving.set()  # so that the constructor returns also if the thread fails
-
-    async def _serve(self) -> None:
-        servers = [
-            await self._loop.create_server(lambda robot=robot: Connection(robot), sock=listening)
-            for robot, listening in zip(self._robots, self._sockets, strict=True)
-        ]
-        self._serving.set()
-        await self._ended.wait()
-        for server in servers:
-            server.close()
-        for robot in self._robots:
+        clock, robots = self._clock, self._robots
+        due_ns = clock.now_ns()
+        with selectors.DefaultSelector() as listening, closing(UnreadBytes()) as unread:
+            for robot, its_socket in zip(robots, self._sockets, strict=True):
+                listening.register(its_socket, selectors.EVENT_READ, (its_socket, robot))
+            while not self._ended.is_set():
+                self._set_alive()
+                for ready, _ in listening.select(0):
+                    _accept(*ready.data)
+                for robot in robots:
+                    robot.do_pass(unread)
+                due_ns = max(due_ns + PASS_NS, clock.now_ns())  # a pass that is late is not made up for
+                clock.sleep_until(due_ns)
+        for robot, its_socket in zip(robots, self._sockets, strict=True):
+            its_socket.close()
             robot.hang_up()
+
+    def _set_alive(self) -> None:
+        while self._alive:
+            for robot, alive in zip(self._robots, self._alive.popleft(), strict=True):
+                robot.live(alive)
+
+
+def _accept(listening: socket.socket, robot: EmulatedRobot) -> None:
+    with suppress(OSError):  # the client has left again
+        client, _ = listening.accept()
+        robot.connect(client)
 
 
 def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
@@ -228,7 +228,7 @@ def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
     sockets: list[socket.socket] = []
     for host, port in addresses:
         try:
-            sockets.append(socket.create_server((host, port), backlog=BACKLOG))
+            sockets.append(_listening_at(host, port))
         except OSError as error:
             for listening in sockets:
                 listening.close()
@@ -236,3 +236,11 @@ def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
             expected = f"expected {host}:{port} to be free, and ours to take: {reason}"
             raise BadInput(WHERE, "address", expected) from error
     return sockets
+
+
+def _listening_at(host: str, port: int) -> socket.socket:
+    """A listening socket whose connections have the module's buffer."""
+    listening = socket.create_server((host, port), backlog=BACKLOG)
+    listening.setblocking(False)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+    return listening

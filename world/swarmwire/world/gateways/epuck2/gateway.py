@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.clock import DatedClock
+from swarmwire.comms.clock import DatedClock, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
@@ -27,11 +27,8 @@ from swarmwire.world.gateways.gateway import Commands, Gateway
 
 @dataclass(frozen=True)
 class Epuck2GatewayOptions:
-    """How the robots differ from the firmware's defaults."""
+    """Where the robots are, and which chip they have."""
 
-    stream: bool = parameter(
-        False, help="answer the last command once more with each new reading, as the WiFi firmware does unasked"
-    )
     north_deg: float = parameter(
         0.0, help="heading of magnetic north in the arena", unit="deg", at_least=-360, at_most=360
     )
@@ -81,15 +78,15 @@ def _drive_differences(body: Body, model: Body) -> list[str]:
 
 
 def _at_rest(body: Body, model: Body) -> list[str]:
-    absent = [name for name in model.sensors if name in READABLE_SENSORS and name not in body.sensors]
+    readable = READABLE_SENSORS - {"odometry"}  # the gateway counts steps itself
+    absent = [name for name in model.sensors if name in readable and name not in body.sensors]
     return [f"it has no {', '.join(absent)}, which read as for a robot at rest"] if absent else []
 
 
 class Epuck2Gateway(Gateway):
-    """Emulated e-puck2s. Each executes and answers commands as the firmware does, except those counted as refused.
+    """Emulated e-puck2s. Each executes and answers commands as the firmware does, but for what it counts as refused.
 
-    A robot keeps its last command when its connection is lost, since the real one has no watchdog. The firmware's
-    obstacle avoidance is refused: the commanded speeds apply. Images are black.
+    A robot keeps its last command when its connection is lost, since the real one has no watchdog.
     """
 
     options: ClassVar[type] = Epuck2GatewayOptions
@@ -106,6 +103,7 @@ class Epuck2Gateway(Gateway):
         self._packets = SensorPackets(body, len(self.names), options.compass)
         self._answers = self._packets.answers()
         self._alive = np.ones(len(self.names), bool)
+        self._published_ns = 0
         self._server: Server | None = None
 
     def differences(self) -> tuple[str, ...]:
@@ -115,26 +113,25 @@ class Epuck2Gateway(Gateway):
     def open(self) -> tuple[str, ...]:
         """As `Gateway.open`; opened once more it has the same addresses."""
         robots = [self._robot(i) for i in range(len(self.names))]
-        self._server = Server(robots, self._addresses)
+        self._server = Server(robots, self._addresses, self.clock)
         self._server.live(self._alive.tolist())
         self._addresses = self._server.addresses
         return tuple(f"{host}:{port}" for host, port in self._addresses)
 
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
-        """As `Gateway.publish`."""
-        for robot, counters in self._received.counters().items():
-            self._packets.count_from(robot, *counters)
+        """As `Gateway.publish`; odometry is not used, since an e-puck2 counts the steps of its commands."""
+        revived = np.flatnonzero(alive & ~self._alive).tolist()
+        steps = self._received.steps_per_s * to_s(time_ns - self._published_ns)
+        self._packets.count(steps, self._received.counters() | dict.fromkeys(revived, (0, 0)))
+        self._published_ns = time_ns
         self._packets.fill(fields)
         self._answers = self._packets.answers()  # as a whole, so that the other thread sees these or those before
-        server = self._server
-        if server is not None:
-            if not np.array_equal(alive, self._alive):
-                for robot in np.flatnonzero(alive & ~self._alive).tolist():
-                    self._received.halt(robot)
-                self._alive = alive.copy()
-                server.live(alive.tolist())
-            if self._options.stream:
-                server.tell_unasked()
+        if not np.array_equal(alive, self._alive):
+            for robot in revived:
+                self._received.halt(robot)
+            self._alive = alive.copy()
+            if self._server is not None:
+                self._server.live(alive.tolist())
 
     def take(self) -> Commands:
         """As `Gateway.take`."""

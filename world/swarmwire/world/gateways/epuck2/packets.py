@@ -5,7 +5,7 @@ group as the packets that its robots answer with.
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from threading import Lock
 
 import numpy as np
@@ -13,8 +13,15 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
-from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S, RobotCommand, body_speeds
-from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, RobotSettingsBits
+from swarmwire.comms.robots.epuck2.commands import (
+    BODY_LED,
+    FRONT_LED,
+    MAX_STEPS_PER_S,
+    RobotCommand,
+    body_speeds,
+    limited,
+)
+from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands
@@ -29,12 +36,18 @@ _ANSWER = np.dtype([("header", "u1"), ("sensors", SENSORS)])
 
 
 class ReceivedCommands:
-    """The newest speeds of each robot, its LEDs, and its step counters; any thread may add to them."""
+    """The newest speeds of each robot, its LEDs, and its step counters; any thread may add to them.
+
+    Attributes:
+        steps_per_s: (n, 2) speeds of the left and the right wheel that were taken last.
+    """
 
     def __init__(self, robots: int, body: Body, counts: Counter[str]) -> None:
         self._robots, self._wheel_base_m, self._counts = robots, body.wheels.wheel_base_m, counts
         self._lock = Lock()
-        self._speeds: dict[int, tuple[float, float]] = {}
+        self.steps_per_s = np.zeros((robots, 2))
+        self._speeds: dict[int, tuple[int, int]] = {}  # steps/s
+        self._refused: set[tuple[int, str]] = set()  # robot and what it was asked for
         self._leds: dict[tuple[int, int], int] = {}  # robot and place -> 0xRRGGBB
         self._counters: dict[int, tuple[int, int]] = {}
         self._shown = [dict.fromkeys(range(body.led_count), 0) for _ in range(robots)]
@@ -42,14 +55,15 @@ class ReceivedCommands:
     def add(self, robot: int, command: RobotCommand) -> None:
         """Keep a command for a robot."""
         with self._lock:
-            if command.settings & RobotSettingsBits.AVOID:
-                self._counts["avoidance_refused"] += 1  # its speeds still apply
+            asked = {(robot, name) for name in _refused(command)}
+            self._counts.update(name for _, name in asked - self._refused)
+            self._refused |= asked
             if command.settings & RobotSettingsBits.SET_STEPS:
                 self._counters[robot] = command.left, command.right
             else:
                 if max(abs(command.left), abs(command.right)) > MAX_STEPS_PER_S:
                     self._counts["speeds_clipped"] += 1
-                self._speeds[robot] = body_speeds(command.left, command.right, self._wheel_base_m)
+                self._speeds[robot] = limited(command.left), limited(command.right)
             before = self._shown[robot]
             if before:
                 shown = command.lights.shown(before)
@@ -72,23 +86,40 @@ class ReceivedCommands:
             speeds, self._speeds = self._speeds, {}
             leds, self._leds = self._leds, {}
         drive, linear_mps, angular_radps = np.zeros(self._robots, bool), *np.zeros((2, self._robots))
-        for robot, (linear, angular) in speeds.items():
-            drive[robot], linear_mps[robot], angular_radps[robot] = True, linear, angular
+        for robot, steps in speeds.items():
+            self.steps_per_s[robot], drive[robot] = steps, True
+            linear_mps[robot], angular_radps[robot] = body_speeds(*steps, self._wheel_base_m)
         rows, place, rgb = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T.copy()
         lateral_mps = np.zeros(self._robots)
         return Commands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float)))
 
 
+def _refused(command: RobotCommand) -> list[str]:
+    """What a command asks for that an emulated robot does not do; everything else in it applies."""
+    switched = command.lights.switched
+    asked = {
+        "avoidance_refused": command.settings & RobotSettingsBits.AVOID,
+        "calibration_refused": command.settings & RobotSettingsBits.CALIBRATE,
+        "body_led_refused": switched & BODY_LED,
+        "front_led_refused": switched & FRONT_LED,
+        "sound_refused": command.sound,
+        "image_black": command.request & PacketRequest.IMAGE,
+    }
+    return [name for name, value in asked.items() if value]
+
+
 class SensorPackets:
-    """The present answer of each robot of a group. A lost reading (nan) leaves the number unchanged."""
+    """The present answer of each robot of a group. A lost reading (nan) leaves the number unchanged.
+
+    The step counters show the steps that the motors were commanded to do, so they continue at a wall.
+    """
 
     def __init__(self, body: Body, robots: int, compass: Compass) -> None:
         self._body, self._compass = body, compass
         self._answers = np.zeros(robots, _ANSWER)
         self._answers["header"] = Header.SENSORS
         self._rows = self._answers["sensors"]
-        self._travelled = np.zeros((robots, 2), np.int64)  # steps, without wrap
-        self._counted_from = np.zeros((robots, 2), np.int64)  # what a counter that shows 0 has travelled
+        self._steps = np.zeros((robots, 2))  # of the left and the right motor, without wrap
         self._to_wire: dict[str, tuple[str, Callable[[FloatArray], AnyArray]]] = {
             "proximity.value": ("proximity", readings.to_proximity),
             "light.value": ("ambient", readings.to_light),
@@ -107,12 +138,13 @@ class SensorPackets:
                 self._set(place, to_wire(values))
         if "imu.turn_radps" in fields:
             self._set_imu(fields)
-        if "odometry.left_m" in fields:
-            self._set_steps(fields)
 
-    def count_from(self, robot: int, left: int, right: int) -> None:
-        """Set a robot's step counters to these numbers."""
-        self._counted_from[robot] = self._travelled[robot] - (left, right)
+    def count(self, steps: FloatArray, shown: Mapping[int, tuple[int, int]]) -> None:
+        """Add these steps (n, 2) to the counters; those of robots in `shown` show these numbers instead."""
+        self._steps += steps
+        for robot, counters in shown.items():
+            self._steps[robot] = counters
+        self._rows["steps"] = _wrapped(np.rint(self._steps).astype(np.int64))
 
     def answers(self) -> list[bytes]:
         """Header and sensors' packet of each robot."""
@@ -136,12 +168,6 @@ class SensorPackets:
 
     def _field_ut(self, heading_rad: FloatArray) -> FloatArray:
         return self._compass.field_ut(heading_rad, LEVEL_UT, DOWN_UT)
-
-    def _set_steps(self, fields: Fields) -> None:
-        told = np.stack([fields["odometry.left_m"], fields["odometry.right_m"]], axis=1)
-        steps = np.where(np.isnan(told), self._travelled, np.rint(told / M_PER_STEP))
-        self._travelled = steps.astype(np.int64)
-        self._rows["steps"] = _wrapped(self._travelled - self._counted_from)
 
     def _set_imu(self, fields: Fields) -> None:
         """Accelerometer, with what the firmware works out of it, and gyro."""
