@@ -21,6 +21,7 @@ swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
 swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.hero
+.ci/uv run --no-sync python -m docs.pictures.tutorial
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages

@@ -14,8 +14,9 @@ from swarmwire.metrics.report.campaign_data import (
     rounding_of,
     short_value,
 )
-from swarmwire.metrics.report.campaign_models import resilience_section, scaling_section, survival_section
-from swarmwire.metrics.report.campaign_overview import distribution_section, what_was_run
+from swarmwire.metrics.report.campaign_models import resilience_section, scaling_section
+from swarmwire.metrics.report.campaign_overview import distribution_section, setup_section
+from swarmwire.metrics.report.campaign_survival import survival_section
 from swarmwire.metrics.report.campaign_transitions import transition_section
 from swarmwire.metrics.report.page import Report, Section, Table
 from swarmwire.metrics.statistics.bootstrap import MIN_RESAMPLES, RESAMPLES
@@ -49,6 +50,10 @@ _OF_SECTIONS = {
         "not come down to a quartile it is beyond the limit, and so said (>). Ticks on curves are censored runs. "
         "Where runs stop early, values at the end and sums are of runs of different lengths: what stopped them is "
         "selected."
+    ),
+    "Survival": (
+        "Shares of runs. Intervals are Wilson's score intervals (Journal of the American Statistical Association 22, "
+        "1927)."
     ),
     "Transitions": (
         "Change points. Of all ways to divide the ordered values of a parameter in two, the one with the least sum "
@@ -249,4 +254,4 @@ def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Re
     sections = [section for section in found if section is not None]
     methods = methods_section([section.title for section in sections], times=bool(times))
     about = f"{counted(len(folder.runs), 'run')} of {counted(len(folder.points), 'design point')}"
-    return Report(folder.about.name, (what_was_run(folder), *sections, methods), about)
+    return Report(folder.about.name, (setup_section(folder), *sections, methods), about)

@@ -28,7 +28,7 @@ _ENDINGS = {
 _KNOWN = {
     "radio.pdr": "PDR: received / intended",
     "radio.link_pdr": "link PDR: received / in range",
-    "stop_time_s": "time until it stopped in s",
+    "stop_time_s": "time to the stop condition in s",
     "radio.sent": "packets sent",
     "radio.intended": "intended receivers",
     "radio.in_range": "receivers in range",

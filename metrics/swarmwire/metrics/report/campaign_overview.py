@@ -21,7 +21,7 @@ _DURATION = "duration_s"  # the path of how long a run lasts
 MAX_PARAMETERS = 3
 
 
-def what_was_run(folder: CampaignFolder) -> Section:
+def setup_section(folder: CampaignFolder) -> Section:
     """The section."""
     about = folder.about
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["run"].to_list()
@@ -38,7 +38,7 @@ def what_was_run(folder: CampaignFolder) -> Section:
         ("CPU", listed(_machines(folder))),
     ]
     parts = [Table(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
-    return Section("What was run", tuple(parts))
+    return Section("Setup", tuple(parts))
 
 
 def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:

@@ -29,6 +29,7 @@ _GOLDEN = 0.6180339887498949
 _APART = 0.012  # of the axis, between the points of several lines
 _COLORS = "cividis"  # an ordered scale, also for colour-blind readers and in grey print
 _ROW_IN, _MIN_IN, _MAX_IN, _HEAD_IN = 0.2, 1.0, 2.6, 0.42
+_NUMBER_LEFT_FROM = 0.8  # of the axis: from there on the number of a change point stands left of its line
 _MAX_WRITTEN = 7  # columns and rows of cells into which values are written
 _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
@@ -154,9 +155,7 @@ def response_curve(lines: Sequence[MedianLine], title: str, x_label: str, limit:
     colors = [CURVE] if alone else ordered_colors(len(lines))
     for place, (line, color) in enumerate(zip(lines, colors, strict=True)):
         x = _aside(line.x, place - 0.5 * (len(lines) - 1), log=log)
-        if line.jump is not None and alone:
-            _draw_jump(axes, line.jump)
-        elif line.jump is not None:
+        if line.jump is not None and not alone:
             axes.axvline(line.jump.at, color=color, lw=0.9, ls=(place, (3, len(lines))), zorder=1)
         if alone:
             low, high = _within(line.q25, limit), _within(line.q75, limit)
@@ -171,6 +170,8 @@ def response_curve(lines: Sequence[MedianLine], title: str, x_label: str, limit:
         set_log(axes.yaxis)
     if not alone:
         plain_legend(axes, loc="best")
+    elif lines[0].jump is not None:
+        _draw_jump(axes, lines[0].jump)
     return figure
 
 
@@ -198,10 +199,15 @@ def _draw_medians(axes: Any, x: FloatArray, line: MedianLine, limit: float | Non
 
 
 def _draw_jump(axes: Any, jump: Jump) -> None:
+    """Draw it on axes whose limits are known, with its number on the side that has room."""
     axes.axvspan(jump.low, jump.high, color=ACCENT, alpha=0.12, lw=0, zorder=0)
     axes.axvline(jump.at, color=ACCENT, lw=1.0, zorder=1)
     at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top", "color": ACCENT}
-    axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), (3, 7), fontsize=LETTERS_PT, **at)
+    low, high = axes.get_xlim()
+    at_px, low_px, high_px = axes.transData.transform([(x, axes.get_ylim()[1]) for x in (jump.at, low, high)])[:, 0]
+    is_right = at_px > low_px + _NUMBER_LEFT_FROM * (high_px - low_px)
+    beside: Look = {"xytext": (-3, 7), "ha": "right"} if is_right else {"xytext": (3, 7), "ha": "left"}
+    axes.annotate(f"{jump.at:.3g}", (jump.at, 1.0), fontsize=LETTERS_PT, **beside, **at)
 
 
 def heat_map(

@@ -31,7 +31,7 @@ _KINDS = {"level": "", "count": "adds up", "time": "a time"}
 _ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "link PDR", "trajectory")
 
 
-def what_was_run(run: RunData) -> Section:
+def setup_section(run: RunData) -> Section:
     """The section: a table of facts, problems of the run, and the command that repeats it."""
     facts = [*_scenario(run), *_course(run), *_machine(run)]
     again = (
@@ -40,7 +40,7 @@ def what_was_run(run: RunData) -> Section:
         else "Without its `run.json` the run cannot be repeated."
     )
     return Section(
-        "What was run",
+        "Setup",
         (
             Table(("", ""), tuple(facts), ""),
             *_problems(run),
@@ -183,7 +183,7 @@ def run_report(folder: Path) -> Report:
     read, or without matplotlib.
     """
     run = read_run(folder)
-    sections = (what_was_run(run), what_happened(run), radio(run), measured(run), *scenario_text(run))
+    sections = (setup_section(run), what_happened(run), radio(run), measured(run), *scenario_text(run))
     return Report(run.static.name, sections, _about(run))
 
 

@@ -14,13 +14,8 @@ from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import fits_log
 from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
-from swarmwire.metrics.report.campaign_models import (
-    FittedShape,
-    SurvivalCurve,
-    resilience_curve,
-    scaling_curve,
-    survival_curves,
-)
+from swarmwire.metrics.report.campaign_models import FittedShape, resilience_curve, scaling_curve
+from swarmwire.metrics.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
 from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
 from swarmwire.metrics.report.page import as_svg, page, write_report
 from tests.support.metrics.campaigns import write_campaign
@@ -60,7 +55,7 @@ def ordinary(tmp_path, **differently):
 def test_one_parameter_has_curves_and_no_map(tmp_path):
     sections, shown = of(ordinary(tmp_path))
     assert list(sections) == [
-        *("What was run", "Summary", "Distributions", "Transitions", "Survival", "Resilience", "Methods")
+        *("Setup", "Summary", "Distributions", "Transitions", "Survival", "Resilience", "Methods")
     ]
     names = [figure.name for section in sections.values() for figure in section.parts if hasattr(figure, "svg")]
     assert {"distribution-aggregation_time_s-radio.loss", "response-order.final-radio.loss"} < set(names)
@@ -101,7 +96,7 @@ def test_three_numbers_are_drawn_in_pairs(tmp_path):
 
 def test_a_single_point_has_a_table_and_survival_alone(tmp_path):
     sections, shown = of(ordinary(tmp_path, vary={}, points=[{}]))
-    assert list(sections) == ["What was run", "Summary", "Survival", "Methods"]
+    assert list(sections) == ["Setup", "Summary", "Survival", "Methods"]
     assert shown.table("n", "median")[0][0] == "6"
 
 
@@ -182,7 +177,7 @@ def test_seeds_are_told_to_the_last_digit(tmp_path):
 
 def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):
     sections, _ = of(ordinary(tmp_path, missing=range(24), parts=1))
-    assert list(sections) == ["What was run", "Methods"]
+    assert list(sections) == ["Setup", "Methods"]
 
 
 def test_when_every_run_failed_there_is_a_report_all_the_same(tmp_path):
@@ -409,3 +404,22 @@ def test_nothing_reaches_beyond_a_phones_screen(tmp_path, browser):
     command = [browser, *quiet, f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=20000", "--dump-dom"]
     ended = subprocess.run([*command, frame.as_uri()], capture_output=True, text=True, timeout=100, check=True)
     assert f"is {PHONE_PX} of {PHONE_PX} px, beyond: </body>" in ended.stdout
+
+
+def test_the_share_of_runs_is_drawn_with_wilsons_interval():
+    axes = share_curve(np.array([0.0, 0.5]), np.array([10.0, 5.0]), np.array([10.0, 10.0]), "what", "x").axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_xydata(), [[0.0, 1.0], [0.5, 0.5]])
+    (intervals,) = axes.collections
+    np.testing.assert_allclose(
+        [segment[:, 1] for segment in intervals.get_segments()], [[0.7225, 1.0], [0.2366, 0.7634]], atol=1e-4
+    )
+
+
+@pytest.mark.parametrize(("place", "side"), [(0.1, "left"), (0.95, "right")])
+def test_the_number_of_a_change_point_stays_within_the_figure(place, side):
+    x = np.array([0.0, 0.5, 1.0])
+    line = MedianLine("a", x, x, x, x, x, x, Jump(place, place, place))
+    figure = response_curve([line], "what", "x")
+    (number,) = figure.axes[0].texts
+    assert number.get_ha() == side
+    assert number.get_window_extent().x1 < figure.bbox.x1
