@@ -360,7 +360,14 @@ def failed(robots: list[str], error: BaseException, context: StepContext | None 
     if agents:  # what called the agent, and what it called, is no line of the agent's
         shown.stack = traceback.StackSummary.from_list(shown.stack[agents[0] : agents[-1] + 1])
     when = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
-    return AgentFailed(robots_text(robots), "".join(shown.format()) + when)
+    return AgentFailed(robots_text(robots), "".join(shown.format()) + _public_names(error) + when)
+
+
+def _public_names(error: BaseException) -> str:
+    """The line that names what an object of swarmwire has, if the agent used an attribute that it lacks."""
+    if type(error) is not AttributeError or not _is_machinery(type(error.obj).__module__):
+        return ""
+    return f"{type(error.obj).__name__} has {', '.join(name for name in dir(error.obj) if name[0] != '_')}\n"
 
 
 def _is_machinery(module: str) -> bool:

@@ -70,6 +70,18 @@ def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
         assert re.search(r"test_host\.py.*in step", error.traceback)
 
 
+def test_a_reading_without_the_field_that_an_agent_reads_names_those_that_it_has() -> None:
+    class Reads(Agent):
+        needs = ("compass",)
+
+        def step(self, robot: Robot) -> None:
+            getattr(robot.compass, "value")  # noqa: B009 - the type checker knows that there is none
+
+    lines = failure(Reads).traceback.splitlines()
+    assert "AttributeError" in lines[-3]
+    assert lines[-2].startswith("CompassReading has heading_rad")
+
+
 def test_declared_senses_are_those_of_the_robot_itself() -> None:
     seen: list[tuple[float, ...]] = []
 

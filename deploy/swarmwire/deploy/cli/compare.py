@@ -31,9 +31,9 @@ def compare_command(
     Points that agree in every parameter that both vary are compared, and seeds that both ran one by one. Unless
     responses are named they are all times, the last values of metrics, and the link PDR. For example:
 
-      swarmwire compare runs/plain runs/smoothed --response order
+      swarmwire compare campaigns/plain campaigns/smoothed --response order
 
-      swarmwire compare runs/loss@radio.loss=0 runs/loss@radio.loss=0.4
+      swarmwire compare campaigns/loss@radio.loss=0 campaigns/loss@radio.loss=0.4
     """
     # Imported here: polars and scipy take a second, which --help should not.
     from rich.console import Console

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile
+from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile, program
 
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
@@ -120,8 +120,8 @@ def new_command(
     made = new_swarm(name, within)
     folder = made[0].parent
     typer.echo(f"made {folder}: {', '.join(path.name for path in made)}")
-    typer.echo(f"run it:    swarmwire run {folder / 'scenario.toml'}")
-    typer.echo(f"check it:  swarmwire check {folder / 'scenario.toml'}")
+    typer.echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
+    typer.echo(f"check it:  {program()} check {folder / 'scenario.toml'}")
     typer.echo(f"test it:   python -m pytest {folder}")
 
 

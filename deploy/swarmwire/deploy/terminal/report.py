@@ -155,7 +155,8 @@ def _radio_rows(radio: RadioResult) -> Iterator[tuple[str, str]]:
 def _percentiles(value: Percentiles) -> str:
     if value.p50 is None or value.p99 is None:
         return "-"
-    return f"{value.p50 * 1000:.0f} ms (99 %: {value.p99 * 1000:.0f} ms)"
+    p50_ms, p99_ms = (number_text(round(of_s * 1000.0, 3)) for of_s in (value.p50, value.p99))
+    return f"{p50_ms} ms (99 %: {p99_ms} ms)"
 
 
 def _number(value: float | None) -> str:

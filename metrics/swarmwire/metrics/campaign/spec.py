@@ -17,6 +17,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import did_you_mean, from_toml, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.atomic import write_text
+from swarmwire.metrics.run_folder.layout import STATIC
 from swarmwire.metrics.statistics.sample import Kind
 
 CAMPAIGN_FORMAT = 1  # of campaign.json and of the tables beside it; another is refused
@@ -121,6 +122,8 @@ def read_campaign(folder: Path) -> Campaign:
     if (folder / SCENARIO_FOLDER).is_dir() and not path.exists():
         expected = "is missing: the campaign ended before its first run; remove the folder and begin again"
         raise BadInput(str(folder), ABOUT, expected)
+    if (folder / STATIC).exists() and not path.exists():
+        raise BadInput(str(folder), "", "expected the folder of a campaign, which `swarmwire sweep` makes; got a run's")
     campaign = read_json(Campaign, path, CAMPAIGN_FORMAT)
     varied = set(campaign.vary)
     good = {
