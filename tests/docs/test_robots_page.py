@@ -25,7 +25,7 @@ from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
-from tests.docs.pages import ROOT, blocks_of, files_of
+from tests.docs.pages import ROOT, blocks_of
 from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
@@ -74,26 +74,22 @@ def test_the_rehearsal_on_the_page_moves_robots_that_hear_one_another(tmp_path, 
 
 
 @pytest.fixture
-def feed(tmp_path) -> Path:
-    """The page's program, beside a folder with the certificates of a robot and of the tracker."""
+def certs(tmp_path) -> Path:
+    """A folder with the certificates of a robot and of the tracker."""
     begin_authority(tmp_path / "lab-ca", WallClock())
-    issue(
-        tmp_path / "lab-ca",
-        [certificate_request(name, ("127.0.0.1",)) for name in ("flock-0", "tracker")],
-        1,
-        WallClock(),
-    )
-    file = tmp_path / "pose_feed.py"
-    file.write_text(files_of(PAGE)[file.name])
-    return file
+    requests = [certificate_request(name, ("127.0.0.1",)) for name in ("flock-0", "tracker")]
+    issue(tmp_path / "lab-ca", requests, 1, WallClock())
+    return tmp_path / "lab-ca"
 
 
 @contextmanager
-def listening(folder: Path) -> Generator[tuple[Tracker, Sequence[str]]]:
+def listening(certs: Path | None) -> Generator[tuple[Tracker, Sequence[str]]]:
     """What an agent does with poses, and its endpoints."""
     keys = SwarmKeys("lab")
-    own = {"ca": folder / "ca.pem", "certificate": folder / "flock-0.pem", "key": folder / "flock-0.key"}
-    network = Network(("tls/127.0.0.1:0",), **own)
+    network = Network(("tcp/127.0.0.1:0",))
+    if certs:
+        own = {"ca": certs / "ca.pem", "certificate": certs / "flock-0.pem", "key": certs / "flock-0.key"}
+        network = Network(("tls/127.0.0.1:0",), **own)
     with closing(open_swarm(network, access_of(network, keys, ROBOTS, "flock-0"), small=False)) as session:
         tracker = Tracker(session, keys, ROBOTS)
         tracker.open()
@@ -101,28 +97,39 @@ def listening(folder: Path) -> Generator[tuple[Tracker, Sequence[str]]]:
         tracker.close()
 
 
-def fed(feed: Path, endpoints: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """A single line for the page's program."""
-    command = [sys.executable, str(feed), "lab", str(folder), *endpoints]
-    line = "flock-1 1.20 0.35 1.57\n"
-    return subprocess.run(command, input=line, capture_output=True, text=True, check=False, timeout=60)
+def fed(*words: object) -> subprocess.CompletedProcess[str]:
+    """Lines of a camera for the pose feed with these words."""
+    command = [sys.executable, "-m", "swarmwire.agent.pose_feed", "lab", *map(str, words)]
+    lines = "flock-1 1.20 0.35\nflock-1 1.20 0.35 1.57\n"
+    return subprocess.run(command, input=lines, capture_output=True, text=True, check=False, timeout=60)
 
 
-def test_a_single_line_of_a_camera_becomes_a_pose_by_the_tracker_s_certificate(feed, tmp_path):
-    with listening(tmp_path / "lab-ca") as (tracker, endpoints):
-        done = fed(feed, endpoints, tmp_path / "lab-ca")
-        assert (done.returncode, done.stderr) == (0, "linked with 1 of 1\n")
+@pytest.mark.parametrize("proven", [True, False])
+def test_a_line_of_a_camera_becomes_a_pose_with_certificates_and_without(certs: Path, proven: bool):
+    with listening(certs if proven else None) as (tracker, endpoints):
+        done = fed(*endpoints, *(["--certs", certs] if proven else ["--insecure"]))
+        assert done.returncode == 0
+        assert done.stderr.splitlines() == [
+            "linked with 1 of 1",
+            "expected NAME X_M Y_M HEADING_RAD, got 'flock-1 1.20 0.35'",
+        ]
         assert until(lambda: tracker.pose("flock-1", WallClock().utc_ns())) == (1.20, 0.35, 1.57)
 
 
-def test_a_camera_with_the_certificate_of_another_ca_is_told_that_nobody_listens(feed, tmp_path):
+def test_a_camera_with_the_certificate_of_another_ca_reaches_no_agent(certs: Path, tmp_path: Path):
     begin_authority(tmp_path / "other", WallClock())
     issue(tmp_path / "other", [certificate_request("tracker", ())], 1, WallClock())
-    with listening(tmp_path / "lab-ca") as (tracker, endpoints):
-        done = fed(feed, endpoints, tmp_path / "other")
+    with listening(certs) as (tracker, endpoints):
+        done = fed(*endpoints, "--certs", tmp_path / "other")
         assert done.returncode == 1
-        assert "nobody listens for poses of 'lab'" in done.stderr
+        assert "no agent listens for poses of 'lab'" in done.stderr
         assert tracker.pose("flock-1", WallClock().utc_ns()) is None
+
+
+def test_a_pose_feed_beyond_this_machine_needs_certificates_or_insecure():
+    done = fed("tcp/192.0.2.1:7557")
+    assert done.returncode == 2
+    assert "insecure" in done.stderr
 
 
 def typed() -> list[tuple[str, list[str]]]:

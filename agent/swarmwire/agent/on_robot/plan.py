@@ -17,7 +17,7 @@ import numpy as np
 
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import Command, Driver, load_driver
-from swarmwire.agent.on_robot.settings import RobotSettings
+from swarmwire.agent.on_robot.settings import HERE, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.comms.assignment import params_of
 from swarmwire.comms.bodies.body import Body, body_from, load_body
@@ -75,7 +75,9 @@ def _radio_fault(need: str, capabilities: Capabilities) -> str | None:
     if need in capabilities.radio_measures:
         return None
     if capabilities.radio == "none":
-        return 'needs a radio: expected radio.kind "zenoh" or "world"'
+        of_poses = 'radio.kind "zenoh" with tracker = true, or ' if need in OF_POSES else ""
+        here = f'for agents on this machine alone, listen = ["{HERE}"]'
+        return f'needs a radio: expected {of_poses}radio.kind "world"; {here}'
     if need in OF_POSES and capabilities.radio == "zenoh":
         return "a real radio does not measure it: expected tracker = true"
     measures = ", ".join(sorted(capabilities.radio_measures)) or "nothing of a packet"

@@ -25,6 +25,7 @@ BAD_INPUT = 2
 INTERRUPTED = 130  # Ctrl-C
 
 FORMAT = 1  # of `robot.toml`
+HERE = "tcp/127.0.0.1:7557"  # an endpoint that needs no certificate, in hints
 NO_FILE = "command line"  # in place of the file, in errors of settings without one
 Flags = Mapping[str, tuple[str, Any]]  # key of the settings -> the flag's name and value
 
@@ -122,7 +123,9 @@ def _settings(table: dict[str, Any], where: str, base: Path) -> RobotSettings:
     if "\0" in settings.log:
         raise BadInput(where, "log", f"expected a folder, got {settings.log!r}")
     if settings.network is None and (settings.tracker or settings.radio.kind != "none"):
-        raise BadInput(where, "network", "expected listen, connect or multicast = true: radio and tracker need it")
+        here = f'for agents on this machine alone, listen = ["{HERE}"]'
+        expected = f"expected listen, connect or multicast = true, which radio and tracker need; {here}"
+        raise BadInput(where, "network", expected)
     return _absolute(replace(settings, robots=settings.robots or (settings.name,)), base)
 
 
@@ -212,7 +215,9 @@ HINTS = {  # keys in hints of errors -> flags
     "ca, certificate and key": "--ca, --certificate and --key",
     "insecure = true": "--insecure",
     "tracker = true": "--tracker",
-    'radio.kind "zenoh" or "world"': "--radio zenoh or --radio world",
+    'radio.kind "zenoh"': "--radio zenoh",
+    'radio.kind "world"': "--radio world",
+    f'listen = ["{HERE}"]': f"--listen {HERE}",
     "rate_hz": "--rate-hz",
 }
 
@@ -264,8 +269,8 @@ def _in_flags(text: str) -> str:
 
     >>> _in_flags("expected listen, connect or multicast = true")
     'expected --listen, --connect or --multicast'
-    >>> _in_flags('expected radio.kind "zenoh" or "world"')
-    'expected --radio zenoh or --radio world'
+    >>> _in_flags('expected radio.kind "zenoh" with tracker = true, or radio.kind "world"')
+    'expected --radio zenoh with --tracker, or --radio world'
     """
     for keys, flags in HINTS.items():
         text = text.replace(keys, flags)

@@ -317,7 +317,7 @@ UNMET = {
     "compass": (_offer(), "does not give (it gives proximity): expected tracker = true"),
     "camera": (_offer(), "the body epuck2 lacks: it has proximity"),
     "positioning": (_offer(tracker=True), "the body epuck2 lacks"),
-    "radio.range": (_offer(), 'needs a radio: expected radio.kind "zenoh" or "world"'),
+    "radio.range": (_offer(), 'needs a radio: expected radio.kind "zenoh" with tracker = true, or radio.kind "world"'),
     "radio.bearing": (_offer(radio="zenoh"), "a real radio does not measure it: expected tracker = true"),
     "radio.tx_status": (
         _offer(radio="zenoh", tracker=True),
