@@ -184,7 +184,16 @@ def _write_capture(run: Path, to: Path, options: ExportOptions) -> str:
         if first_ns <= frame.on_air_at_ns and (stop_ns is None or frame.on_air_at_ns < stop_ns)
     )
     description = f"{folder.static.name}, seed {folder.static.seeds[arena]}: {radio.preset or radio.model}"
-    return f"{write_capture(to, link, f'air-{arena}', description, frames)} frames"
+    count = write_capture(to, link, f"air-{arena}", description, frames)
+    return f"{count} frames{_in_flight(folder, arena)}"
+
+
+def _in_flight(folder: "RunFolder", arena: int) -> str:
+    """How much a capture leaves out, since it was under way at the end of the run; "": nothing."""
+    radio = (folder.summary or {}).get("radio")
+    fates = (radio[arena] if isinstance(radio, list) else radio or {}).get("fates", {})
+    count = fates.get("in_flight", 0)
+    return f"; {count} receptions were in flight at the end" if count else ""
 
 
 def _check_times(from_s: float | None, until_s: float | None) -> None:

@@ -115,6 +115,32 @@ def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
     assert ": speed" in verdict(found)
 
 
+@pytest.mark.parametrize(("sent", "within"), [(9.95, True), (10.1, True), (9.5, False), (10.3, False)])
+def test_counts_have_a_tolerance_of_their_own(runs, tmp_path, sent, within):
+    """In each of the runs of 20 s a robot sends 9.95 packets a second."""
+    watched_runs, many = runs
+    logs = measured_log(read_real_logs(as_logs(watched_runs[0], tmp_path, phase_s=PHASES_S)), MEASURES)
+    logs.radio["sent"] = round(sent * 6 * logs.duration_s)
+    found = compare_sim_to_real(many, logs, MEASURES)
+    (row,) = (row for row in found.radio if row.of.name == "packets sent")
+    assert (row.emulated.low, row.emulated.high) == (9.95, 9.95)
+    assert row.within is within
+
+
+@pytest.mark.parametrize(("events", "within"), [(100, True), (101, True), (103, True), (110, False)])
+def test_a_metric_of_events_may_have_one_more_at_either_end(runs, tmp_path, events, within):
+    """In each of the runs an event happens in every third tick, 100 in all."""
+    watched_runs, many = runs
+    metric = METRICS["collisions"]()
+    ticks = len(watched_runs[0].truths)
+    series = np.floor(np.arange(1, ticks + 1) * 100 / ticks)
+    emulated = replace(many, runs=tuple(replace(run, series={metric.name: series}) for run in many.runs))
+    logs = measured_log(read_real_logs(as_logs(watched_runs[0], tmp_path, phase_s=PHASES_S)), [])
+    logs.series[metric.name] = np.floor(np.arange(1, ticks + 1) * events / ticks)
+    (row,) = compare_sim_to_real(emulated, logs, [metric]).rows
+    assert row.within is within
+
+
 def test_what_is_not_compared_has_its_reason(runs, tmp_path):
     found = compared(runs[1], watched(seed=11), tmp_path)
     assert "contacts" in found.not_in_log["collisions"]

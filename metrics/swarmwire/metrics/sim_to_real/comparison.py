@@ -23,6 +23,7 @@ from swarmwire.metrics.text import number_text
 
 Radio = Mapping[str, Any]
 MIN_RUNS = 3  # that have a spread
+COUNT_TOLERANCE = 0.01  # of a count per second: robots' loops miss a step now and then, and clocks differ
 WHOLE = 0.95  # share of a run that must be compared for its totals to count
 SPREAD = (0.05, 0.5, 0.95)
 ONLY_IN_RANGE = "who was within range is not in the log, and not all were; pdr counts all on both sides"
@@ -50,13 +51,15 @@ class MetricRow:
     difference: Interval  # of the means, log less run, by blocks of ticks: of a single run
     runs: tuple[FloatArray, ...]  # the values of each run
     values: FloatArray  # those of the log
+    grain: float = 0.0  # how far apart equal ones may be by the way they are counted, in the metric's unit
 
     @property
     def within(self) -> bool | None:
         """Whether the log lies within the spread, or the means differ by no more than chance; None: undecided."""
         if not math.isnan(self.reach):
-            return self.distance <= self.reach
-        return None if math.isnan(self.difference.low) else self.difference.low <= 0.0 <= self.difference.high
+            return self.distance <= self.reach + self.grain
+        low, high = self.difference.low - self.grain, self.difference.high + self.grain
+        return None if math.isnan(low) else low <= 0.0 <= high
 
     @property
     def badness(self) -> float:
@@ -148,7 +151,7 @@ def compare_sim_to_real(emulated: EmulatedRuns, log: MeasuredLog, metrics: Seque
         real = _values(metric, log.series[metric.name], log.static.rate_hz, duration_s)
         runs = [values for values in runs if len(values)]
         if runs and len(real):
-            rows.append(_row(metric, runs, real))
+            rows.append(_row(metric, runs, real, duration_s))
         elif runs or len(real):
             undefined.append(metric.name)
         elif metric.kind == "time":
@@ -185,7 +188,7 @@ def _values(metric: Metric, series: FloatArray, rate_hz: int, duration_s: float)
     return np.diff(known, prepend=0.0) * rate_hz if metric.kind == "count" else known
 
 
-def _row(metric: Metric, runs: list[FloatArray], real: FloatArray) -> MetricRow:
+def _row(metric: Metric, runs: list[FloatArray], real: FloatArray, duration_s: float) -> MetricRow:
     emulated, mean = spread(float(of.mean()) for of in runs), float(real.mean())
     nan, values = math.nan, (tuple(runs), real)
     if metric.kind == "time":
@@ -197,7 +200,13 @@ def _row(metric: Metric, runs: list[FloatArray], real: FloatArray) -> MetricRow:
     elif len(runs) == 1:
         difference = mean_difference_interval(runs[0], real)
     ks, distance = kolmogorov_smirnov(pooled, real), wasserstein_1(pooled, real)
-    return MetricRow(metric, emulated, mean, ks, distance, reach, difference, *values)
+    grain = _count_grain(emulated.median, duration_s) if metric.kind == "count" and duration_s > 0.0 else 0.0
+    return MetricRow(metric, emulated, mean, ks, distance, reach, difference, *values, grain)
+
+
+def _count_grain(per_s: float, duration_s: float) -> float:
+    """How far apart equal counts per second may be: one event more or less at either end, and the tolerance."""
+    return 2.0 / duration_s + COUNT_TOLERANCE * per_s
 
 
 def _to_others(runs: list[FloatArray], place: int) -> float:
@@ -242,8 +251,8 @@ def radio_values(emulated: EmulatedRuns, log: MeasuredLog, duration_s: float) ->
         told = (of(whole) for whole in wholes)
         of_log = of(real)
         known = tuple(value for value in told if value is not None)
-        # One packet more or less at the ends; a bin of the latencies' histogram.
-        grain = 1.0 / log.duration_s if unit == "1/s" else 2.0 * RELATIVE_ERROR * max(known, default=0.0)
+        most = max(known, default=0.0)  # of latencies, a bin of their histogram
+        grain = _count_grain(most, log.duration_s) if unit == "1/s" else 2.0 * RELATIVE_ERROR * most
         yield RadioValue(name, unit, text, known, math.nan if of_log is None else of_log, grain if unit else 0.0)
 
 
