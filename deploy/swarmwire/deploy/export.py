@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rich.console import Console
 
@@ -190,9 +190,9 @@ def _write_capture(run: Path, to: Path, options: ExportOptions) -> str:
 
 def _in_flight(folder: "RunFolder", arena: int) -> str:
     """How much a capture leaves out, since it was under way at the end of the run; "": nothing."""
-    radio = (folder.summary or {}).get("radio")
-    fates = (radio[arena] if isinstance(radio, list) else radio or {}).get("fates", {})
-    count = fates.get("in_flight", 0)
+    radio: Any = (folder.summary or {}).get("radio") or {}
+    of_arena = cast("dict[str, Any]", radio[arena] if isinstance(radio, list) else radio)
+    count = int(of_arena.get("fates", {}).get("in_flight", 0))
     return f"; {count} receptions were in flight at the end" if count else ""
 
 

@@ -21,6 +21,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_bridged
@@ -102,6 +103,22 @@ def taken(bridge: RadioBridge, packets: int) -> SentPackets:
     parts: list[SentPackets] = []
     until(lambda: parts.append(bridge.take()) or sum(map(len, parts)) >= packets)
     return SentPackets.joined(parts)
+
+
+def test_what_an_agent_noted_last_comes_to_the_world_once():
+    nothing = SparseTable.of(np.array([0]), np.array([[math.nan]]))
+    with bridged() as (bridge, session):
+        radio = joined(session())
+        for state, value in (("search", 1.0), ("wait", 2.5)):
+            row, place = np.array([1]), np.zeros(1, np.int64)
+            radio.note(SparseTable(row, place, np.zeros(1), (state,)), SparseTable(row, place, np.array([value])))
+        radio.note(nothing, SparseTable(row, place, np.array([3.5])))
+        radio.send(words(1.0))
+        until(lambda: len(bridge.take()))
+        states, values = bridge.noted()
+        assert (states.rows.tolist(), states.names, states.integers.tolist()) == ([1], ("wait",), [0])
+        assert (values.rows.tolist(), values.value.tolist()) == ([1], [3.5])
+        assert [len(table) for table in bridge.noted()] == [0, 0]
 
 
 def test_a_robot_learns_what_the_worlds_radio_gives():

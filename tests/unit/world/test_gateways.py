@@ -68,6 +68,10 @@ class RadioMedium:
     def take(self) -> SentPackets:
         return SentPackets(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
 
+    def noted(self) -> tuple[SparseTable, SparseTable]:
+        row, place = np.array([3]), np.zeros(1, np.int64)
+        return SparseTable(row, place, np.zeros(1), ("search",)), SparseTable(row, place, np.array([1.25]))
+
     def counts(self) -> dict[str, int]:
         return {"late": 2, "odd": 0, "packets_to_robots": 9}
 
@@ -171,9 +175,21 @@ def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_pack
     assert actions.sent.sender.tolist() == [0, 3]
 
 
+def test_what_agents_of_robots_outside_noted_is_among_the_actions() -> None:
+    actions = Around().act(0, [2, 3, 4])
+    assert (actions.notes.rows.tolist(), actions.notes.names, actions.notes.integers.tolist()) == (
+        [3],
+        ("search",),
+        [0],
+    )
+    assert (actions.values.rows.tolist(), actions.values.value.tolist()) == ([3], [1.25])
+
+
 def test_without_a_radio_nothing_but_commands_is_taken() -> None:
     around = Around(medium=False)
-    assert [around.act(0, [2, 3, 4]).sent.payloads.row(0)] == [b"inner"]
+    actions = around.act(0, [2, 3, 4])
+    assert [actions.sent.payloads.row(0)] == [b"inner"]
+    assert len(actions.notes) == len(actions.values) == 0
 
 
 def test_a_group_that_does_not_act_in_a_tick_is_told_nothing_and_commanded_all_the_same() -> None:

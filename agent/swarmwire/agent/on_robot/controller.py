@@ -20,7 +20,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupReadings
+from swarmwire.comms.tick_io import NOTHING_SET, Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire.radio_bridge import Pose
 
 NO_READING = Pose(nan, nan, nan)  # as emulated sensors read when a reading is lost
@@ -77,6 +77,8 @@ class Decision:
     command: Command  # within the limits, with the LEDs that were switched in this step
     drive: bool  # whether the agent commanded a speed in this step; otherwise the last command holds
     sent: SentPackets
+    states: SparseTable = NOTHING_SET  # that the agent noted
+    values: SparseTable = NOTHING_SET  # numbers that it noted
 
 
 class Controller:
@@ -120,7 +122,7 @@ class Controller:
             self.value = float(actions.values.value[-1])
         switched = dict(zip(actions.leds.place.tolist(), actions.leds.integers.tolist(), strict=True))
         self.leds |= switched
-        return Decision(self._with_leds(switched), drive, actions.sent)
+        return Decision(self._with_leds(switched), drive, actions.sent, actions.notes, actions.values)
 
     def all_leds(self) -> Command:
         """The current command with every LED that the agent ever switched: for a robot that was off meanwhile."""

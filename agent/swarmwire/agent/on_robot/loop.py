@@ -230,6 +230,8 @@ class RobotLoop:
         finally:  # a robot that cannot drive can still send
             if len(decision.sent):
                 parts.radio.send(decision.sent)
+            if len(decision.states) or len(decision.values):
+                parts.radio.note(decision.states, decision.values)
 
     def _reconnect(self, error: DriverLost) -> None:
         """Wait until the robot answers again; the agent is not stepped meanwhile, and its time does not pass."""

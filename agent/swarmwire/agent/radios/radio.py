@@ -3,6 +3,7 @@
 from typing import NamedTuple, Protocol
 
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.tick_io import SparseTable
 
 SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
 
@@ -34,6 +35,10 @@ class RobotRadio(Protocol):
         """Send packets at once; one that is lost or too large raises nothing and is counted."""
         ...
 
+    def note(self, states: SparseTable, values: SparseTable) -> None:
+        """Pass what the agent noted to the records of a world, if the radio is that of one."""
+        ...
+
     def counts(self) -> dict[str, int]:
         """Losses and faults so far, by name."""
         ...
@@ -62,6 +67,9 @@ class NoRadio:
     def send(self, sent: SentPackets) -> None:
         """Count the packets."""
         self._unsent += len(sent)
+
+    def note(self, states: SparseTable, values: SparseTable) -> None:
+        """There is no world."""
 
     def counts(self) -> dict[str, int]:
         """Number of dropped packets."""

@@ -1,7 +1,7 @@
 """The radio medium of a nearby world as the radio of a real robot: its packets are emulated among the world's robots.
 
 The radio joins by a query, whose answer describes the world's medium (`BridgeInfo`). Then it sends `actions` frames, of
-which only the packets count, and receives `tick` frames without readings.
+which only packets, states and noted numbers count, and receives `tick` frames without readings.
 """
 
 # zenoh's stubs leave out the return types of put and undeclare.
@@ -9,6 +9,7 @@ which only the packets count, and receives `tick` frames without readings.
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_bridged
 from swarmwire.comms.wire.tick_frames import encode_actions
@@ -30,6 +31,11 @@ QUERY_TIMEOUT_S = 1.0
 QUERY_INTERVAL_NS = to_ns(0.1)
 MAX_WAITING = 1024  # frames that may wait for the agent's next step
 NO_COMMAND = np.zeros(1)
+
+
+def _no_actions(row: int) -> Actions:
+    """The actions of a robot that only a driver commands."""
+    return Actions(np.array([row]), NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND)
 
 
 class _Arrival(NamedTuple):
@@ -111,9 +117,18 @@ class WorldRadio:
             self._counted["packets_sent" if fits else "packets_too_large"] += 1
             self._log.sent(SentPacket(utc_ns, self._sequence, to, size_bytes, tag, SENT if fits else TOO_LARGE))
             self._sequence += 1
-        row = np.array([terms.row])
         packets = SentPackets(np.full(len(sent), terms.row), sent.to, sent.payloads, sent.tx_status_id)
-        actions = Actions(row, NO_COMMAND != 0.0, NO_COMMAND, NO_COMMAND, NO_COMMAND, packets)
+        if not self._put(replace(_no_actions(terms.row), sent=packets)):
+            self._counted["packets_refused"] += len(sent)
+
+    def note(self, states: SparseTable, values: SparseTable) -> None:
+        """Pass what the agent noted to the world."""
+        row = self._joined().row
+        notes, values = (replace(table, rows=np.full(len(table), row)) for table in (states, values))
+        self._put(replace(_no_actions(row), notes=notes, values=values))
+
+    def _put(self, actions: Actions) -> bool:
+        """Whether the session took a frame with these actions."""
         self._frames += 1
         try:
             self._session.put(
@@ -122,7 +137,8 @@ class WorldRadio:
                 congestion_control=zenoh.CongestionControl.DROP,
             )
         except zenoh.ZError:  # the session was closed
-            self._counted["packets_refused"] += len(sent)
+            return False
+        return True
 
     def counts(self) -> dict[str, int]:
         """Packets and frames sent, received and lost on the way to the world, by name, without zeros."""

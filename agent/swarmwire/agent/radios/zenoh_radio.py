@@ -33,6 +33,7 @@ from swarmwire.comms.packets import (
     SentPackets,
     TxStatuses,
 )
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 
@@ -221,6 +222,9 @@ class ZenohRadio:
             payloads=Payloads.of([packet.message for packet, _ in delivered]),
         )
         return received, NO_TX_STATUSES
+
+    def note(self, states: SparseTable, values: SparseTable) -> None:
+        """There is no world; the robot's own log has them."""
 
     def send(self, sent: SentPackets) -> None:
         """Publish each packet; those that are too large or have no receiver only take a number, as in emulation."""

@@ -19,6 +19,7 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
 from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 
@@ -130,6 +131,9 @@ class ScriptedRadio:
 
     def send(self, sent: SentPackets) -> None:
         self.sent.append(sent)
+
+    def note(self, states: SparseTable, values: SparseTable) -> None:
+        """There is no world."""
 
     def counts(self) -> dict[str, int]:
         return {"packets_sent": len(self.sent)}

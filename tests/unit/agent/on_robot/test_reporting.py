@@ -37,7 +37,7 @@ REFUSED = {
     "--driver writen": "--driver: expected a driver: one of",
     "--driver lacking": "pip install 'written-driver[lacking]'",
     "--radio smoke": "--radio: expected one of zenoh, world, none; got 'smoke'",
-    "--radio zenoh": "command line: --listen: expected --listen, --connect or --multicast: radio and tracker",
+    "--radio zenoh": "command line: --listen: expected --listen, --connect or --multicast, which radio",
     "--radio zenoh --connect nowhere": 'expected endpoints such as "tls/10.0.0.5:7447", got "nowhere"',
     "--radio zenoh --listen tcp/0.0.0.0:0": "expected --ca, --certificate and --key, or --insecure",
     "--duration-s 0": "--duration-s: expected more than 0 s, got 0",
@@ -397,7 +397,7 @@ def test_an_agent_that_is_none_or_lacks_something_is_refused(installed, capsys, 
 
 @pytest.mark.parametrize(
     ("flags", "cure"),
-    [((), "expected --radio zenoh or --radio world"), (("--radio", "zenoh"), "expected --tracker")],
+    [((), "expected --radio zenoh with --tracker, or --radio world; "), (("--radio", "zenoh"), "expected --tracker")],
 )
 def test_what_an_agent_needs_is_told_in_the_flags_that_would_give_it(installed, capsys, flags, cure):
     listen = ("--listen", "tcp/127.0.0.1:0") if flags else ()

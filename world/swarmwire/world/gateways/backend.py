@@ -21,7 +21,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.tick_io import Actions, Readings, SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
@@ -93,6 +93,10 @@ class RobotsRadio(Protocol):
         """The packets that they sent since the last call."""
         ...
 
+    def noted(self) -> tuple[SparseTable, SparseTable]:
+        """The states and the numbers that their agents noted since the last call."""
+        ...
+
     def counts(self) -> dict[str, int]:
         """Faults, by name."""
         ...
@@ -132,11 +136,9 @@ class GatewayBackend:
         self._pace.hold(tick)
         self._catch_up(tick)
         commands = Actions.joined([actions, *(group.take() for group in self._groups)])
-        return (
-            replace(commands, sent=SentPackets.joined([commands.sent, self._medium.take()]))
-            if self._medium
-            else commands
-        )
+        if not self._medium:
+            return commands
+        return self._with_noted(replace(commands, sent=SentPackets.joined([commands.sent, self._medium.take()])))
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
@@ -150,7 +152,7 @@ class GatewayBackend:
         self._subticks.pass_tick(tick, medium, self)
         self._catch_up(tick)
         without_packets = replace(actions, sent=SentPackets.none())
-        return Actions.joined([without_packets, *(group.take() for group in self._groups)])
+        return self._with_noted(Actions.joined([without_packets, *(group.take() for group in self._groups)]))
 
     def take_in(self) -> list[SubtickPackets]:
         """The packets of agents and of foreign programs since the last call."""
@@ -180,6 +182,14 @@ class GatewayBackend:
     def report(self) -> RealTimeReport:
         """The report of the loop."""
         return report_of(self._pace, self._subticks)
+
+    def _with_noted(self, actions: Actions) -> Actions:
+        """The actions, with what the agents of robots behind gateways noted."""
+        if not self._medium:
+            return actions
+        states, values = self._medium.noted()
+        notes = SparseTable.joined([actions.notes, states])
+        return replace(actions, notes=notes, values=SparseTable.joined([actions.values, values]))
 
     def _begin(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Readings:
         """Begin a tick: publish everything; returns the readings of the other groups."""

@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
@@ -69,6 +70,8 @@ class RadioBridge:
         self._publishers: dict[int, zenoh.Publisher] = {}  # by row
         self._declarations: tuple[object, ...] = ()  # zenoh undeclares what is not referenced
         self._counted = Counter[str]()
+        self._states: dict[int, str] = {}  # by row, noted since the last call of `noted`
+        self._values: dict[int, float] = {}  # the same of numbers
         self._unknown_keys = self._oversized = 0  # refused by the network's threads
 
     @property
@@ -108,9 +111,22 @@ class RadioBridge:
 
     def take(self) -> SentPackets:
         """The packets from robots since the last call; the medium ends those of dead robots."""
-        parts = [sent for row, frame in self._inbox.take() if (sent := self._sent(row, frame)) is not None]
-        self._counted["packets_from_robots"] += sum(map(len, parts))
-        return SentPackets.joined(parts)
+        parts = [actions for row, frame in self._inbox.take() if (actions := self._actions(row, frame)) is not None]
+        for actions in parts:  # each of one robot
+            names = [actions.notes.names[int(index)] for index in actions.notes.value]
+            self._states |= dict(zip(actions.notes.rows.tolist(), names, strict=True))
+            self._values |= dict(zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True))
+        sent = SentPackets.joined([actions.sent for actions in parts])
+        self._counted["packets_from_robots"] += len(sent)
+        return sent
+
+    def noted(self) -> tuple[SparseTable, SparseTable]:
+        """The last state and number of each agent that noted one, in the frames taken since the last call."""
+        states, self._states = self._states, {}
+        values, self._values = self._values, {}
+        names = tuple(dict.fromkeys(states.values()))
+        indices = [names.index(state) for state in states.values()]
+        return _table(list(states), indices, names), _table(list(values), list(values.values()))
 
     def counts(self) -> dict[str, int]:
         """Carried packets and unusable frames, by name, those above 0."""
@@ -148,12 +164,17 @@ class RadioBridge:
             else:
                 query.reply(key, self._medium.terms(row).encode())
 
-    def _sent(self, row: int, data: bytes) -> SentPackets | None:
+    def _actions(self, row: int, data: bytes) -> Actions | None:
         try:
             frame = frames.decode(data, MAX_RADIO_FRAME_BYTES)
             if frame.kind != "actions":
                 raise BadFrame("malformed", frame.kind)
-            return decode_actions(frame, np.array([row])).sent
+            return decode_actions(frame, np.array([row]))
         except BadFrame as error:
             self._counted[f"frames_{error.fault}"] += 1
             return None
+
+
+def _table(rows: list[int], values: Sequence[float], names: tuple[str, ...] = ()) -> SparseTable:
+    """A number for each of these rows."""
+    return SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(values, np.float64), names)
