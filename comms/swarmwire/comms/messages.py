@@ -21,6 +21,7 @@ import numpy as np
 from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.packets import TAG_BYTES, Payloads
 
 f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
@@ -231,4 +232,5 @@ def _range(dtype: np.dtype[Any]) -> tuple[float, float, bool]:
 
 def _tag(name: str, fields: list[tuple[str, np.dtype[Any]]]) -> int:
     text = f"{name}({','.join(f'{field}:{dtype.str}' for field, dtype in fields)})"
-    return 1 + int.from_bytes(blake2b(text.encode(), digest_size=2).digest(), "little") % 0xFFFF
+    tag = 1 + int.from_bytes(blake2b(text.encode(), digest_size=2).digest(), "little") % 0xFFFF
+    return tag + (tag == FRAME_TAG)

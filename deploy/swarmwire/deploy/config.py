@@ -212,7 +212,12 @@ def real_time_factor(realtime: float | str | None) -> float | None:
 
 
 def subtick_of(subtick: float | None, factor: float | None, scenario: Scenario) -> float | None:
-    """The subtick of a run in real time at so many times the wall clock's pace, in s; BadInput if it cannot be."""
+    """The subtick of a run in real time at so many times the wall clock's pace, in s; BadInput if it cannot be.
+
+    With network interfaces there always is one.
+    """
+    if subtick is None and factor is not None and scenario.radio and scenario.radio.interface:
+        subtick = MIN_SUBTICK_S
     if subtick is None:
         return None
     if factor is None:

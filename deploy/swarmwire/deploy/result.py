@@ -15,6 +15,7 @@ from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.world.interfaces.backend import InterfacesReport
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
@@ -109,6 +110,7 @@ class Result:
     lost_runners: tuple[str, ...]  # that the run survived: name, robots and reason
     runner_events: tuple[RunnerEvent, ...]  # runners that joined, left, were lost and returned, in order
     realtime: RealTimeReport | None
+    interfaces: InterfacesReport | None  # frames of the robots' network interfaces, if they have some
     facts: RunFacts  # from what the run was made
     inputs: InputsRecord | None  # recorded actions that came from outside, if any did
     live_events: LiveEventsRecord | None  # recorded live events, if there were any
@@ -168,6 +170,7 @@ class Result:
             "lost_runners": list(self.lost_runners),
             "runner_events": [asdict(change) for change in self.runner_events],
             "realtime": asdict(self.realtime) if self.realtime else None,
+            "interfaces": asdict(self.interfaces) if self.interfaces else None,
             "gateways": dict(self.facts.gateways),
             "record": self.record,
             "cpu": self.facts.cpu,
@@ -207,6 +210,7 @@ def result_of(
         lost_runners=tuple(str(loss) for loss in parts.losses),
         runner_events=tuple(parts.runner_events),
         realtime=realtime,
+        interfaces=entries.get("interfaces"),
         facts=facts,
         inputs=parts.folder.inputs(),
         live_events=parts.folder.live_events(),

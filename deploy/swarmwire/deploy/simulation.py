@@ -121,6 +121,7 @@ class Simulation:
         with ExitStack() as stack:
             stack.push(parts.folder.failed_to_start)
             parts.begin()
+            stack.enter_context(parts.interfaces())
             self.served = stack.enter_context(parts.served())
             listening = self.config.listening
             if parts.published and listening and listening.observed:  # an endpoint is refused before agents join

@@ -1,12 +1,13 @@
 """The parts of a run, made from its config and connected; and its observers, in one ordered list."""
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.deploy.backends import Backends
@@ -24,6 +25,7 @@ from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
 from swarmwire.deploy.gateways.serving import RunGateways, Served, Undriven
 from swarmwire.deploy.host import need_open_files, need_threads
+from swarmwire.deploy.interfaces import InterfacesLog, OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.observers import Guarded, TooLarge
@@ -54,6 +56,7 @@ from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBack
 from swarmwire.world.backends.registry import Loss, RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
+from swarmwire.world.interfaces.backend import InterfacesBackend
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of, custom_code
@@ -95,6 +98,9 @@ class RunParts:
         self.code = tuple(dict.fromkeys([*self.agents.values(), *custom_code(static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         replay = config.replay
+        self._interfaces = RunInterfaces(self.scenario, repeated=replay is not None)
+        self._open_interfaces: OpenInterfaces | None = None
+        self._factor = factor
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.runners = runner_count(config.runners, static.arenas * static.robots)
@@ -139,6 +145,7 @@ class RunParts:
             EventLog(),
             *self._guarded,
             *([Undriven(served, self.factor, say)] if served else []),  # last: its warning ends the output
+            *([InterfacesLog(self._open_interfaces)] if self._open_interfaces else []),  # once all others have begun
         ]
 
     def begin(self) -> None:
@@ -167,6 +174,12 @@ class RunParts:
         """The robots that answer as real ones within the context; None if there are none."""
         return self.gateways.served(self.world, self.agents, self.clock, self.factor, self.folder.path, self.folder.say)
 
+    @contextmanager
+    def interfaces(self) -> Generator[None]:
+        """The robots have their network interfaces within the context, if the scenario has some."""
+        with self._interfaces.opened(self.world.static, self.pace, self.folder.path) as self._open_interfaces:
+            yield
+
     def new_backend(self, served: Served | None) -> AbstractContextManager[AgentBackend]:
         """The agents, ended with the context."""
         pace, subtick_s = self.pace, self._subtick_s
@@ -193,6 +206,8 @@ class RunParts:
         acting = backend
         if replay and replay.inputs:
             acting = ReplayedBackend(backend, replay.inputs, static.arenas * static.robots, static.rate_hz)
+        if self._open_interfaces:
+            acting = InterfacesBackend(cast("TimedBackend", acting), self._open_interfaces.ports)
         acting = self.folder.recorded(acting, self._from_outside)
         self.backend = backend
         self.loop = Loop(
@@ -255,6 +270,7 @@ class RunParts:
         if self.runners or config.out is not None:  # else there is no network, and no table
             need_threads(self.runners)
         self.gateways.check(static.arenas, self.runners)
+        self._interfaces.check(static, self._factor)
         self._record.check(static)
         if self.runners and config.socket is not None:
             check_socket(config.socket)
@@ -300,7 +316,7 @@ class RunParts:
         """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
         record, found = self._record, list[Observer]()
         if record.tables:
-            topics = {DICT_TAG: "dict"} | {kind.tag: kind.__name__ for kind in message_classes()}
+            topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
             found += recorders(
                 RecordOptions(
                     folder,

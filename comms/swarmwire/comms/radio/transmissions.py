@@ -11,8 +11,10 @@ from typing import Protocol
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, ByteArray, IntArray
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
+from swarmwire.comms.radio.config.radio import Radio
 
 RECEIVED = int(Fate.RECEIVED)
 
@@ -69,6 +71,16 @@ class Transmissions:
 
     def __len__(self) -> int:
         return self.table.shape[1]
+
+    def payload_bytes(self, radio: Radio) -> IntArray:
+        """Sizes beside which `overhead_bytes` and `max_payload_bytes` of the radio stand, (k,).
+
+        Those of the payloads, but for frames of interfaces, of which `overhead_bytes` holds some headers already.
+        """
+        sizes, doubled = self.payloads.sizes, radio.frame_headers_bytes
+        if radio.interface is None or not doubled:
+            return sizes
+        return sizes - doubled * (self.tag == FRAME_TAG)
 
     def select(self, index: IntArray) -> "Transmissions":
         """The packets of `index`, in its order."""

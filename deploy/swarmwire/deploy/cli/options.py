@@ -60,6 +60,14 @@ Subtick = Annotated[
         metavar="SECONDS",
     ),
 ]
+Interfaces = Annotated[
+    bool,
+    typer.Option(
+        "--interfaces",
+        help="Give each robot a network interface, whose frames go over the radio; in real time, as root or where "
+        "/dev/net/tun is open to all.",
+    ),
+]
 Socket = Annotated[
     Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
 ]

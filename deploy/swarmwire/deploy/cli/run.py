@@ -16,6 +16,7 @@ from swarmwire.deploy.cli.options import (
     Gateway,
     GatewaySet,
     Insecure,
+    Interfaces,
     Key,
     Links,
     NetworkEndpoint,
@@ -61,6 +62,7 @@ def run_command(
     socket: Socket = None,
     realtime: RealTime = None,
     subtick: Subtick = None,
+    interfaces: Interfaces = False,
     packets: Packets = "off",
     links: Links = False,
     rrd: Rrd = True,
@@ -89,12 +91,19 @@ def run_command(
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.config import Recording, RunConfig, choose_seeds, packet_share
     from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
+    from swarmwire.deploy.interfaces import enter_user_namespace
     from swarmwire.deploy.record.folder import default_folder
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:
         UI.need("--ui")
     checked = load_scenario(scenario, overrides or [])
+    if interfaces and checked.radio is None:
+        raise BadInput("--interfaces", "", "expected a scenario with a radio, over which their frames go")
+    if interfaces and checked.radio and checked.radio.interface is None:
+        checked = load_scenario(scenario, [*(overrides or []), "radio.interface={}"])
+    if checked.radio and checked.radio.interface and realtime is not None:
+        enter_user_namespace()
     for name in revoked or []:
         if name not in checked.robot_names():
             raise BadInput("--revoked", name, "expected a robot of the scenario")

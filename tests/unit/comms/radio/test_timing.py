@@ -12,8 +12,11 @@ from scipy import integrate, stats
 from swarmwire.comms.clock import NS_PER_S, to_ns
 from swarmwire.comms.draws import derive_key, uniform
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import exchanged, station
+from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
-from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.phy import Access
+from swarmwire.comms.radio.config.radio import Interface, Radio
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.delays import MAX_NS, delay_distribution, varying_delay_ns
 from swarmwire.comms.radio.timing import (
@@ -340,3 +343,54 @@ def test_a_uniform_delay_that_would_be_negative_is_refused():
     with pytest.raises(BadInput, match=r"a.toml: radio.delay.deviation_s: expected at most 0.0057735 s"):
         law_of("uniform", 0.01, 0.006)
     assert varying_delay_ns(law_of("uniform", 0.01, 0.005), 0.5) == pytest.approx(0.01 * NS_PER_S, abs=1)
+
+
+def frame_of(packet_bytes: int) -> Payloads:
+    """A frame with an IP packet of so many bytes."""
+    return Payloads.one(exchanged(station(1) + station(0) + b"\x08\x00" + bytes(packet_bytes)))
+
+
+@pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
+@pytest.mark.parametrize(("frame", "headers"), [("802.11a", 24 + 8 + 4), ("plain", 14)])
+@pytest.mark.parametrize("packet_bytes", [28, 500, 1500])
+def test_a_frame_of_an_interface_takes_the_airtime_of_its_standard(model, frame, headers, packet_bytes):
+    """802.11: MAC header, LLC with SNAP, FCS (IEEE 802.11-2007, 7.1.3); other radios carry the Ethernet header."""
+    overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
+    access = None if model == "unit-disk" else Access("none")
+    radio = Radio(
+        range_m=5.0,
+        model=model,
+        frame=frame,
+        bit_rate_bps=6_000_000,
+        overhead_bytes=overhead,
+        max_payload_bytes=most,
+        interface=Interface(),
+        access=access,
+    )
+    assert radio.mtu_bytes == 1500
+    medium = make_medium(radio, 2)
+    medium.step(0, PAIR)
+    medium.send_at(np.zeros(2, np.int64), SentPackets(np.array([0]), np.array([1]), frame_of(packet_bytes)))
+    finished = medium.step(TICK_NS, PAIR).finished
+    octets = headers + packet_bytes
+    airtime = ieee80211a_ns if frame == "802.11a" else at_bit_rate_ns
+    assert finished.final_at_ns[0] - finished.on_air_at_ns[0] == airtime(octets, 6_000_000)
+    assert finished.size_bytes[0] == 14 + packet_bytes
+
+
+@pytest.mark.parametrize("frame", ["802.11a", "plain"])
+def test_a_frame_above_the_mtu_is_too_large(frame):
+    overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
+    radio = Radio(
+        range_m=5.0,
+        frame=frame,
+        bit_rate_bps=6_000_000,
+        overhead_bytes=overhead,
+        max_payload_bytes=most,
+        interface=Interface(),
+    )
+    medium = make_medium(radio, 2)
+    medium.step(0, PAIR)
+    for packet_bytes in (radio.mtu_bytes, radio.mtu_bytes + 1):
+        medium.send_at(np.zeros(2, np.int64), SentPackets(np.array([0]), np.array([1]), frame_of(packet_bytes)))
+    assert sorted(medium.step(TICK_NS, PAIR).finished.fate.tolist()) == [Fate.RECEIVED, Fate.TOO_LARGE]

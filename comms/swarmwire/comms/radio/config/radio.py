@@ -4,12 +4,14 @@ No kernels here: a scenario is read without a compiler.
 """
 
 from dataclasses import dataclass, field, replace
+from ipaddress import IPv4Network
 
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import HEADER_BYTES
 from swarmwire.comms.radio.config.impairments import Bursts, Delays, Measures, refuse_negative
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (
@@ -49,6 +51,15 @@ class Trace:
     )
 
 
+@dataclass(frozen=True)
+class Interface:
+    """A network interface on each robot, for programs: its frames are packets of this radio. Needs real time."""
+
+    network: str = parameter("10.77.0.0/16", help="IPv4 network of which the robots get the first addresses, in order")
+
+
+DATAGRAM_BYTES = 28  # headers of IPv4 and UDP
+MIN_MTU_BYTES = 68  # of IPv4 (RFC 791)
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
 FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
 
@@ -146,6 +157,21 @@ class Radio:
     trace: Trace | None = parameter(None, help="measured links are replayed")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
     measures: Measures = field(default_factory=Measures)
+    interface: Interface | None = parameter(None, help="robots have a network interface, for programs; in real time")
+
+    @property
+    def frame_headers_bytes(self) -> int:
+        """Bytes of a frame of an interface that stand in `overhead_bytes` already.
+
+        IEEE 802.11 has headers of its own in place of Ethernet's, and `overhead_bytes` holds IPv4's and UDP's of
+        messages, which a frame brings along. Other radios carry the whole frame.
+        """
+        return 0 if self.frame == "plain" else HEADER_BYTES + DATAGRAM_BYTES
+
+    @property
+    def mtu_bytes(self) -> int:
+        """The largest IP packet in a frame of an interface."""
+        return self.max_payload_bytes + self.frame_headers_bytes - HEADER_BYTES
 
     @property
     def is_phy(self) -> bool:
@@ -275,6 +301,20 @@ def check_radio(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.bit_rate_bps", f"{radio.frame} has {listed}; got {radio.bit_rate_bps} bit/s")
     if radio.is_phy:
         _check_fits(radio, where)
+    if radio.interface is not None:
+        _check_interface(radio, radio.interface, where)
+
+
+def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
+    try:
+        IPv4Network(interface.network)
+    except ValueError as error:
+        expected = f"expected an IPv4 network such as 10.77.0.0/16: {error}"
+        raise BadInput(where, "radio.interface.network", expected) from None
+    if radio.mtu_bytes < MIN_MTU_BYTES:
+        least = radio.max_payload_bytes + MIN_MTU_BYTES - radio.mtu_bytes
+        expected = f"expected at least {least} for an interface: IPv4 needs {MIN_MTU_BYTES} bytes in a frame"
+        raise BadInput(where, "radio.max_payload_bytes", f"{expected}; got {radio.max_payload_bytes}")
 
 
 def unfit_for_torus(radio: Radio) -> str | None:

@@ -102,7 +102,7 @@ class PacketTable:
 
 def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
     """Rows of dtype PACKET for packets that wait at their radios, (k,); `robots` per arena."""
-    sizes = taken.payloads.sizes
+    sizes = taken.payload_bytes(radio)
     frame_bytes = sizes + radio.overhead_bytes
     pause_ns = np.zeros(len(taken), np.int64)
     if radio.access_or_default.method == "csma-802154":

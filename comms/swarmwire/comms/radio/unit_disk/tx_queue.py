@@ -156,7 +156,7 @@ class TxQueues:
         its broadcasts in this epoch.
         """
         packets = self._admission.take(sent_at_ns, sent, others_alive, epoch)
-        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payloads.sizes)
+        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payload_bytes(self._radio))
         packets = packets.replaced(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
         self.queued = self.queued.followed_by(packets)
         if self._any_held:

@@ -1,0 +1,187 @@
+"""Addresses of robots' interfaces, and their frames as packets, without a kernel's devices."""
+
+import socket
+from collections.abc import Generator
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import FRAME_TAG, STATION_BROADCAST, exchanged, station
+from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets
+from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
+from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
+from swarmwire.world.interfaces.backend import LATE_S, MAX_READS, FramePorts
+from tests.support.clocks import MS, FakeClock
+
+ROBOTS = 3
+IPV4 = b"\x08\x00"
+ROUTES = """Iface	Destination	Gateway 	Flags	RefCnt	Use	Metric	Mask		MTU	Window	IRTT
+eth0	00000000	010200C0	0003	0	0	0	00000000	0	0	0
+eth0	00034D0A	00000000	0001	0	0	0	00FFFFFF	0	0	0
+vpn0	0000000A	010200C0	0003	0	0	0	000000FF	0	0	0
+"""  # eth0 is in 10.77.3.0/24, and vpn0 leads to 10.0.0.0/8
+
+
+@dataclass
+class Device:
+    """A socket in place of a TAP device: what is written to the other end was sent by a program."""
+
+    addresses: Addresses
+    tap: int
+    program: socket.socket
+
+
+@dataclass
+class Rig:
+    ports: FramePorts
+    devices: list[Device]
+    clock: FakeClock
+
+    def sends(self, robot: int, to: bytes, data: bytes = b"data", source: bytes | None = None) -> bytes:
+        frame = to + (station(robot) if source is None else source) + IPV4 + data
+        self.devices[robot].program.send(frame)
+        return frame
+
+    def gets(self, robot: int) -> list[bytes]:
+        found: list[bytes] = []
+        while True:
+            try:
+                found.append(self.devices[robot].program.recv(2048))
+            except BlockingIOError:
+                return found
+
+
+@pytest.fixture
+def rig() -> Generator[Rig]:
+    with ExitStack() as stack:
+        devices: list[Device] = []
+        for addresses in addresses_of(Interface(), ROBOTS, 1500, ""):
+            world, program = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            for end in (world, program):
+                stack.enter_context(end)
+                end.setblocking(False)
+            devices.append(Device(addresses, world.fileno(), program))
+        clock = FakeClock()
+        pace = Pace(clock, 10, 1.0, lambda _: None)
+        pace.begin()
+        ports = FramePorts(devices, pace)
+        stack.callback(ports.close)
+        yield Rig(ports, devices, clock)
+
+
+def received(*packets: tuple[int, bytes, int]) -> ReceivedPackets:
+    """Packets of a receiver, with a payload and a time of reception."""
+    receiver, payloads, at_ns = zip(*packets, strict=True)
+    numbers = np.arange(len(packets))
+    payload = Payloads.of(list(payloads))
+    return ReceivedPackets(np.array(receiver), numbers, numbers, np.array(at_ns), {}, numbers, payload)
+
+
+def test_robots_have_the_first_addresses_of_the_network_in_their_order():
+    first, *_, last = addresses_of(Interface("192.168.7.0/28"), 14, 1500, "")
+    assert first.mac_text == "02:53:57:00:00:01"
+    assert (str(first.ipv4), str(last.ipv4)) == ("192.168.7.1/28", "192.168.7.14/28")
+    assert (str(first.ipv6), str(last.ipv6)) == ("fd53:57::1/64", "fd53:57::e/64")
+
+
+def test_a_network_with_too_few_addresses_is_refused():
+    with pytest.raises(BadInput, match=r"radio.interface.network: expected a network of at least 15 addresses"):
+        addresses_of(Interface("192.168.7.0/28"), 15, 1500, "")
+
+
+def test_below_ipv6_s_smallest_mtu_there_is_ipv4_alone():
+    assert [addresses_of(Interface(), 1, mtu, "")[0].ipv6 is None for mtu in (1279, 1280)] == [True, False]
+
+
+@pytest.mark.parametrize("network", ["10.77.0.0/16", "10.77.3.128/25"])
+def test_a_network_that_the_machine_uses_is_refused(network):
+    with pytest.raises(BadInput, match=r"expected a network that this machine does not use: eth0 has 10.77.3.0/24"):
+        check_unused(Interface(network), "", ROUTES)
+
+
+def test_networks_behind_a_gateway_are_no_hindrance():
+    check_unused(Interface("10.78.0.0/16"), "", ROUTES)
+
+
+@pytest.mark.parametrize("network", ["10.77.0.1/16", "fd00::/64", "robots"])
+def test_only_ipv4_networks_will_do(network):
+    with pytest.raises(BadInput, match=r"radio.interface.network: expected an IPv4 network"):
+        check_radio(Radio(range_m=1.0, interface=Interface(network)), "")
+
+
+def test_a_radio_too_small_for_ipv4_is_refused():
+    with pytest.raises(BadInput, match=r"radio.max_payload_bytes: expected at least 82 for an interface"):
+        check_radio(Radio(range_m=1.0, max_payload_bytes=81, interface=Interface()), "")
+    check_radio(Radio(range_m=1.0, max_payload_bytes=82, interface=Interface()), "")
+
+
+@pytest.mark.parametrize(
+    ("to", "expected"),
+    [
+        (station(2), 2),
+        (STATION_BROADCAST, BROADCAST),
+        (bytes.fromhex("01005e0000fb"), BROADCAST),  # IPv4 multicast
+        (bytes.fromhex("333300000001"), BROADCAST),  # IPv6 multicast
+    ],
+)
+def test_a_frame_is_a_packet_of_its_length_to_whom_it_is_addressed(rig, to, expected):
+    frame = rig.sends(1, to)
+    sent = rig.ports.take()
+    assert (sent.sender.tolist(), sent.to.tolist()) == ([1], [expected])
+    assert exchanged(sent.payloads.row(0)) == frame
+    assert sent.payloads.tags().tolist() == [FRAME_TAG]
+
+
+@pytest.mark.parametrize("to", [bytes.fromhex("025357000000"), bytes.fromhex("0a0b0c0d0e0f"), station(ROBOTS)])
+def test_an_address_of_no_robot_is_beyond_all_robots(rig, to):
+    rig.sends(0, to)
+    assert rig.ports.take().to[0] >= ROBOTS
+
+
+def test_frames_in_the_name_of_another_station_are_counted_and_dropped(rig):
+    rig.sends(0, station(1), source=station(2))
+    assert not len(rig.ports.take())
+    assert rig.ports.counts() == {"frames_of_other_stations": 1}
+
+
+def test_a_flood_of_one_robot_waits_for_the_next_subtick(rig):
+    for _ in range(MAX_READS + 1):
+        rig.sends(0, station(1))
+    rig.sends(2, station(1))
+    assert [len(rig.ports.take()) for _ in range(3)] == [MAX_READS + 1, 1, 0]
+
+
+def test_received_frames_go_to_their_devices_and_messages_to_agents(rig):
+    frame = station(2) + station(0) + IPV4 + b"data"
+    messages = rig.ports.deliver(received((1, b"\1\0message", 5), (2, exchanged(frame), 5), (2, b"\2\0", 6)))
+    assert [messages.payloads.row(row) for row in messages.payload] == [b"\1\0message", b"\2\0"]
+    assert [rig.gets(robot) for robot in range(ROBOTS)] == [[], [], [frame]]
+
+
+def test_a_robot_gets_frames_in_the_order_of_their_reception(rig):
+    frames = [station(1) + station(0) + IPV4 + bytes([i]) for i in range(3)]
+    rig.ports.deliver(received(*((1, exchanged(frames[i]), at_ns) for i, at_ns in ((0, 1), (2, 9), (1, 4)))))
+    assert rig.gets(1) == frames
+
+
+def test_the_lateness_of_deliveries_is_counted(rig):
+    frame = exchanged(station(1) + station(0) + IPV4)
+    rig.clock.time_ns += 10 * MS
+    limit_ns = round(LATE_S * 1000) * MS
+    rig.ports.deliver(received((1, frame, 10 * MS), (1, frame, 10 * MS - limit_ns), (1, frame, 10 * MS - limit_ns - 1)))
+    report = rig.ports.report()
+    assert (report.delivered, report.delivered_bytes, report.late) == (3, 3 * len(frame), 1)
+    assert report.delivery is not None
+    assert report.delivery.count == 3
+    assert report.delivery.worst_s == pytest.approx(LATE_S, rel=0.01)
+
+
+def test_a_device_that_refuses_a_frame_ends_nothing(rig):
+    rig.devices[1].program.close()
+    rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
+    assert rig.ports.counts() == {"frames_refused_by_device": 1}
+    assert rig.ports.report().delivered == 0

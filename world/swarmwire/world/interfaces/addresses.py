@@ -1,0 +1,76 @@
+"""The addresses of robots' interfaces, derived from the scenario's network and the robot's index."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from ipaddress import IPv4Address, IPv4Interface, IPv4Network, IPv6Address, IPv6Interface
+from pathlib import Path
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import station
+from swarmwire.comms.radio.config.radio import Interface
+
+KEY = "radio.interface.network"
+ULA_NETWORK = 0xFD53_0057 << 96  # fd53:57::/64, unique local addresses (RFC 4193)
+ULA_PREFIX_BITS = 64
+MIN_IPV6_MTU_BYTES = 1280  # RFC 8200
+ROUTES = Path("/proc/net/route")  # of this process's network namespace
+ROUTE_HEADER_LINES = 1
+IS_GATEWAY = 0x2  # RTF_GATEWAY: a route to networks of others
+
+
+@dataclass(frozen=True, slots=True)
+class Addresses:
+    """The addresses of one robot."""
+
+    mac: bytes
+    ipv4: IPv4Interface
+    ipv6: IPv6Interface | None  # beside the link-local one; None: the MTU is too small for IPv6
+
+    @property
+    def mac_text(self) -> str:
+        """Such as 02:53:57:00:00:01."""
+        return self.mac.hex(":")
+
+
+def addresses_of(interface: Interface, robots: int, mtu_bytes: int, where: str) -> tuple[Addresses, ...]:
+    """The addresses of the robots of an arena; BadInput if the network has too few."""
+    network = IPv4Network(interface.network)
+    usable = network.num_addresses - 2
+    if usable < robots:
+        raise BadInput(where, KEY, f"expected a network of at least {robots} addresses (the robots), got {network}")
+    has_ipv6 = mtu_bytes >= MIN_IPV6_MTU_BYTES
+    return tuple(
+        Addresses(
+            station(robot),
+            IPv4Interface((network.network_address + robot + 1, network.prefixlen)),
+            IPv6Interface((IPv6Address(ULA_NETWORK + robot + 1), ULA_PREFIX_BITS)) if has_ipv6 else None,
+        )
+        for robot in range(robots)
+    )
+
+
+def check_unused(interface: Interface, where: str, routes: str | None = None) -> None:
+    """BadInput if an interface of this machine has addresses of the network.
+
+    `routes` is the content of /proc/net/route, which is read if left out.
+    """
+    network = IPv4Network(interface.network)
+    for name, connected in _connected(ROUTES.read_text() if routes is None else routes):
+        if network.overlaps(connected):
+            expected = f"expected a network that this machine does not use: {name} has {connected}"
+            raise BadInput(where, KEY, f"{expected}; got {network}")
+
+
+def _connected(routes: str) -> Sequence[tuple[str, IPv4Network]]:
+    """Names of interfaces, and the networks to which they are connected."""
+    found: list[tuple[str, IPv4Network]] = []
+    for line in routes.splitlines()[ROUTE_HEADER_LINES:]:
+        name, destination, _, flags, _, _, _, mask, *_ = line.split()
+        if not int(flags, 16) & IS_GATEWAY and int(mask, 16):
+            network = IPv4Network((_address(destination), str(_address(mask))))
+            found.append((name, network))
+    return found
+
+
+def _address(text: str) -> IPv4Address:
+    return IPv4Address(bytes.fromhex(text)[::-1])  # the kernel writes them in the byte order of the processor
