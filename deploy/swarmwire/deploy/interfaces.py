@@ -10,6 +10,7 @@ from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from swarmwire.comms.errors import BadInput
@@ -20,7 +21,7 @@ from swarmwire.metrics.atomic import write_text
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import FramePorts
-from swarmwire.world.interfaces.entering import process_start
+from swarmwire.world.interfaces.entering import INTERFACES, Place, process_start
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,
     USER_NAMESPACE,
@@ -29,10 +30,11 @@ from swarmwire.world.interfaces.namespaces import (
     may_make_namespaces,
     missing_right,
 )
+from swarmwire.world.interfaces.programs import Programs, RobotProgram, hosts
 from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"
-INTERFACES = "interfaces.json"  # in the run folder, while the run lasts: how `swarmwire exec` finds the namespaces
+PROGRAMS = "programs"  # in the run folder: output, scratch folders and host names of programs
 DESCRIPTORS = 2  # of each robot: its device and its namespace
 
 
@@ -41,7 +43,9 @@ class OpenInterfaces:
     """The interfaces of a run that has begun."""
 
     ports: FramePorts
-    interfaces: tuple[RobotInterface, ...]
+    programs: Programs
+    places: tuple[Place, ...]  # of the robots
+    addresses: tuple[Addresses, ...]  # of the robots
     folder: Path | None  # the run folder
 
 
@@ -50,7 +54,7 @@ class RunInterfaces:
 
     def __init__(self, scenario: Scenario, *, repeated: bool) -> None:
         radio = scenario.radio
-        self._scenario = scenario
+        self._scenario, self._repeated = scenario, repeated
         self._radio = radio if radio and radio.interface and not repeated else None
 
     def __bool__(self) -> bool:
@@ -61,9 +65,10 @@ class RunInterfaces:
 
         `factor` is that of real time, None in lockstep.
         """
-        if self._radio is None or self._radio.interface is None:
-            return
         where = self._scenario.source
+        if self._radio is None or self._radio.interface is None:
+            self._check_no_programs(where)
+            return
         if factor is None:
             raise BadInput(where, KEY, "expected --realtime 1 with it: programs do not wait for a simulation")
         if static.arenas > 1:
@@ -71,6 +76,8 @@ class RunInterfaces:
                 "--seeds", "", f"expected one seed: robots' interfaces are in one arena, got {static.arenas}"
             )
         self._addresses(static.robots)
+        for group in self._scenario.robots:
+            self._program(group)
         check_unused(self._radio.interface, where)
         need_open_files(DESCRIPTORS * static.robots)
         check_rights()
@@ -82,13 +89,49 @@ class RunInterfaces:
             yield None
             return
         with ExitStack() as stack:
+            addresses = self._addresses(static.robots)
             interfaces: list[RobotInterface] = []
-            for addresses in self._addresses(static.robots):
-                interface = RobotInterface(addresses, self._radio.mtu_bytes)
+            for of in addresses:
+                interface = RobotInterface(of, self._radio.mtu_bytes)
                 stack.callback(interface.close)
                 interfaces.append(interface)
             ports = stack.enter_context(closing(FramePorts(interfaces, pace)))
-            yield OpenInterfaces(ports, tuple(interfaces), folder)
+            files = folder.resolve() / PROGRAMS if folder else Path(stack.enter_context(TemporaryDirectory()))
+            files.mkdir(exist_ok=True)
+            names = files / "hosts"
+            names.write_text(hosts(static.robot_names, addresses))
+            places = _places(static, interfaces, names)
+            programs = stack.enter_context(closing(self._new_programs(static, places, addresses, files)))
+            yield OpenInterfaces(ports, programs, places, addresses, folder)
+
+    def _new_programs(
+        self, static: Static, places: Sequence[Place], addresses: Sequence[Addresses], files: Path
+    ) -> Programs:
+        near = _near(self._scenario)
+        programs = {
+            robot: RobotProgram(command, places[robot], addresses[robot], near)
+            for group in static.groups
+            if (command := self._program(group.name))
+            for robot in range(group.start, group.stop)
+        }
+        return Programs(programs, files, static.robots)
+
+    def _program(self, group: str) -> tuple[str, ...]:
+        """The program of a group with its path made absolute; BadInput if it is not there."""
+        command = self._scenario.robots[group].program
+        if not command:
+            return ()
+        name = command[0]
+        path = _near(self._scenario) / name if os.sep in name else shutil.which(name)
+        if path is None or not os.access(path, os.X_OK) or Path(path).is_dir():
+            expected = f"expected a program that can be run, got {name!r}"
+            raise BadInput(self._scenario.source, f"robots.{group}.program", expected)
+        return (str(path), *command[1:])
+
+    def _check_no_programs(self, where: str) -> None:
+        for group, table in self._scenario.robots.items():
+            if table.program and not self._repeated:
+                raise BadInput(where, f"robots.{group}.program", f"expected [{KEY}] with it, the robots' network")
 
     def _addresses(self, robots: int) -> tuple[Addresses, ...]:
         assert self._radio
@@ -96,8 +139,22 @@ class RunInterfaces:
         return addresses_of(self._radio.interface, robots, self._radio.mtu_bytes, self._scenario.source)
 
 
+def _near(scenario: Scenario) -> Path:
+    """The folder of the scenario's file."""
+    return Path(scenario.source).parent.resolve()
+
+
+def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -> tuple[Place, ...]:
+    pid = os.getpid()
+    start = process_start(pid) or 0
+    return tuple(
+        Place(pid, start, interface.namespace, name, str(names))
+        for name, interface in zip(static.robot_names, interfaces, strict=True)
+    )
+
+
 class InterfacesLog(Observer):
-    """Observer that says in the run folder where the interfaces are, as long as the run lasts.
+    """Observer that starts the programs, and says in the run folder where the interfaces are while the run lasts.
 
     Summary part: `interfaces`, the frames and bytes sent and delivered, and their lateness.
     """
@@ -107,9 +164,18 @@ class InterfacesLog(Observer):
 
     def begin(self, static: Static) -> None:
         """Frames are carried from now on, so programs may come."""
+        self._opened.programs.start()
         if self._opened.folder:
-            text = json.dumps(_description(static, self._opened.interfaces), indent=2)
-            write_text(self._opened.folder / INTERFACES, text + "\n")
+            robots = {
+                place.robot: {
+                    "place": place._asdict(),
+                    "mac": addresses.mac_text,
+                    "ipv4": str(addresses.ipv4),
+                    "ipv6": str(addresses.ipv6) if addresses.ipv6 else None,
+                }
+                for place, addresses in zip(self._opened.places, self._opened.addresses, strict=True)
+            }
+            write_text(self._opened.folder / INTERFACES, json.dumps(robots, indent=2) + "\n")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The report of the whole run."""
@@ -117,20 +183,6 @@ class InterfacesLog(Observer):
             (self._opened.folder / INTERFACES).unlink(missing_ok=True)
         self._opened.ports.count_dropped()
         return {"interfaces": self._opened.ports.report()}
-
-
-def _description(static: Static, interfaces: Sequence[RobotInterface]) -> dict[str, Any]:
-    """The world's process, and by robot its namespace's descriptor there and its addresses."""
-    robots = {
-        name: {
-            "namespace": interface.namespace,
-            "mac": interface.addresses.mac_text,
-            "ipv4": str(interface.addresses.ipv4),
-            "ipv6": str(interface.addresses.ipv6) if interface.addresses.ipv6 else None,
-        }
-        for name, interface in zip(static.robot_names, interfaces, strict=True)
-    }
-    return {"pid": os.getpid(), "process_start": process_start(os.getpid()), "robots": robots}
 
 
 def enter_user_namespace() -> None:

@@ -219,6 +219,7 @@ class RunParts:
             stop,
             self.live_events,
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
+            *([self._open_interfaces.programs.follow] if self._open_interfaces else []),
         )
 
     def entered_loop(self) -> Loop:

@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.interfaces import INTERFACES
-from swarmwire.world.interfaces.entering import Place, command_line
+from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
 from swarmwire.world.interfaces.namespaces import check_rights
 from tests.support.clocks import until
 
@@ -82,13 +81,11 @@ class InterfacesRun:
 
     def __init__(self, folder: Path, process: subprocess.Popen[str]) -> None:
         self.folder, self.process = folder, process
-        description: dict[str, Any] = json.loads((folder / INTERFACES).read_text())
-        self._world = description["pid"], description["process_start"]
-        self.robots: dict[str, dict[str, Any]] = description["robots"]
+        self.robots: dict[str, dict[str, Any]] = json.loads((folder / INTERFACES).read_text())
 
     def command(self, robot: str, *command: str) -> list[str]:
         """The command that runs a command on a robot."""
-        return command_line(Place(*self._world, self.robots[robot]["namespace"], robot, None), [*command])
+        return command_line(Place(**self.robots[robot]["place"]), [*command])
 
     def on(self, robot: str, *command: str, timeout_s: float = TIMEOUT_S) -> subprocess.CompletedProcess[str]:
         """A command that has ended on a robot."""
@@ -103,7 +100,7 @@ class InterfacesRun:
     def end(self) -> dict[str, Any]:
         """End the run as Ctrl-C does; its summary."""
         self.process.send_signal(signal.SIGINT)
-        self.process.communicate(timeout=TIMEOUT_S)
+        self.process.wait(TIMEOUT_S)
         return json.loads((self.folder / "summary.json").read_text())
 
 
@@ -121,11 +118,14 @@ def running(
     )
     try:
         until(lambda: (out / INTERFACES).exists() or process.poll() is not None)
-        assert process.poll() is None, process.communicate()[0]
+        if process.poll() is not None:
+            raise AssertionError(process.communicate()[0])
         yield InterfacesRun(out, process)
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
+        if process.stdout:
+            process.stdout.close()
 
 
 def _command(folder: Path, out: Path, options: Sequence[str]) -> list[str]:

@@ -16,7 +16,7 @@ from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, Se
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.subtick import SubtickRadio
@@ -79,6 +79,7 @@ class Loop:
         stop_conditions: StopConditions | None = None,
         live_events: LiveEvents | None = None,
         timed: TimedBackend | None = None,
+        follow: Callable[[int, BoolArray], Sequence[EventRecord]] | None = None,
     ) -> None:
         """Make a loop for a backend that has been started before `run`.
 
@@ -91,6 +92,7 @@ class Loop:
             stop_conditions: checked after each tick, after the observers; None: no arena ends before the run.
             live_events: live events, taken at the start of each tick.
             timed: the backend, if it sends and delivers packets within a tick.
+            follow: gets the start of each tick in ns and which robots are alive (rows,), and returns further events.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
@@ -100,7 +102,7 @@ class Loop:
         progress = live_events.progress if live_events else None
         self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, progress)
         self._mailbox = Mailbox(world.static)
-        self._timed = timed
+        self._timed, self._follow = timed, follow
         self._subtick = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
         self._invalid_destination, self._without_radio = (
             np.zeros_like(self._left_after),
@@ -154,7 +156,7 @@ class Loop:
             edges=results.edges if results else None,
             tally=results.tally if results else None,
             finished=results.finished if results else None,
-            events=effects.records,
+            events=(*effects.records, *self._follow(start_ns, alive)) if self._follow else effects.records,
             departed=results.departed if results else None,
             movable=movable,
             value=world.values.value,

@@ -16,6 +16,7 @@ from swarmwire.deploy.cli.certs import certs_app
 from swarmwire.deploy.cli.compare import compare_command, report_command, sim_to_real_command
 from swarmwire.deploy.cli.ctl import ctl_app
 from swarmwire.deploy.cli.ctl_events import events_app
+from swarmwire.deploy.cli.exec import exec_command
 from swarmwire.deploy.cli.export import draw_command, export_command
 from swarmwire.deploy.cli.inspect import (
     check_command,
@@ -68,6 +69,7 @@ def options(
 app.command("new", rich_help_panel=RUN)(new_command)
 app.command("run", rich_help_panel=RUN)(run_command)
 app.command("repeat", rich_help_panel=RUN)(repeat_command)
+app.command("exec", rich_help_panel=RUN)(exec_command)
 ctl_app.add_typer(events_app)
 app.add_typer(ctl_app, name="ctl", rich_help_panel=RUN)
 app.command("view", rich_help_panel=VIEW)(view_command)

@@ -14,8 +14,8 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.interfaces import INTERFACES
 from swarmwire.world.interfaces import namespaces
+from swarmwire.world.interfaces.entering import INTERFACES
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running
 

@@ -38,6 +38,9 @@ START_FIELD = 19  # of /proc/PID/stat after the command's name: when the process
 NOT_FOUND, NOT_ENTERED = 127, 125  # exit codes, as of shells and of containers
 
 
+INTERFACES = "interfaces.json"  # in the run folder, while the run lasts: by robot its `Place` and its addresses
+
+
 class Place(NamedTuple):
     """Where a command is to run."""
 

@@ -60,6 +60,9 @@ class RobotsTable(Table):
     """How many robots."""
     agent: str = Field(min_length=1)
     """The agent's class, as module:Class or file.py:Class."""
+    program: tuple[str, ...] = Field(default=(), strict=False)
+    """A program that runs on each robot, and its arguments; a path is relative to the scenario. Needs
+    radio.interface."""
     act_every_ticks: int = Field(default=1, ge=1, le=1_000_000, json_schema_extra={"unit": "ticks"})
     """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
     params: dict[str, Any] = Field(default_factory=dict)

@@ -1,0 +1,92 @@
+"""Programs on robots: their surroundings, their end, and `swarmwire exec`."""
+
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+import psutil
+import pytest
+
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import repeat, run
+from tests.support.clocks import until
+from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running
+from tests.support.deploy.runs import swarmwire
+
+pytestmark = needs_interfaces
+GROUP = "[robots.line]\n"
+
+
+def with_program(scenario: str, *command: str) -> str:
+    return scenario.replace(GROUP, f"{GROUP}program = {json.dumps(command)}\n")
+
+
+def output(folder: Path, robot: str) -> str:
+    path = folder / "programs" / f"{robot}.log"
+    return path.read_text() if path.exists() else ""
+
+
+def test_a_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
+    script = 'env | grep ^ROBOT; hostname; cat /sys/class/net/radio0/address; pwd; touch "$ROBOT_SCRATCH/mine"; exit 7'
+    scenario = with_program(line(2), "sh", "-c", script).replace("3600", "2") + DISK
+    with running(tmp_path, scenario, "--packets", "all") as world:
+        assert world.process.wait(60) == 0
+    lines = output(world.folder, "line-1").splitlines()
+    assert sorted(lines[:-3]) == [
+        "ROBOT=line-1",
+        "ROBOT_INDEX=1",
+        "ROBOT_INTERFACE=radio0",
+        "ROBOT_IPV4=10.77.0.2",
+        "ROBOT_IPV6=fd53:57::2",
+        "ROBOT_MAC=02:53:57:00:00:02",
+        f"ROBOT_SCRATCH={world.folder}/programs/line-1",
+    ]
+    assert lines[-3:] == ["line-1", "02:53:57:00:00:02", str(tmp_path)]
+    assert (world.folder / "programs/line-1/mine").exists()
+    events = json.loads((world.folder / "summary.json").read_text())["events"]
+    ends = sorted((event["do"], event["part"], *event["robots"]) for event in events)
+    assert ends == [("program_ended", "exit code 7", robot) for robot in ("line-0", "line-1")]
+    assert swarmwire("verify", world.folder).returncode == 0
+    assert repeat(world.folder).same
+
+
+def test_a_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
+    script = "trap '' TERM; echo started; sleep 1000 & wait"
+    kill = '\n[[events]]\ndo = "kill"\nrobots = { names = ["line-0"] }\nat_s = 0.5\nfor_s = 0.5\n'
+    with running(tmp_path, with_program(line(2), "sh", "-c", script) + DISK + kill) as world:
+        until(lambda: output(world.folder, "line-0").count("started") == 2)
+        assert output(world.folder, "line-1").count("started") == 1
+        sleepers = [p for p in psutil.Process(world.process.pid).children(recursive=True) if p.name() == "sleep"]
+        assert len(sleepers) == 2
+        os.kill(world.process.pid, signal.SIGKILL)
+        until(lambda: not any(process.is_running() for process in sleepers))
+
+
+@needs_program("ping")
+def test_exec_runs_a_command_on_a_robot_which_knows_the_others_by_name(tmp_path):
+    with running(tmp_path, line(2) + DISK) as world:
+        done = swarmwire("exec", world.folder, "line-0", "--", "ping", "-c", "1", "line-1")
+        assert done.returncode == 0, done.stderr
+        assert re.search(r"1 received", done.stdout)
+        assert swarmwire("exec", world.folder, "line-0", "--", "sh", "-c", "exit 3").returncode == 3
+        assert swarmwire("exec", world.folder, "line-0", "--", "no-such").returncode == 127
+        unknown = swarmwire("exec", world.folder, "line-7")
+        assert (unknown.returncode, "expected one of line-" in unknown.stderr) == (2, True)
+        world.end()
+    over = swarmwire("exec", world.folder, "line-0", "--", "true")
+    assert over.returncode == 2
+    assert "expected the folder of a running simulation with network interfaces" in over.stderr
+
+
+def test_a_program_that_is_not_there_or_has_no_network_is_refused_before_anything_is_made(tmp_path):
+    (tmp_path / "still.py").write_text(STILL)
+    path = tmp_path / "scenario.toml"
+    path.write_text(with_program(line(1), "no-such-program") + DISK + "[radio.interface]")
+    with pytest.raises(BadInput, match=r"robots.line.program: expected a program that can be run, got 'no-such"):
+        run(path, realtime=1, out=tmp_path / "out")
+    path.write_text(with_program(line(1), "true") + DISK)
+    with pytest.raises(BadInput, match=r"robots.line.program: expected \[radio.interface\] with it"):
+        run(path, realtime=1, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
