@@ -33,7 +33,7 @@ PANEL_IN, APART_IN, LOW_IN = 3.0, 0.15, 1.18  # panels: sides, distances, above 
 VIEW_X_M, VIEW_Y_M = (-2.65, 4.05), (-3.35, 3.35)  # of the arena: where the robots go
 ROBOTS = 0.016  # least radius of a disc by the arena's side: they are drawn larger than in other pictures
 TRAIL_S = 3.0
-HEAD_PT, TEXT_PT = 12.0, 9.0
+HEAD_PT, TEXT_PT = 13.0, 10.5
 
 
 class Panel:
@@ -55,15 +55,15 @@ class Panel:
             left, title_y, f"{100 * loss:.0f} % of packets lost", fontsize=HEAD_PT, fontweight="bold", color=INK
         )
 
-        plot = plain_axes(figure, (left + 0.025, 0.075, across - 0.025, 0.095), "")
+        plot = plain_axes(figure, (left + 0.025, 0.092, across - 0.025, 0.083), "")
         plot.set(xlim=(0.0, UNTIL_S), ylim=(-0.03, 1.05), yticks=(0.0, 1.0), xticks=(0, 10, 20))
         plot.set_xticklabels(("0", "10 s", "20 s"))
         plot.tick_params(labelsize=TEXT_PT - 1.0)
         plot.plot(film.time_s, self._order, color=FAINT, lw=1.0)
         [self._past] = plot.plot([], [], color=CURVE, lw=1.8)
         [self._dot] = plot.plot([], [], "o", color=CURVE, ms=5.0, mec="white", mew=0.8, clip_on=False, zorder=4)
-        number_y = 0.187
-        self._number: Any = figure.text(left, number_y, "", fontsize=TEXT_PT + 1.0, fontweight="bold", color=INK)
+        number_y = 0.19
+        self._number: Any = figure.text(left, number_y, "", fontsize=TEXT_PT + 0.5, fontweight="bold", color=INK)
         self._note: Any = figure.text(left + across, number_y, "", fontsize=TEXT_PT, color=SOFT, ha="right")
 
     @property
@@ -113,11 +113,11 @@ class Hero:
         self._time: Any = figure.text(right, top, "", fontsize=HEAD_PT, color=INK, ha="right")
         look: dict[str, Any] = {"frameon": False, "fontsize": TEXT_PT, "labelcolor": INK, "borderaxespad": 0.0}
         entries = packet_entries((Fate.RECEIVED, Fate.LOST))
-        figure.legend(handles=entries, loc="center right", bbox_to_anchor=(right - 0.1, top + 0.013), ncols=2, **look)
+        figure.legend(handles=entries, loc="center right", bbox_to_anchor=(right - 0.115, top + 0.013), ncols=2, **look)
         speed = EVERY_TICKS * FRAMES_PER_S / films[0].static.rate_hz
         note = f"{SCENARIO}, seed {SEED}; {speed:g} x real time; {self._panels[0].swarm.enlargement}"
         figure.text(right, 0.008, note, fontsize=TEXT_PT - 1.5, color=SOFT, ha="right")
-        explained = "order: length of the mean heading vector, 1 if all head the same way"
+        explained = "order: 1 if all head the same way"
         figure.text(left, 0.008, explained, fontsize=TEXT_PT - 1.5, color=SOFT)
         self._still: Any = None
 

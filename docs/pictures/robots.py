@@ -1,4 +1,4 @@
-"""Draws docs/robots.svg: what runs where, with real robots, and what stands in for them in a rehearsal."""
+"""Draws docs/robots.svg: the processes of a swarm of real robots, and their emulation in a rehearsal."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ COLUMNS = (10.0, 305.0, 600.0)
 BOX_WIDTH = 270.0
 YOURS, NETWORK, AGENT, ROBOT, WORLD = "#f1f5f9", "#fae8ff", "#dcfce7", "#fef3c7", "#dbeafe"
 AGENTS = (
-    ("agent of flock-0", "driver epuck2, radio zenoh", "TCP port 1000, WiFi"),
-    ("agent of flock-1", "driver epuck2, radio zenoh", "TCP port 1000, WiFi"),
+    ("agent of flock-0", "driver epuck2, radio zenoh", "TCP port 1000, Wi-Fi"),
+    ("agent of flock-1", "driver epuck2, radio zenoh", "TCP port 1000, Wi-Fi"),
     ("agent of turtle-0", "driver ros2, radio zenoh", "zenoh, port 7447"),
 )
 ROBOTS = (
-    ("e-puck2", "no watchdog of its own"),
-    ("e-puck2", "no watchdog of its own"),
+    ("e-puck2", "no watchdog: drives on without Wi-Fi"),
+    ("e-puck2", "no watchdog: drives on without Wi-Fi"),
     ("TurtleBot", "ROS 2 behind a zenoh bridge"),
 )
 
@@ -33,19 +33,19 @@ def draw(to: Path = TO) -> None:
         text(
             WIDTH / 2,
             WORLD_Y + 21,
-            "In a rehearsal, swarmwire run --gateway is robots, tracker and radio medium; the agents are the same.",
+            "In a rehearsal, swarmwire run --gateway emulates robots, tracker and radio; the agents are the same.",
             anchor="middle",
         ),
     ]
-    to.write_text(page("What runs where", WIDTH, HEIGHT, shapes), encoding="utf-8")
+    to.write_text(page("Robots, agents and network", WIDTH, HEIGHT, shapes), encoding="utf-8")
 
 
 def _company() -> list[str]:
-    """The computer of whoever runs the swarm, and the tracker, above the network."""
+    """The operator's computer and the tracker, above the network."""
     left, right = COLUMNS[0], COLUMNS[2]
     return [
         _titled(left, 10, YOURS, "your computer", "swarmwire robots, swarmwire certs"),
-        _titled(right, 10, YOURS, "tracker", "camera system: where each robot is"),
+        _titled(right, 10, YOURS, "tracker", "camera system: poses of all robots"),
         text((left + right + BOX_WIDTH) / 2, 34, "deploy, start, stop: by SSH to the agents' hosts", anchor="middle"),
         arrow(left + 60, 62, left + 60, NETWORK_Y - 2),
         text(left + 70, 94, "estop, status"),
@@ -55,7 +55,7 @@ def _company() -> list[str]:
 
 
 def _network() -> list[str]:
-    said = "the swarm's network: zenoh over TLS, each member as the name on its certificate, and as nobody else"
+    said = "the swarm's network: zenoh over TLS; each member is authenticated by its certificate"
     return [box(10, NETWORK_Y, WIDTH - 20, 34, NETWORK), text(WIDTH / 2, NETWORK_Y + 22, said, anchor="middle")]
 
 

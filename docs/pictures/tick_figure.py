@@ -6,7 +6,7 @@ from docs.pictures.svg import arrow, box, line, page, text
 from docs.pictures.tick_steps import LANES, Step, tick_steps
 
 TO = Path(__file__).parents[1] / "tick-steps.svg"
-LANE, ROW, TOP, WIDE = 156.0, 44.0, 44.0, 124.0
+LANE, ROW, TOP, WIDE = 170.0, 44.0, 44.0, 124.0
 FILLS = dict(zip(LANES, ("#fee2e2", "#fae8ff", "#dbeafe", "#f1f5f9", "#dcfce7", "#fef3c7"), strict=True))
 
 

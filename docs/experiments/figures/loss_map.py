@@ -24,7 +24,7 @@ CAMPAIGNS = (*(f"loss-map-{behaviour}{radio}" for behaviour in BEHAVIOURS for ra
 COLUMNS = ("radio.link_pdr",)
 
 TITLES = {
-    "avoidance": "avoidance\nnobody touches in 60 s",
+    "avoidance": "avoidance\nno contact in 60 s",
     "flocking": "flocking\none flock within 60 s",
     "pso": "particle swarm search\nhalf at the light within 150 s",
 }

@@ -52,7 +52,7 @@ from swarmwire.metrics.drawing.scene import round_length_m
 _VIEW_IN, _UNDER_IN, _EDGE_IN, _HEAD_IN = 3.55, 0.25, 0.14, 0.4
 _CAPTION_LETTERS, _CAPTION_ROW_IN = 118, 0.14
 _CURVE_IN = 0.75
-_VALUES_AT_IN = 0.95  # of facts, from their names
+_VALUES_AT_IN = 0.78  # of facts, from their names
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
 _FADES_FROM, _FADING = 0.6, 10  # of the view, where rays that leave it begin to fade; and in so many steps
 _NUMBER_AT = 0.055  # beyond the rays' ends, as a share of the view
@@ -289,9 +289,8 @@ def draw_from_above(axes: Any, body: Body) -> None:
             "borderaxespad": 0.0,
             "borderpad": 0.0,
         }
-        legend = axes.legend(
-            ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), handlelength=1.3, columnspacing=1.2, **plain
-        )
+        close: Look = {"handlelength": 1.1, "handletextpad": 0.4, "columnspacing": 0.8}  # the bar needs its room
+        legend = axes.legend(ncols=3, loc="center right", bbox_to_anchor=(1.0, _BELOW), **close, **plain)
         for line in legend.get_lines():  # rays of a scan are too fine to be seen alone
             line.set_linewidth(max(line.get_linewidth(), _MIN_LINE_PT))
 
