@@ -2,6 +2,7 @@
 
 import json
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ from zenoh.ext import Int64, z_deserialize
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.robots.ros2.keys import RANGE
 from swarmwire.comms.robots.ros2.links import close
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.transforms import sensor_frames
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.publishers import Rate
+from swarmwire.world.gateways.ros2.publishers import Rate, broadcasters_of
 from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent
 from tests.support.world.gateways import (
@@ -29,7 +33,7 @@ from tests.support.world.gateways import (
 )
 
 # pycdr2 has arrays for types that are lists in fact:
-# pyright: reportIndexIssue=false
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false
 
 
 TOPICS = {
@@ -39,12 +43,18 @@ TOPICS = {
     "battery_state": "sensor_msgs/msg/BatteryState",
     "illuminance": "sensor_msgs/msg/Illuminance",
 }
+OF_ROBOT = 9  # tokens in the graph of rmw_zenoh: a node, and its topics
+IN_RMW = 2 * OF_ROBOT + 2  # with the clock, and its node
+IN_BRIDGE = 2 * (OF_ROBOT - 1) + 2  # with the clock, and the bridge itself
 GO = independent.twist(0.1, -0.5).serialize()
 
 
 def dds(kind: str) -> str:
     package, _, name = kind.split("/")
     return f"{package}::msg::dds_::{name}_"
+
+
+FRAMES = {"tf": "tf2_msgs/msg/TFMessage", "tf_static": "tf2_msgs/msg/TFMessage"}
 
 
 @pytest.mark.parametrize("topic", TOPICS)
@@ -78,6 +88,44 @@ def test_readings_are_told_in_units_and_signs_of_ros():
         assert node.message("flock_1/illuminance", TOPICS["illuminance"]).illuminance == 200.0
         odom = node.message("flock_1/odom", TOPICS["odom"])
         assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_footprint")
+
+
+def test_frames_lead_from_the_odometry_to_each_sensor_and_turn_with_it():
+    with ros_node() as node:
+        turned = dict(readings())
+        for tick in range(5):
+            turned["odometry.left_m"], turned["odometry.right_m"] = (np.array([0.0, by * tick]) for by in (-0.01, 0.01))
+            node.publish(turned)
+        came = node.subscribe("flock_1/tf")
+        (moved,) = independent.TFMessage.deserialize(node.first(came, turned).payload.to_bytes()).transforms
+        assert (moved.header.frame_id, moved.child_frame_id) == ("odom", "base_footprint")
+        turn_rad = 2 * 0.04 / 0.16  # of wheels 0.16 m apart
+        assert moved.transform.rotation.z == pytest.approx(sin(turn_rad / 2))
+        still = node.message("flock_1/tf_static", FRAMES["tf_static"]).transforms
+        parents = {of.child_frame_id: of.header.frame_id for of in still}
+        assert parents == dict.fromkeys(("base_scan", "imu_link", "illuminance"), "base_link") | {
+            "base_link": "base_footprint"
+        }
+        (cell,) = (of.transform for of in still if of.child_frame_id == "illuminance")
+        assert (cell.translation.x, cell.translation.y) == pytest.approx((0.105, 0.0))
+
+
+@pytest.mark.parametrize("distro", ["humble", "jazzy"])
+def test_proximity_is_told_as_the_distance_from_the_rim(distro):
+    body = load_body("epuck2")
+    assert body.proximity
+    value = body.proximity.response.value(np.array([0.02, np.inf, 0.05]))
+    fields = {"proximity.value": np.concatenate([value, np.zeros(5)])[None]}
+    messages, broadcasters = Messages(distro), broadcasters_of(body, 1, Ros2GatewayOptions(distro=distro))
+    proximity = [of for of in broadcasters if of.topic.startswith("proximity")]
+    told: dict[str, Any] = {of.topic: of.message(messages, fields, 0, 5) for of in proximity}
+    assert list(told) == [f"proximity_{place}" for place in range(8)]
+    near, none, far = (told[f"proximity_{place}"] for place in range(3))
+    assert (near.range, none.range, far.range) == pytest.approx((0.02, np.inf, 0.05))
+    assert (near.header.frame_id, near.radiation_type, near.max_range) == ("proximity_0", near.INFRARED, 0.05)
+    assert messages.decode(RANGE, messages.encode(RANGE, near)).range == pytest.approx(0.02)
+    frames = {frame.name: frame for frame in sensor_frames(body)}
+    assert (frames["proximity_2"].x_m, frames["proximity_2"].y_m) == pytest.approx((0.0, -0.035))  # to the right
 
 
 def test_odometry_is_where_the_wheels_say_that_the_base_is_whether_or_not_anybody_listened():
@@ -204,22 +252,25 @@ def tokens(node, pattern: str) -> set[str]:
 
 def test_foreign_tools_find_nodes_and_topics_of_every_robot():
     with ros_node() as node:
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
         shown = {"/".join(token.split("/")[5:12]) for token in rmw}
         for robot in ("flock_0", "flock_1"):
             assert f"NN/%/%{robot}/base" in shown
-            for topic, kind in TOPICS.items():
+            for topic, kind in (TOPICS | FRAMES).items():
                 assert f"MP/%/%{robot}/base/%{robot}%{topic}/{dds(kind)}" in {t.rsplit("/", 1)[0] for t in shown}
             assert any(token.startswith(f"MS/%/%{robot}/base/%{robot}%cmd_vel/") for token in shown)
-        assert len({tuple(token.split("/")[3:5]) for token in rmw}) == 14  # ids of nodes and topics are their own
-        bridge = until(lambda: tokens(node, "@/*/@ros2_lv/**"), lambda found: len(found) == 13)
+        assert "NN/%/%/world" in shown
+        assert any(token.startswith("MP/%/%/world/%clock/rosgraph_msgs::msg::dds_::Clock_/RIHS01_") for token in shown)
+        assert len({tuple(token.split("/")[3:5]) for token in rmw}) == IN_RMW  # ids of nodes and topics are their own
+        bridge = until(lambda: tokens(node, "@/*/@ros2_lv/**"), lambda found: len(found) == IN_BRIDGE)
+        assert any("/MP/clock/rosgraph_msgs§msg§Clock/:1:0:0,10:typehash=RIHS01_" in t for t in bridge)
         assert any("/MP/flock_1§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64c1" in t for t in bridge)
         assert any("/MS/flock_1§cmd_vel/geometry_msgs§msg§Twist/" in t for t in bridge)
 
 
 def test_stamped_commands_are_announced_where_the_user_says_so():
     with ros_node(stamped=True, distro="humble") as node:
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
         assert sum("cmd_vel/geometry_msgs::msg::dds_::TwistStamped_/TypeHashNotSupported/" in t for t in rmw) == 2
 
 
@@ -230,7 +281,7 @@ def test_a_dead_robot_is_silent_vanishes_and_takes_no_command_until_it_lives_aga
         node.session.put("flock_1/cmd_vel", GO)
         node.told()
         node.publish(alive=np.array([True, False]))
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 7)
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW - OF_ROBOT)
         assert not any("flock_1" in token for token in rmw)
         came.clear()
         assert node.told() == (0.0, 0.0)
@@ -241,7 +292,7 @@ def test_a_dead_robot_is_silent_vanishes_and_takes_no_command_until_it_lives_aga
         node.publish(alive=np.array([True, False]))
         assert not came
         node.publish(alive=ALIVE)
-        until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == 14)
+        until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
         node.first(came)
 
 

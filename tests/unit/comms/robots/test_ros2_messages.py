@@ -1,5 +1,6 @@
 """Keys and messages of ROS 2 in zenoh."""
 
+import struct
 from dataclasses import fields, is_dataclass
 
 import numpy as np
@@ -89,6 +90,17 @@ def test_tokens_of_rmw_read_as_its_design_page_writes_them():
     assert RmwNode(0, "aa11", 0, "/", "base").token == "@ros2_lv/0/aa11/0/0/NN/%/%/base"
     for token in (node.token, node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")):
         assert zenoh.KeyExpr("@ros2_lv/2/**").includes(zenoh.KeyExpr(token))
+
+
+def test_tokens_of_static_frames_are_for_late_subscribers_too():
+    node = RmwNode(0, "aa11", 0, "/flock_0", "base")
+    assert node.topic_token(1, "MP", "/flock_0/tf_static", keys.TRANSFORMS, "").endswith("//:1:,1:,:,:,,")
+    assert "/:1:1:0,1:" in bridge_token("aa11", WRITE, "/flock_0/tf_static", keys.TRANSFORMS, "")
+
+
+def test_the_id_of_a_publisher_is_the_xxh3_of_its_token_low_half_first():
+    """xxHash's own test vector of no bytes, as XXH3_128bits returns its halves."""
+    assert publisher_id("") == struct.pack("<QQ", 0x6001C324468D497F, 0x99AA06D3014798D8)
 
 
 def test_tokens_of_the_bridge_read_as_its_source_writes_them():
@@ -183,6 +195,7 @@ SAMPLES = {
         FRAMES,
     ),
     keys.ILLUMINANCE: st.builds(independent.Illuminance, headers(), DOUBLES, DOUBLES),
+    keys.RANGE: st.builds(independent.Range, headers(), st.integers(0, 255), *[SINGLES] * 5),
     keys.CLOCK: st.builds(independent.Clock, st.builds(independent.Time, st.integers(0, 2**31 - 1), st.just(5))),
 }
 

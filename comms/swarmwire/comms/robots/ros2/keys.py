@@ -9,9 +9,9 @@ rmw_zenoh: a message travels under domain, full name of the topic, type and its 
 import re
 import struct
 from dataclasses import dataclass
-from hashlib import blake2b
 
 from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.extras import ROS2
 
 TWIST = "geometry_msgs/msg/Twist"  # what a base is to drive
 TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # the same with the time at which it was said
@@ -21,12 +21,17 @@ IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
 ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # of a photocell, in lux
 CLOCK = "rosgraph_msgs/msg/Clock"  # the time in an emulation
+TRANSFORMS = "tf2_msgs/msg/TFMessage"  # where frames are in others
+RANGE = "sensor_msgs/msg/Range"  # the distance of a proximity sensor
 
 TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
 NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
 BRIDGE_QOS = ":1:0:0,10"  # without a key, reliable, volatile, the last ten kept: the default of publishers
+BRIDGE_LATCHED_QOS = ":1:1:0,1"  # transient local, the last one kept
 READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
 QOS = "::,10:,:,:,,"  # of rmw_zenoh: all defaults
+LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one kept
+LATCHED = ("tf_static",)  # topics whose last message is for late subscribers, too
 ANY = "*"
 MAX_TOPICS = 10_000  # of a node: ids of nodes and topics are whole numbers, unique in a session
 LAYOUT = struct.Struct("<qqB16s")  # of an attachment
@@ -80,7 +85,8 @@ def bridge_key(topic: str) -> str:
 def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str) -> str:
     """The token of a topic that the bridge of this zenoh id writes or reads; READ or WRITE, seen from ROS."""
     names = "/".join(part.replace("/", "§") for part in (bridge_key(topic), kind))
-    return f"{bridge_itself(zid)}/{direction}/{names}/{BRIDGE_QOS}:typehash={type_hash};"
+    qos = BRIDGE_LATCHED_QOS if _is_latched(topic) else BRIDGE_QOS
+    return f"{bridge_itself(zid)}/{direction}/{names}/{qos}:typehash={type_hash};"
 
 
 def bridge_itself(zid: str) -> str:
@@ -114,12 +120,17 @@ class RmwNode:
 
     def topic_token(self, place: int, direction: str, topic: str, kind: str, type_hash: str) -> str:
         """The token of a topic that the node writes (MP) or reads (MS); `place` counts them, from 1."""
-        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{QOS}"
+        qos = LATCHED_QOS if _is_latched(topic) else QOS
+        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{qos}"
 
     def _token(self, place: int, direction: str) -> str:
         node = self.place * MAX_TOPICS
         space = _mangled(self.namespace)
         return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + place}/{direction}/%/{space}/{self.name}"
+
+
+def _is_latched(topic: str) -> bool:
+    return topic.rpartition("/")[2] in LATCHED
 
 
 def _mangled(name: str) -> str:
@@ -132,8 +143,14 @@ def _mangled(name: str) -> str:
 
 
 def publisher_id(token: str) -> bytes:
-    """An id of 16 bytes, derived from the publisher's liveliness token, so that ids differ."""
-    return blake2b(token.encode(), digest_size=ID_BYTES).digest()
+    """The id (gid) of 16 bytes of the publisher with this liveliness token: its XXH3-128, the low half first.
+
+    rmw_zenoh: liveliness_utils.cpp; the digest of the library has the highest byte first.
+    """
+    ROS2.need("ros2")
+    from xxhash import xxh3_128_digest
+
+    return xxh3_128_digest(token.encode())[::-1]
 
 
 def attachment(sequence: int, utc_ns: int, publisher: bytes) -> bytes:

@@ -25,7 +25,7 @@ class Messages:
         from rosbags.serde import SerdeError
         from rosbags.typesys import Stores, get_typestore
 
-        self._distro, self._store, self._fault = distro, get_typestore(Stores(f"ros2_{distro}")), SerdeError
+        self.distro, self._store, self._fault = distro, get_typestore(Stores(f"ros2_{distro}")), SerdeError
 
     def make(self, kind: str, *fields: Any) -> Any:
         """A message with these fields, in the order of its definition."""
@@ -52,7 +52,7 @@ class Messages:
 
     def hash_of(self, kind: str) -> str:
         """The hash of this kind of message as rmw_zenoh of the distribution writes it (REP 2016)."""
-        return NO_HASH if self._distro == "humble" else self._store.hash_rihs01(kind)
+        return NO_HASH if self.distro == "humble" else self._store.hash_rihs01(kind)
 
 
 def stamp_ns(header: Any) -> int:

@@ -131,7 +131,38 @@ class Clock(IdlStruct, typename="rosgraph_msgs/msg/Clock"):
     clock: Time
 
 
-KINDS = (Twist, TwistStamped, Odometry, LaserScan, Imu, BatteryState, Illuminance, Clock)
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs/msg/Transform"):
+    translation: Vector3
+    rotation: Quaternion
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs/msg/TransformStamped"):
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs/msg/TFMessage"):
+    transforms: sequence[TransformStamped]
+
+
+@dataclass
+class Range(IdlStruct, typename="sensor_msgs/msg/Range"):
+    """From Iron on; before, without variance."""
+
+    header: Header
+    radiation_type: uint8
+    field_of_view: float32
+    min_range: float32
+    max_range: float32
+    range: float32
+    variance: float32
+
+
+KINDS = (Twist, TwistStamped, Odometry, LaserScan, Imu, BatteryState, Illuminance, Clock, TFMessage, Range)
 BY_KIND = {kind.__idl_typename__: kind for kind in KINDS}
 
 

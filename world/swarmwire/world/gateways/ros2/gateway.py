@@ -12,7 +12,16 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.clock import DatedClock, to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.ros2.keys import CLOCK, RmwNode, bridge_itself, bridge_key, rmw_key, ros_name
+from swarmwire.comms.robots.ros2.keys import (
+    CLOCK,
+    WRITE,
+    RmwNode,
+    bridge_itself,
+    bridge_key,
+    bridge_token,
+    rmw_key,
+    ros_name,
+)
 from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, open_router
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NOTHING_SET
@@ -21,7 +30,7 @@ from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
 from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
-CLOCK_TOPIC = "/clock"
+CLOCK_TOPIC, CLOCK_NODE = "/clock", "world"
 
 
 class Ros2Gateway(Gateway):
@@ -31,7 +40,9 @@ class Ros2Gateway(Gateway):
     """
 
     options: ClassVar[type] = Ros2GatewayOptions
-    sensors: ClassVar[frozenset[str]] = frozenset({"scan", "odometry", "imu", "compass", "battery", "light"})
+    sensors: ClassVar[frozenset[str]] = frozenset(
+        {"scan", "odometry", "imu", "compass", "battery", "light", "proximity"}
+    )
 
     def __init__(
         self, names: Sequence[str], body: Body, address: str, options: Ros2GatewayOptions, clock: DatedClock
@@ -48,7 +59,7 @@ class Ros2Gateway(Gateway):
         self._session: zenoh.Session | None = None
         self._bases: list[Base] = []
         self._clocks: tuple[Publisher, ...] = ()
-        self._graph: tuple[object, ...] = ()  # tokens of the gateway itself
+        self._graph: list[object] = []  # tokens of the gateway itself
 
     def differences(self) -> tuple[str, ...]:
         """As `Gateway.differences`."""
@@ -62,10 +73,9 @@ class Ros2Gateway(Gateway):
             raise BadInput(
                 "ros2", "address", f"cannot listen on {self.address}: {str(error).split(' at ')[0]}"
             ) from error
-        self._graph = (self._session.liveliness().declare_token(bridge_itself(str(self._session.zid()))),)
+        self._declare(self._session, bridge_itself(str(self._session.zid())))
         self._bases = [self._base(self._session, place) for place in range(len(self.names))]
-        rmw = rmw_key(self._options.domain, CLOCK_TOPIC, CLOCK, self._messages.hash_of(CLOCK))
-        self._clocks = Publisher(self._session, bridge_key(CLOCK_TOPIC), None), Publisher(self._session, rmw, rmw)
+        self._clocks = self._clock_publishers(self._session)
         return (endpoint,) * len(self.names)
 
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
@@ -100,7 +110,19 @@ class Ros2Gateway(Gateway):
         """As `Gateway.close`."""
         if self._session is not None:
             close(self._session)
-        self._session, self._graph, self._clocks = None, (), ()
+        self._session, self._graph, self._clocks = None, [], ()
+
+    def _clock_publishers(self, session: zenoh.Session) -> tuple[Publisher, ...]:
+        """The publishers of `/clock`, with their tokens in the graphs, where a node of its own has it."""
+        zid, type_hash = str(session.zid()), self._messages.hash_of(CLOCK)
+        node = RmwNode(self._options.domain, zid, len(self.names), "/", CLOCK_NODE)
+        token = node.topic_token(1, WRITE, CLOCK_TOPIC, CLOCK, type_hash)
+        self._declare(session, node.token, token, bridge_token(zid, WRITE, CLOCK_TOPIC, CLOCK, type_hash))
+        key = rmw_key(node.domain, CLOCK_TOPIC, CLOCK, type_hash)
+        return Publisher(session, bridge_key(CLOCK_TOPIC), None), Publisher(session, key, token)
+
+    def _declare(self, session: zenoh.Session, *tokens: str) -> None:
+        self._graph += [session.liveliness().declare_token(token) for token in tokens]
 
     def _base(self, session: zenoh.Session, place: int) -> Base:
         options = self._options

@@ -10,11 +10,28 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import parameter
-from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.robots.ros2.keys import (
+    BATTERY_STATE,
+    ILLUMINANCE,
+    IMU,
+    LASER_SCAN,
+    ODOMETRY,
+    RANGE,
+    TRANSFORMS,
+)
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
 from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, battery_state, illuminance, topics_of_light
+from swarmwire.comms.robots.ros2.transforms import (
+    Frame,
+    odometry_frame,
+    proximity_range,
+    proximity_topics,
+    sensor_frames,
+    transforms,
+)
+from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
 
 
@@ -34,6 +51,7 @@ class Ros2GatewayOptions:
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
 
 
+LATCHED_RATE_HZ = 1.0  # of messages that are always the same
 NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
 
 
@@ -117,8 +135,70 @@ class OdometryBroadcaster(Broadcaster):
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
         """As `Broadcaster.message`."""
-        lost = isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
-        return None if lost else self._poses.message(messages, base, stamp_ns)
+        return None if self.is_lost(fields, base) else self._poses.message(messages, base, stamp_ns)
+
+    def is_lost(self, fields: Fields, base: int) -> bool:
+        """Whether the reading of a base was lost."""
+        return isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
+
+    def frame(self, base: int) -> Frame:
+        """Where a base is in the frame of its odometry."""
+        return odometry_frame(*map(float, self._poses.pose[base]))
+
+
+class TransformBroadcaster(Broadcaster):
+    """`tf`: where the base is in the frame of its odometry."""
+
+    kind = TRANSFORMS
+    reads = OdometryBroadcaster.reads
+    topic = "tf"
+
+    def __init__(self, odometry: OdometryBroadcaster) -> None:
+        """`odometry` comes before it in each tick."""
+        self.rate_hz = odometry.rate_hz
+        self._odometry = odometry
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Broadcaster.message`."""
+        if self._odometry.is_lost(fields, base):
+            return None
+        return transforms(messages, (self._odometry.frame(base),), stamp_ns)
+
+
+class SensorFrameBroadcaster(Broadcaster):
+    """`tf_static`: the frames of the sensors, again and again for late subscribers."""
+
+    kind = TRANSFORMS
+    reads = ()
+    topic = "tf_static"
+    rate_hz = LATCHED_RATE_HZ
+
+    def __init__(self, body: Body) -> None:
+        self._frames = sensor_frames(body)
+
+    def is_published(self, fields: Fields) -> bool:
+        """As `Broadcaster.is_published`."""
+        return True
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
+        """As `Broadcaster.message`."""
+        return transforms(messages, self._frames, stamp_ns)
+
+
+class ProximityBroadcaster(Broadcaster):
+    """One sensor of `proximity` as Range."""
+
+    kind = RANGE
+    reads = ("proximity.value",)
+
+    def __init__(self, spec: ProximitySpec, topic: str, place: int) -> None:
+        self.topic, self.rate_hz = topic, spec.rate_hz
+        self._spec, self._place = spec, place
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Broadcaster.message`."""
+        value = float(fields["proximity.value"][base, self._place])
+        return None if isnan(value) else proximity_range(messages, self._spec, value, self.topic, stamp_ns)
 
 
 class ImuBroadcaster(Broadcaster):
@@ -177,7 +257,11 @@ def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tupl
     if body.scan:
         broadcasters.append(ScanBroadcaster(body.scan))
     if body.odometry and wheel_base_m:
-        broadcasters.append(OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m))
+        odometry = OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m)
+        broadcasters += [odometry, TransformBroadcaster(odometry)]
+    if body.proximity:
+        topics = proximity_topics(len(body.proximity.angle_rad))
+        broadcasters += [ProximityBroadcaster(body.proximity, topic, place) for place, topic in enumerate(topics)]
     rates_hz = tuple(body.sensors[name].rate_hz for name in ("imu", "compass") if name in body.sensors)
     if rates_hz:
         broadcasters.append(ImuBroadcaster(rates_hz, options.north_deg))
@@ -188,4 +272,5 @@ def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tupl
         broadcasters.extend(
             LightBroadcaster(t, body.light.rate_hz, cell, options.full_lux) for cell, t in enumerate(topics)
         )
+    broadcasters.append(SensorFrameBroadcaster(body))
     return tuple(broadcasters)
