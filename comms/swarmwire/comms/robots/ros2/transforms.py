@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.ros2.keys import RANGE, TRANSFORMS
@@ -35,7 +36,7 @@ class Frame(NamedTuple):
 
 def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> Frame:
     """Where the wheels say that the base is."""
-    return Frame(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, yaw_rad)
+    return Frame(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
 
 
 def sensor_frames(body: Body) -> tuple[Frame, ...]:
