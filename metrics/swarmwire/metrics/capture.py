@@ -6,24 +6,29 @@
 | 127, IEEE802_11_RADIOTAP | radiotap (rate, channel, strength), then IEEE 802.11, LLC, IPv4 and UDP |
 | 147, USER0 | `PLAIN`, for radios without a standard |
 
-Robots' addresses are their indices. No frame has a checksum at its end.
+| 1, ETHERNET | none: frames of robots' network interfaces on radios that carry them whole |
+
+Robots' addresses are their indices. No frame has a checksum at its end. A frame of a robot's network interface on a
+radio of IEEE 802.11 has that header, then LLC with its own type in place of IPv4 and UDP.
 """
 
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import polars as pl
 
-from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, exchanged, station
+from swarmwire.comms.packets import FATE_NAMES, TAG_BYTES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
 from swarmwire.metrics.atomic import output_file
 
-IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 283, 127, 147
+ETHERNET, IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 1, 283, 127, 147
 
 # Version 0, length of the header, 2 bytes of 0, sender, receiver (all ones: everybody), sequence, dBm (NaN: unknown).
 PLAIN = struct.Struct("<BBHIIIf")
@@ -39,8 +44,9 @@ RADIOTAP_FIELDS = 1 << 1 | 1 << 2 | 1 << 3  # flags, rate, channel
 RADIOTAP_STRENGTH = 1 << 5
 CCK, OFDM, AT_2_GHZ, AT_5_GHZ = 0x0020, 0x0040, 0x0080, 0x0100  # of a channel
 DATA_FRAME = 0x0008  # frame control: data between stations of an ad hoc network
-NETWORK = bytes.fromhex("025357000000")  # the BSSID, and the first bytes of stations
-LLC_IPV4 = bytes.fromhex("aaaa030000000800")
+NETWORK = bytes.fromhex("025357000000")  # the BSSID
+SNAP = bytes.fromhex("aaaa03000000")  # LLC, before a type of Ethernet (IEEE 802)
+IPV4 = bytes.fromhex("0800")
 UDP, UDP_PORT = 17, 49_152  # the first port that belongs to nobody
 APPLICATION = "swarmwire"
 SECTION, INTERFACE, PACKET = 0x0A0D0D0A, 1, 6
@@ -65,6 +71,12 @@ class Frame:
     rssi_dbm: float | None = None  # at the receiver where it was strongest; None: unknown
     comments: tuple[str, ...] = ()  # its content, and its fates
 
+    @property
+    def ethernet(self) -> bytes:
+        """The whole Ethernet frame, if it is one of a robot's network interface; else nothing."""
+        is_frame = int.from_bytes(self.payload[:TAG_BYTES], "little") == FRAME_TAG
+        return exchanged(self.payload) if is_frame and len(self.payload) == self.size_bytes else b""
+
 
 class Link(NamedTuple):
     """How frames of a radio are captured."""
@@ -72,15 +84,20 @@ class Link(NamedTuple):
     link_type: int
     most_robots: int  # that have addresses
     header: Callable[[Frame], bytes]
+    carried: Callable[[Frame], bytes] | None = None  # all of a frame of a network interface; None: robots have none
+    carried_type: int = ETHERNET  # link type of these
 
 
 def link_of(radio: Radio) -> Link:
     """The link type of a radio's frames."""
     if radio.is_phy and radio.frame != "plain":
-        return Link(IEEE802_11_RADIOTAP, 1 << 24, partial(_headers_80211, radio))
+        carried = partial(_ethernet_80211, radio) if radio.interface else None
+        headers = partial(_headers_80211, radio)
+        return Link(IEEE802_11_RADIOTAP, 1 << 24, headers, carried, IEEE802_11_RADIOTAP)
+    carried = attrgetter("ethernet") if radio.interface else None
     if radio.is_phy and radio.reception_or_default.model == "802.15.4":
-        return Link(IEEE802_15_4_TAP, SHORT_ROBOTS, partial(_headers_802154, radio))
-    return Link(USER0, EVERYBODY, _plain)
+        return Link(IEEE802_15_4_TAP, SHORT_ROBOTS, partial(_headers_802154, radio), carried)
+    return Link(USER0, EVERYBODY, _plain, carried)
 
 
 def _plain(frame: Frame) -> bytes:
@@ -131,22 +148,29 @@ def _radiotap(radio: Radio, frame: Frame) -> bytes:
     return struct.pack("<BBHI", 0, 0, 8 + len(fields), present) + fields
 
 
-def _ieee80211(radio: Radio, frame: Frame) -> bytes:
-    """A data frame of an ad hoc network (IEEE 802.11-2007, 7.2.2) with LLC, IPv4 (RFC 791) and UDP (RFC 768)."""
-    to = b"\xff" * 6 if frame.to is None else _station(frame.to)
+def _ethernet_80211(radio: Radio, frame: Frame) -> bytes:
+    """A frame of a network interface as IEEE 802.11 carries it: with its own addresses, and its type behind LLC."""
+    frame_bytes = frame.ethernet
+    return _radiotap(radio, frame) + _data_frame(radio, frame, frame_bytes[:ADDRESS_BYTES]) + SNAP + frame_bytes[12:]
+
+
+def _data_frame(radio: Radio, frame: Frame, to: bytes) -> bytes:
+    """The header of a data frame of an ad hoc network (IEEE 802.11-2007, 7.2.2)."""
     duration_us = 0 if frame.to is None else _answer_us(radio)
-    head = struct.pack("<HH6s6s6sH", DATA_FRAME, duration_us, to, _station(frame.sender), NETWORK, _count(frame))
+    ends = to, station(frame.sender), NETWORK
+    return struct.pack("<HH6s6s6sH", DATA_FRAME, duration_us, *ends, _count(frame))
+
+
+def _ieee80211(radio: Radio, frame: Frame) -> bytes:
+    """A data frame with LLC, IPv4 (RFC 791) and UDP (RFC 768)."""
+    to = b"\xff" * ADDRESS_BYTES if frame.to is None else station(frame.to)
     length = 8 + frame.size_bytes
     datagram = struct.pack(">HHHH", UDP_PORT, UDP_PORT, length, 0)  # 0: no checksum
-    return head + LLC_IPV4 + _ipv4(frame, length) + datagram
+    return _data_frame(radio, frame, to) + SNAP + IPV4 + _ipv4(frame, length) + datagram
 
 
 def _count(frame: Frame) -> int:
     return (frame.sequence & 0xFFF) << 4  # the fragment's number below: 0
-
-
-def _station(robot: int) -> bytes:
-    return NETWORK[:3] + (robot + 1).to_bytes(3, "big")
 
 
 def _answer_us(radio: Radio) -> int:
@@ -185,12 +209,22 @@ def write_capture(to: Path, link: Link, name: str, description: str, frames: Ite
     count = 0
     with output_file(to) as part, part.open("wb") as file:
         file.write(section(APPLICATION) + interface(link.link_type, name, description))
+        if link.carried and link.carried_type != link.link_type:
+            file.write(interface(link.carried_type, name, f"network interfaces: {description}"))
         for frame in frames:
-            header = link.header(frame)
-            length = len(header) + frame.size_bytes
-            file.write(packet(frame.on_air_at_ns, header + frame.payload, length, frame.comments))
+            place, captured, length = _captured(link, frame)
+            file.write(packet(frame.on_air_at_ns, captured, length, frame.comments, place))
             count += 1
     return count
+
+
+def _captured(link: Link, frame: Frame) -> tuple[int, bytes, int]:
+    """The interface of the capture, the bytes as far as known, and the length of a frame."""
+    if link.carried and frame.ethernet:
+        whole = link.carried(frame)
+        return int(link.carried_type != link.link_type), whole, len(whole)
+    header = link.header(frame)
+    return 0, header + frame.payload, len(header) + frame.size_bytes
 
 
 def frames_on_air(packets: pl.DataFrame, names: Sequence[str]) -> Iterator[Frame]:
@@ -247,9 +281,9 @@ def interface(link_type: int, name: str, description: str) -> bytes:
     return _block(INTERFACE, struct.pack("<HHI", link_type, 0, 0), options)
 
 
-def packet(at_ns: int, captured: bytes, length: int, comments: Sequence[str] = ()) -> bytes:
-    """A packet of the first interface at this time, with `length` bytes of which the first were captured."""
-    body = struct.pack("<IIIII", 0, at_ns >> 32, at_ns & 0xFFFFFFFF, len(captured), length) + _padded(captured)
+def packet(at_ns: int, captured: bytes, length: int, comments: Sequence[str] = (), place: int = 0) -> bytes:
+    """A packet of an interface, by its place, at this time, with `length` bytes of which the first were captured."""
+    body = struct.pack("<IIIII", place, at_ns >> 32, at_ns & 0xFFFFFFFF, len(captured), length) + _padded(captured)
     return _block(PACKET, body, [(COMMENT, _text(comment)) for comment in comments])
 
 

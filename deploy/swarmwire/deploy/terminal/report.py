@@ -119,6 +119,10 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
         yield "ticks began late", _delays(real.tick_jitter)
     if real.delivery:
         yield "delivered late", f"{_delays(real.delivery)} of {real.delivery.count} packets"
+    if frames := result.interfaces:
+        yield "interfaces", f"{frames.sent} frames sent, {frames.delivered} delivered, {frames.late} late"
+        if frames.delivery:
+            yield "frames late", _delays(frames.delivery)
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
