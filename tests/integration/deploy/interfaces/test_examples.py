@@ -1,0 +1,221 @@
+"""Unmodified programs on robots: what they measure of the radio, discovery by multicast, and routing."""
+
+import json
+import re
+import sys
+from math import sqrt
+
+import pytest
+from scipy import stats
+
+from swarmwire.comms.radio.timing import at_bit_rate_ns
+from tests.support.clocks import until
+from tests.support.deploy.interfaces import DISK, InterfacesRun, line, needs_interfaces, needs_program, running
+from tests.support.deploy.runs import swarmwire
+
+pytestmark = needs_interfaces
+LOSS = 0.2
+DATAGRAMS = 1000
+FALSE_ALARM = 1e-4  # of each binomial interval
+BABELD = "exec babeld -I '' -S '' -h 1 -H 1 -L $ROBOT_SCRATCH/babeld.log -C 'default type wireless' radio0"
+
+RECEIVER = """
+import socket, sys
+
+inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+inbox.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+inbox.bind(("0.0.0.0", 9000))
+inbox.settimeout(2.0)
+open("ready-" + sys.argv[1], "w").close()
+received = 0
+try:
+    while True:
+        inbox.settimeout(60.0 if not received else 2.0)
+        inbox.recv(2048)
+        received += 1
+except TimeoutError:
+    print(received)
+"""
+SENDER = """
+import socket, sys, time
+
+out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+out.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+for number in range(int(sys.argv[2])):
+    out.sendto(bytes(100), (sys.argv[1], 9000))
+    time.sleep(0.002)
+"""
+ZENOH = """
+import sys, time
+import zenoh
+
+config = zenoh.Config()
+config.insert_json5("scouting/multicast/interface", '"radio0"')
+config.insert_json5("listen/endpoints", '["tcp/0.0.0.0:0"]')
+with zenoh.open(config) as session:
+    inbox = session.declare_subscriber("swarm/*")
+    while True:
+        session.put("swarm/" + sys.argv[1], "here")
+        sample = inbox.try_recv()
+        while sample is not None:
+            print(sample.key_expr, flush=True)
+            sample = inbox.try_recv()
+        time.sleep(0.1)
+"""
+DDS = """
+import sys, time
+from dataclasses import dataclass
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+@dataclass
+class Here(IdlStruct, typename="Here"):
+    robot: str
+
+participant = DomainParticipant(0)
+topic = Topic(participant, "here", Here)
+writer, reader = DataWriter(participant, topic), DataReader(participant, topic, qos=Qos(Policy.History.KeepAll))
+while True:
+    writer.write(Here(sys.argv[1]))
+    for sample in reader.take(10):
+        if sample is not None:
+            print(sample.robot, flush=True)
+    time.sleep(0.1)
+"""
+NETWORK = "<General><Interfaces><NetworkInterface name='radio0'/></Interfaces></General>"
+CYCLONE = f"<CycloneDDS><Domain>{NETWORK}</Domain></CycloneDDS>"
+
+
+def output(world: InterfacesRun, robot: str) -> str:
+    path = world.folder / "programs" / f"{robot}.log"
+    return path.read_text() if path.exists() else ""
+
+
+def with_program(scenario: str, *command: str) -> str:
+    return scenario.replace("[robots.line]\n", f"[robots.line]\nprogram = {json.dumps(command)}\n")
+
+
+@needs_program("ping")
+def test_ping_measures_latency_jitter_and_airtime(tmp_path):
+    """Two frames of 1042 bytes at 250 kbit/s take 66.7 ms on air; each has 10 ms of latency, and up to 20 of jitter."""
+    radio = DISK.replace("6_000_000", "250_000") + "latency_s = 0.01\njitter_s = 0.02\n"
+    with running(tmp_path, line(2) + radio) as world:
+        world.on("line-0", "ping", "-c", "1", world.address("line-1"))  # finds the MAC address
+        done = world.on("line-0", "ping", "-c", "30", "-i", "0.2", "-s", "1000", world.address("line-1"))
+        world.end()
+    times_s = [float(ms) / 1000 for ms in re.findall(r"time=([\d.]+) ms", done.stdout)]
+    airtime_s = at_bit_rate_ns(1000 + 8 + 20 + 14, 250_000) / 1e9
+    least_s = 2 * (airtime_s + 0.01)
+    assert len(times_s) == 30
+    assert min(times_s) > least_s
+    mean_s = sum(times_s) / len(times_s)
+    # Two jitters, uniform from 0 to 20 ms, have a mean of 20 ms and a deviation of 8.2; each frame waits for subticks.
+    assert least_s + 0.02 - 4 * 0.0082 / sqrt(30) < mean_s < least_s + 0.02 + 4 * 0.0082 / sqrt(30) + 0.02, times_s
+
+
+@pytest.mark.parametrize("to", ["10.77.0.2", "10.77.255.255"])
+def test_udp_loses_what_the_radio_loses(tmp_path, to):
+    programs = {"receiver.py": RECEIVER, "sender.py": SENDER}
+    scenario = with_program(line(3, spacing_m=0.5), sys.executable, "receiver.py", "x") + DISK
+    with running(tmp_path, scenario + f"loss = {LOSS}\n", files=programs) as world:
+        until((tmp_path / "ready-x").exists)
+        sender = (sys.executable, str(tmp_path / "sender.py"))
+        assert world.on("line-0", *sender, to, str(DATAGRAMS)).returncode == 0
+        until(lambda: output(world, "line-1"))
+        received = int(output(world, "line-1"))
+        world.end()
+    low, high = stats.binom.interval(1 - FALSE_ALARM, DATAGRAMS, 1 - LOSS)
+    # A unicast datagram waits for ARP, whose losses may cost the first few.
+    assert low - (3 if to.endswith(".2") else 0) <= received <= high
+
+
+@needs_program("iperf3")
+def test_tcp_is_slower_where_the_radio_loses(tmp_path):
+    """6 Mbit/s and a round trip of 40 ms: at a loss of a tenth, 1.1 Mbit/s (Mathis et al., ACM CCR 27, 1997)."""
+    rates_bps: list[float] = []
+    for loss in (0.0, 0.1):
+        folder = tmp_path / str(loss)
+        folder.mkdir()
+        server = with_program(line(2), "iperf3", "-s", "--forceflush") + DISK + f"latency_s = 0.02\nloss = {loss}\n"
+        with running(folder, server) as world:
+            until(lambda world=world: "listening" in output(world, "line-1"))
+            done = world.on("line-0", "iperf3", "-c", world.address("line-1"), "-C", "reno", "-t", "4", "-J")
+            rates_bps.append(json.loads(done.stdout)["end"]["sum_received"]["bits_per_second"])
+            world.end()
+    clean_bps, lossy_bps = rates_bps
+    assert 1e6 < clean_bps < 6e6
+    assert 1e4 < lossy_bps < 0.5 * clean_bps
+
+
+def test_zenoh_peers_find_one_another_by_multicast(tmp_path):
+    scenario = with_program(line(2), "sh", "-c", f"exec {sys.executable} zenoh_peer.py $ROBOT") + DISK
+    with running(tmp_path, scenario, files={"zenoh_peer.py": ZENOH}) as world:
+        until(lambda: "swarm/line-1" in output(world, "line-0") and "swarm/line-0" in output(world, "line-1"))
+        world.end()
+
+
+def test_dds_participants_discover_one_another_and_exchange(tmp_path):
+    pytest.importorskip("cyclonedds")
+    command = f'CYCLONEDDS_URI="{CYCLONE}" exec {sys.executable} dds.py $ROBOT'
+    scenario = with_program(line(2), "sh", "-c", command) + DISK
+    with running(tmp_path, scenario, files={"dds.py": DDS}) as world:
+        until(lambda: "line-1" in output(world, "line-0") and "line-0" in output(world, "line-1"))
+        world.end()
+
+
+def hops(world: InterfacesRun, to: str) -> list[str]:
+    """Addresses of the robots over which line-0 reaches another, in order; none if it does not."""
+    route: list[str] = []
+    here = "line-0"
+    names = {world.address(name): name for name in world.robots}
+    while here != to:
+        found = world.on(here, "ip", "route", "get", world.address(to)).stdout
+        via = re.search(r"via ([\d.]+)", found)
+        here = names[via[1]] if via else to
+        if here in route:
+            return []  # a loop while routes change
+        route.append(here)
+    return route
+
+
+@needs_program("babeld", "ping", "ip")
+def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
+    """Ten robots in a line that is doubled in its middle: the death of a robot moves the route to the one beside it."""
+    poses = [[1.5 * i, 0.0, 0.0] for i in range(9)] + [[1.5 * 4, 0.8, 0.0]]
+    scenario = re.sub(r"poses = \[\[.*\]\]", f"poses = {poses}", with_program(line(10), "sh", "-c", BABELD))
+    with running(tmp_path, scenario + DISK) as world:
+        far = world.address("line-8")
+        until(lambda: world.on("line-0", "ping", "-c", "1", "-W", "1", far).returncode == 0)
+        route = until(lambda: hops(world, "line-8"))
+        assert len(route) == 8
+        on_way = next(name for name in route if name in ("line-4", "line-9"))
+        other = "line-9" if on_way == "line-4" else "line-4"
+        assert swarmwire("ctl", "--run", world.folder, "kill", on_way).returncode == 0
+        until(lambda: other in hops(world, "line-8"))
+        until(lambda: world.on("line-0", "ping", "-c", "1", "-W", "1", far).returncode == 0)
+        world.end()
+
+
+@needs_program("babeld", "ping", "ip")
+def test_each_half_of_a_flock_that_splits_keeps_its_routes_until_it_is_whole_again(tmp_path):
+    """Six robots in a line of two hops each half; a partition in the middle parts them for some seconds."""
+
+    def reach(pair: tuple[str, str]) -> bool:
+        ping = ("ping", "-c", "1", "-W", "1", world.address(pair[1]))
+        return world.on(pair[0], *ping).returncode == 0
+
+    halves, across = (("line-0", "line-2"), ("line-3", "line-5")), ("line-0", "line-5")
+    scenario = with_program(line(6), "sh", "-c", BABELD).replace("size_m = [100.0", "size_m = [50.0")
+    scenario = re.sub(r"poses = \[\[.*\]\]", f"poses = {[[1.5 * i - 3.75, 0.0, 0.0] for i in range(6)]}", scenario)
+    with running(tmp_path, scenario + DISK) as world:
+        until(lambda: reach(across))
+        assert swarmwire("ctl", "--run", world.folder, "partition", "x", "--for", "12").returncode == 0
+        until(lambda: not reach(across))
+        assert all(reach(half) for half in halves)
+        until(lambda: reach(across))
+        assert all(reach(half) for half in halves)
+        world.end()
