@@ -15,7 +15,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import Point, Response, Value, value_text
-from swarmwire.metrics.statistics.sample import Sample, by_seed
+from swarmwire.metrics.statistics.sample import Sample, SeedTable, by_seed
 from swarmwire.metrics.statistics.summary import Summary, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier
 
@@ -222,8 +222,8 @@ class Samples:
         """The values of all runs."""
         return self.sample(response, tuple(range(len(self.folder.points))))
 
-    def table(self, response: Response, rows: Sequence[tuple[int, ...]]) -> FloatArray:
-        """Values (rows, runs), of the points of each row; a seed keeps its column, NaN where there is no value.
+    def table(self, response: Response, rows: Sequence[tuple[int, ...]]) -> SeedTable:
+        """The values of the points of each row; NaN where there is none.
 
         A time that was cut off counts as the time until then.
         """
@@ -233,7 +233,7 @@ class Samples:
         """Of the same shape: whether the value was observed, not cut off."""
         found = [[self._of_point(response.column, point) for point in points] for points in rows]
         observed = [[replace(sample, value=sample.observed.astype(np.float64)) for sample in row] for row in found]
-        return _side_by_side(observed) == 1.0
+        return _side_by_side(observed).value == 1.0
 
     def summary(self, response: Response, points: tuple[int, ...]) -> Summary:
         """The summary of these runs."""
@@ -260,8 +260,9 @@ class Samples:
         return summary(self.sample(response, points))
 
 
-def _side_by_side(rows: Sequence[Sequence[Sample]]) -> FloatArray:
-    """Values (rows, runs): those of the first point of each row seed by seed, then those of the second, and so on."""
+def _side_by_side(rows: Sequence[Sequence[Sample]]) -> SeedTable:
+    """The values of the first point of each row seed by seed, then those of the second, and so on."""
     turns = max(map(len, rows), default=0)
     blocks = [by_seed([row[turn] if turn < len(row) else _NOTHING for row in rows]) for turn in range(turns)]
-    return np.concatenate([np.empty((len(rows), 0)), *blocks], axis=1)
+    values = np.concatenate([np.empty((len(rows), 0)), *(block.value for block in blocks)], axis=1)
+    return SeedTable(values, np.concatenate([np.empty(0, np.int64), *(block.seed for block in blocks)]))

@@ -21,14 +21,14 @@ from swarmwire.metrics.report.campaign_data import (
     rounding_of,
 )
 from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
-from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
+from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.trends import (
     MIN_STRESSES,
     Degradation,
     Fit,
     Scaling,
     degradation,
-    relative_to_unharmed,
+    relative_means,
     scaling,
 )
 from swarmwire.metrics.text import listed, number, sentence
@@ -91,17 +91,16 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
     growing: list[str] = []
     for levels in filter(_is_loss, (levels_of(path, samples.folder.points) for path in samples.folder.parameters)):
         for response in responses:
-            left = _relative(samples, response, levels)
-            if left is None:
-                continue
-            fits = degradation(_numbers(levels), left)
+            table = _performance(samples, response, levels)
+            fits = degradation(_numbers(levels), table)
             if fits is None:
                 continue
-            present = _present(left)
-            if present[-1].mean() >= present[0].mean():
+            means, intervals = relative_means(_numbers(levels), table)
+            present = means[np.isfinite(means)]
+            if present[-1] >= present[0]:
                 growing.append(f"`{response.column}`")
                 continue
-            figures.append(_resilience_figure(response, levels, left, fits))
+            figures.append(_resilience_figure(response, levels, means, intervals, fits))
             rows += [_words(response, levels, fits, fit) for fit in (fits.linear, fits.exponential)]
     if not figures:
         return None
@@ -126,29 +125,23 @@ def _numbers(levels: Levels) -> FloatArray:
     return levels.number
 
 
-def _relative(samples: Samples, response: Response, levels: Levels) -> FloatArray | None:
-    """Values (levels, runs) relative to the least loss; None without a reference."""
+def _performance(samples: Samples, response: Response, levels: Levels) -> SeedTable:
+    """The values at each level; rates in place of times, 0 where it was not reached."""
     cells = [tuple(levels.points(level)) for level in range(len(levels))]
     table = samples.table(response, cells)
-    if response.kind == "time":
-        reached = samples.reached(response, cells)
-        table = np.where(reached, 1.0 / np.where(table > 0.0, table, np.nan), np.where(np.isnan(table), np.nan, 0.0))
-    left = relative_to_unharmed(_numbers(levels), table)
-    return left if np.isfinite(left).any() else None
+    if response.kind != "time":
+        return table
+    reached, time_s = samples.reached(response, cells), table.value
+    rate = np.where(reached, 1.0 / np.where(time_s > 0.0, time_s, np.nan), np.where(np.isnan(time_s), np.nan, 0.0))
+    return table._replace(value=rate)
 
 
-def _present(left: FloatArray) -> list[FloatArray]:
-    """The values of each level that has any."""
-    rows = [row[np.isfinite(row)] for row in left]
-    return [row for row in rows if len(row)]
-
-
-def _resilience_figure(response: Response, levels: Levels, left: FloatArray, fits: Degradation) -> Figure:
-    share = _numbers(levels)
-    full, present = np.isfinite(left).any(axis=1), _present(left)
-    means = np.array([row.mean() for row in present])
-    intervals = np.array([percentile_interval(resampled_means(row), len(row)) for row in present])
-    low, high = np.where(np.isnan(intervals), means[:, None], intervals).T
+def _resilience_figure(
+    response: Response, levels: Levels, means: FloatArray, intervals: list[Interval], fits: Degradation
+) -> Figure:
+    share, full = _numbers(levels), np.isfinite(means)
+    means, ends = means[full], np.array(intervals)[full]
+    low, high = np.where(np.isnan(ends), means[:, None], ends).T
     grid = np.linspace(0.0, float(share[-1]), _GRID)
     shapes = [
         FittedShape(fit.form, grid, fit.at(grid), fit is fits.better)

@@ -1,7 +1,8 @@
-"""Intervals of confidence: the bootstrap (Efron, Ann. Statist. 7, 1979), of runs or of blocks of ticks, and Wilson's.
+"""Intervals of confidence: the bootstrap (Efron, Ann. Statist. 7, 1979), of seeds or of blocks of ticks, and Wilson's.
 
-Draws are keyed by the sample size n alone: the same data always give the same interval. Counts of draws are cached per
-n, so that an interval of a median of 50 values takes about 0.1 ms.
+Whole seeds are resampled, since all runs of a seed start alike: a seed that is drawn brings all its values (Field and
+Welsh, J. R. Stat. Soc. B 69, 2007). Draws are keyed by the number of seeds alone: the same data always give the same
+interval. Counts of draws are cached, so that an interval of a median of 50 values takes about 0.1 ms.
 """
 
 import math
@@ -45,28 +46,43 @@ def drawn(n: int, sample: int = 0) -> Counts:
     return counts
 
 
-def resampled_means(value: FloatArray, sample: int = 0) -> FloatArray:
-    """The mean of each resample, (resamples,), of values (n,); of (rows, n) it is (resamples, rows)."""
-    n, mean = value.shape[-1], value.mean(axis=-1)
+def drawn_by_seed(seed: IntArray, sample: int = 0) -> tuple[Counts, int]:
+    """How often each value is drawn in each resample of the seeds, (resamples, n); and the number of seeds.
+
+    `seed` (n,) is the seed of each value.
+    """
+    seeds, first, place = np.unique(seed, return_index=True, return_inverse=True)
+    if len(seeds) == len(seed):
+        return drawn(len(seed), sample), len(seed)
+    in_order = np.argsort(np.argsort(first))  # by first occurrence, so that rows of one run each are drawn as they are
+    return drawn(len(seeds), sample)[:, in_order[place]], len(seeds)
+
+
+def resampled_means(value: FloatArray, seed: IntArray | None = None, sample: int = 0) -> FloatArray:
+    """The mean of each resample, (resamples,), of values (n,) with their seeds; without seeds each has its own."""
+    mean = value.mean()
+    counts = drawn(len(value), sample) if seed is None else drawn_by_seed(seed, sample)[0]
     # Deviations may well be rounded to the counts' precision: a wider product takes ten times as long for 1000 values.
-    deviation = (value - mean[..., None]).astype(np.float32)
-    moved: Counts = np.matmul(drawn(n, sample), deviation.T)
-    return mean + moved.astype(np.float64) / n
+    moved: Counts = np.matmul(counts, (value - mean).astype(np.float32))
+    return mean + moved.astype(np.float64) / counts.sum(axis=1)
 
 
-def resampled_medians(value: FloatArray, sample: int = 0) -> FloatArray:
-    """The median of each resample, (resamples,), of values (n,)."""
-    lower, upper = _middle(len(value), sample)
+def resampled_medians(value: FloatArray, seed: IntArray | None = None, sample: int = 0) -> FloatArray:
+    """The median of each resample, (resamples,), of values (n,) with their seeds; without seeds each has its own."""
     rising = np.sort(value)
+    if seed is None or len(np.unique(seed)) == len(seed):
+        lower, upper = _middle(len(value), sample)
+    else:
+        lower, upper = _middle_of(drawn_by_seed(seed, sample)[0][:, np.argsort(value)])
     return 0.5 * (rising[lower] + rising[upper])
 
 
 def percentile_interval(resampled: FloatArray, n: int, level: float = LEVEL) -> Interval:
-    """The expanded percentile interval of a statistic's resampled values, which may be infinite.
+    """The expanded percentile interval of a statistic's values in resamples of n seeds; values may be infinite.
 
     The plain one is too narrow by sqrt((n - 1) / n) and by that of the normal for Student's distribution; here its
     tails are Phi(-t sqrt(n / (n - 1))) with n - 1 degrees of freedom (Hesterberg, The American Statistician 69, 2015).
-    NaN of fewer than two values.
+    NaN of fewer than two seeds.
     """
     if n < 2 or np.isnan(resampled).any():
         return UNKNOWN
@@ -79,9 +95,14 @@ def percentile_interval(resampled: FloatArray, n: int, level: float = LEVEL) -> 
 
 @lru_cache(maxsize=32)
 def _middle(n: int, sample: int) -> tuple[IntArray, IntArray]:
-    """Places, in rising order of all values, of the two (or one) in the middle of each resample."""
-    below = np.cumsum(drawn(n, sample), axis=1)
-    return np.argmax(below > (n - 1) // 2, axis=1), np.argmax(below > n // 2, axis=1)
+    return _middle_of(drawn(n, sample))
+
+
+def _middle_of(counts: Counts) -> tuple[IntArray, IntArray]:
+    """Places, in rising order of all values, of the two (or one) in the middle of each resample, (resamples,) each."""
+    below = np.cumsum(counts, axis=1)
+    total = below[:, -1:]
+    return np.argmax(below > (total - 1.0) // 2.0, axis=1), np.argmax(below > total // 2.0, axis=1)
 
 
 def block_means(series: FloatArray) -> FloatArray:

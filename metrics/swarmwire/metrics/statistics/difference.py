@@ -130,7 +130,7 @@ def _means(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tu
 
 def _unpaired(resampled: Any, one: FloatArray, other: FloatArray, level: float) -> Interval:
     """Of samples drawn independently; as many resamples as there are of the larger."""
-    first, second = resampled(one), resampled(other, 1)
+    first, second = resampled(one), resampled(other, sample=1)
     fewer = min(len(first), len(second))
     return percentile_interval(second[:fewer] - first[:fewer], min(len(one), len(other)), level)
 

@@ -29,6 +29,11 @@ class Sample:
         """Share of the values that are right-censored; NaN of none."""
         return float(np.mean(~self.observed)) if len(self.value) else float("nan")
 
+    @cached_property
+    def seeds(self) -> int:
+        """How many seeds the values have: fewer than values if several runs have the same seed."""
+        return len(np.unique(self.seed))
+
     def __len__(self) -> int:
         return len(self.value)
 
@@ -52,8 +57,20 @@ def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = 
     return Sample(value, observed, np.arange(len(value)) if seed is None else seed, "time")
 
 
-def by_seed(samples: Sequence[Sample]) -> FloatArray:
-    """The values of points and seeds, (points, seeds), seeds rising; NaN where a run has none.
+class SeedTable(NamedTuple):
+    """The values of points, those of one seed in one column, or in several if a row is about several points."""
+
+    value: FloatArray  # (points, columns); NaN where there is no such run
+    seed: IntArray  # (columns,)
+
+    @classmethod
+    def of(cls, table: "FloatArray | SeedTable") -> "SeedTable":
+        """A table as it is; of an array (points, seeds) each column is a seed of its own."""
+        return table if isinstance(table, SeedTable) else cls(table, np.arange(table.shape[1]))
+
+
+def by_seed(samples: Sequence[Sample]) -> SeedTable:
+    """The values of points and seeds, seeds rising.
 
     Of a time that was censored it is the time up to which it had not happened: where all runs may take equally long,
     means of these are restricted means.
@@ -62,7 +79,7 @@ def by_seed(samples: Sequence[Sample]) -> FloatArray:
     table = np.full((len(samples), len(seeds)), np.nan)
     for row, sample in zip(table, samples, strict=True):
         row[np.searchsorted(seeds, sample.seed)] = sample.value
-    return table
+    return SeedTable(table, seeds)
 
 
 class Interval(NamedTuple):

@@ -5,9 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means, resampled_medians
+from swarmwire.metrics.statistics.bootstrap import (
+    drawn_by_seed,
+    percentile_interval,
+    resampled_means,
+    resampled_medians,
+)
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
-from swarmwire.metrics.statistics.survival import kaplan_meier
+from swarmwire.metrics.statistics.survival import (
+    KaplanMeier,
+    kaplan_meier,
+    resampled_quantiles,
+    resampled_restricted_means,
+)
 from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
@@ -16,6 +26,7 @@ class Summary:
     """Of n values; NaN without values, and for a quartile of times beyond the observed times."""
 
     n: int
+    seeds: int  # of these values: fewer than n if several runs have the same seed
     failed: int  # runs that ended in an error
     undefined: int  # runs that ended well with nothing to measure
     censored: float  # share of the values, 0 to 1; 0 for numbers
@@ -29,32 +40,33 @@ class Summary:
 
 
 def summary(sample: Sample, level: float = LEVEL) -> Summary:
-    """Of numbers: quantiles by linear interpolation (Hyndman and Fan's type 7), intervals by the bootstrap.
+    """Of numbers: quantiles by linear interpolation (Hyndman and Fan's type 7), intervals by the bootstrap of seeds.
 
     Of times: quantiles of Kaplan and Meier's estimate with their intervals, and the mean restricted to the largest
-    value, with Greenwood's.
+    value, with Greenwood's; where several runs have the same seed, both intervals are by the bootstrap of seeds.
     """
     if not len(sample):
         nan = math.nan
-        return Summary(0, sample.failed, sample.undefined, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan)
+        return Summary(0, 0, sample.failed, sample.undefined, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan)
     describe = _times if sample.kind == "time" else _numbers
     return describe(sample, level)
 
 
 def _numbers(sample: Sample, level: float) -> Summary:
-    value, n = sample.value, len(sample)
+    value, seeds = sample.value, sample.seeds
     q25, q50, q75 = (float(quantile) for quantile in np.quantile(value, (0.25, 0.5, 0.75)))
-    median = percentile_interval(resampled_medians(value), n, level)
-    mean = percentile_interval(resampled_means(value), n, level)
-    return Summary(
-        n, sample.failed, sample.undefined, 0.0, q25, q50, q75, float(value.mean()), median, mean, float(value.max())
-    )
+    median = percentile_interval(resampled_medians(value, sample.seed), seeds, level)
+    mean = percentile_interval(resampled_means(value, sample.seed), seeds, level)
+    counts = len(sample), seeds, sample.failed, sample.undefined
+    return Summary(*counts, 0.0, q25, q50, q75, float(value.mean()), median, mean, float(value.max()))
 
 
 def _times(sample: Sample, level: float) -> Summary:
     curve, limit = kaplan_meier(sample, level), float(sample.value.max())
+    median, mean = _intervals_of_times(sample, curve, limit, level)
     return Summary(
         len(sample),
+        sample.seeds,
         sample.failed,
         sample.undefined,
         sample.censored,
@@ -62,10 +74,20 @@ def _times(sample: Sample, level: float) -> Summary:
         curve.quantile(0.5),
         curve.quantile(0.75),
         curve.restricted_mean(limit),
-        curve.quantile_interval(0.5),
-        curve.restricted_mean_interval(limit),
+        median,
+        mean,
         limit,
     )
+
+
+def _intervals_of_times(sample: Sample, curve: KaplanMeier, limit: float, level: float) -> tuple[Interval, Interval]:
+    """Of the median and of the restricted mean."""
+    if sample.seeds == len(sample):
+        return curve.quantile_interval(0.5), curve.restricted_mean_interval(limit)
+    counts, seeds = drawn_by_seed(sample.seed)
+    low, high = percentile_interval(resampled_quantiles(sample, counts, 0.5), seeds, level)
+    mean = percentile_interval(resampled_restricted_means(sample, counts, limit), seeds, level)
+    return Interval(math.nan if math.isinf(low) else low, high), mean
 
 
 def quantile_text(value: float, limit: float) -> str:

@@ -108,13 +108,26 @@ def resampled_quantiles(sample: Sample, drawn: Counts, share: float) -> FloatArr
 
     `drawn` (resamples, n) holds the number of draws of each value.
     """
+    time, survival = _resampled(sample, drawn)
+    reached = survival <= 1.0 - share + ROUNDING
+    return np.where(reached.any(axis=1), time[np.argmax(reached, axis=1)], np.inf)
+
+
+def resampled_restricted_means(sample: Sample, drawn: Counts, horizon: float) -> FloatArray:
+    """The mean of min(time, horizon) of each resample, (resamples,): the area under its S up to there."""
+    time, survival = _resampled(sample, drawn)
+    edges = np.minimum(np.concatenate([[0.0], time, [horizon]]), horizon)
+    pieces = np.diff(np.maximum.accumulate(edges))
+    return pieces[0] + survival @ pieces[1:]
+
+
+def _resampled(sample: Sample, drawn: Counts) -> tuple[FloatArray, FloatArray]:
+    """All times (n,), rising, and S from each on in each resample, (resamples, n)."""
     order = np.lexsort((~sample.observed, sample.value))  # at the same time events come before ends
     counts = drawn[:, order].astype(np.float64)
     at_risk = np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]
     events = counts * sample.observed[order]
-    survival = np.cumprod(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
-    reached = survival <= 1.0 - share + ROUNDING
-    return np.where(reached.any(axis=1), sample.value[order][np.argmax(reached, axis=1)], np.inf)
+    return sample.value[order], np.cumprod(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
 
 
 class LogRank(NamedTuple):

@@ -14,15 +14,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from scipy import optimize, special
+from scipy import optimize
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
-from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval
+from swarmwire.metrics.statistics.bootstrap import drawn_by_seed, percentile_interval
+from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, SeedTable
 
 MIN_STRESSES = 3  # two points lie on every curve
 PARAMETERS = 3  # a, b and the variance
+GAUSS_NEWTON_STEPS = 20
 ROUNDING = 1e-24  # of squares, relative to all
 TELLING = 2.0  # smaller differences of AIC mean little (Burnham and Anderson, 2002)
 
@@ -77,20 +78,63 @@ def relative_to_unharmed(stress: FloatArray, table: FloatArray) -> FloatArray:
     return table / (mean if mean != 0.0 else math.nan)
 
 
-def degradation(stress: FloatArray, table: FloatArray, level: float = LEVEL) -> Degradation | None:
-    """Fits a + b f and a exp(b f) to performance (stresses, seeds) at stresses f (stresses,); NaN: no value.
+@dataclass(frozen=True)
+class _Relative:
+    """Resamples of the seeds: performance relative to that at the least stress of the same resample."""
 
-    Intervals are Student's, from the curvature of the squares. None if fewer than three stresses have values.
+    stress: FloatArray  # (stresses,)
+    weight: FloatArray  # (resamples, stresses) number of runs
+    mean: FloatArray  # (resamples, stresses) NaN of no run
+    seeds: int
+
+    def interval(self, values: FloatArray, level: float) -> Interval:
+        """That of a statistic with these values (resamples,)."""
+        return percentile_interval(values, self.seeds, level)
+
+
+def _relative(stress: FloatArray, table: SeedTable) -> _Relative:
+    sums = resampled_sums(table)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = sums.total / np.where(sums.count > 0.0, sums.count, np.nan)
+        mean /= mean[:, [int(np.argmin(stress))]]
+    return _Relative(stress, sums.count, mean, len(np.unique(table.seed)))
+
+
+def relative_means(
+    stress: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL
+) -> tuple[FloatArray, list[Interval]]:
+    """Mean performance at each stress relative to that at the least stress, (stresses,), and the intervals.
+
+    Intervals resample seeds, for numerator and denominator together: at the least stress it is 1 without an error.
+    NaN at stresses without a value.
     """
-    there = np.isfinite(table)
-    if np.count_nonzero(there.any(axis=1)) < MIN_STRESSES:
+    seed_table = SeedTable.of(table)
+    sums, drawn = point_sums(seed_table), _relative(stress, seed_table)
+    means = sums.total / np.where(sums.count > 0.0, sums.count, np.nan)
+    return means / means[int(np.argmin(stress))], [drawn.interval(column, level) for column in drawn.mean.T]
+
+
+def degradation(stress: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL) -> Degradation | None:
+    """Fits a + b f and a exp(b f) to performance at stresses f (stresses,), relative to its mean at the least stress.
+
+    Intervals resample seeds, and so include the error of that mean. None if fewer than three stresses have values.
+    """
+    value, seed = SeedTable.of(table)
+    full = np.isfinite(value).any(axis=1)
+    if np.count_nonzero(full) < MIN_STRESSES:
         return None
-    x = np.broadcast_to(stress[:, None], table.shape)[there]
-    y = table[there]
+    stress, value = stress[full], relative_to_unharmed(stress[full], value[full])
+    there = np.isfinite(value)
+    if not there.any():
+        return None
+    x, y = np.broadcast_to(stress[:, None], value.shape)[there], value[there]
     line = np.polyfit(x, y, 1)
     slope, start = float(line[0]), float(line[1])
     guess = (start, slope / start if start > 0.0 else 0.0)
-    return Degradation(_fit("linear", x, y, (start, slope), level), _fit("exponential", x, y, guess, level))
+    drawn = _relative(stress, SeedTable(value, seed))
+    return Degradation(
+        _fit("linear", x, y, (start, slope), drawn, level), _fit("exponential", x, y, guess, drawn, level)
+    )
 
 
 def _curve(form: Form) -> Any:
@@ -105,27 +149,52 @@ def _exponential(x: FloatArray, a: float, b: float) -> FloatArray:
     return a * np.exp(np.minimum(b * x, 700.0))  # the search may try values that would overflow
 
 
-def _fit(form: Form, x: FloatArray, y: FloatArray, guess: tuple[float, float], level: float) -> Fit:
+def _fit(form: Form, x: FloatArray, y: FloatArray, guess: tuple[float, float], drawn: _Relative, level: float) -> Fit:
     scipy: Any = optimize
     try:
-        with warnings.catch_warnings(action="ignore", category=optimize.OptimizeWarning):  # its variance is inf then
-            found, covariance = scipy.curve_fit(_curve(form), x, y, p0=guess)
+        with warnings.catch_warnings(action="ignore", category=optimize.OptimizeWarning):  # its variance is not used
+            found = scipy.curve_fit(_curve(form), x, y, p0=guess)[0]
     except RuntimeError:  # its word for a search that came to no end
         return Fit(form, math.nan, math.nan, UNKNOWN, UNKNOWN, math.nan, math.inf)
     a, b = float(found[0]), float(found[1])
     residual = max(float(np.sum((y - _curve(form)(x, a, b)) ** 2)), ROUNDING * float(np.sum(y**2)))
     total = float(np.sum((y - y.mean()) ** 2))
-    student: Any = special.stdtrit(max(len(y) - 2, 1), 0.5 + 0.5 * level)
-    reach_a, reach_b = (float(student) * math.sqrt(float(variance)) for variance in np.diag(covariance))
+    a_drawn, b_drawn = _refitted(form, drawn, a, b)
     return Fit(
         form,
         a,
         b,
-        Interval(a - reach_a, a + reach_a),
-        Interval(b - reach_b, b + reach_b),
+        drawn.interval(a_drawn, level),
+        drawn.interval(b_drawn, level),
         1.0 - residual / total if total > 0.0 else math.nan,
         len(y) * math.log(residual / len(y)) + 2.0 * PARAMETERS if residual > 0.0 else -math.inf,
     )
+
+
+def _refitted(form: Form, drawn: _Relative, a: float, b: float) -> tuple[FloatArray, FloatArray]:
+    """Both parameters of each resample, (resamples,), by Gauss and Newton's method from those of all runs.
+
+    Runs at one stress weigh as their mean does with their number, so that the means are enough.
+    """
+    x, weight = drawn.stress, np.where(np.isfinite(drawn.mean), drawn.weight, 0.0)
+    mean = np.where(np.isfinite(drawn.mean), drawn.mean, 0.0)
+    a_drawn, b_drawn = np.full((len(mean), 1), a), np.full((len(mean), 1), b)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for _ in range(1 if form == "linear" else GAUSS_NEWTON_STEPS):
+            if form == "linear":
+                by_a, by_b = np.ones_like(mean), np.broadcast_to(x, mean.shape)
+            else:
+                by_a = np.exp(np.minimum(b_drawn * x, 700.0))
+                by_b = a_drawn * x * by_a
+            left = mean - _curve(form)(x, a_drawn, b_drawn)
+            aa, ab, bb, la, lb = (
+                np.sum(weight * one * other, axis=1, keepdims=True)
+                for one, other in ((by_a, by_a), (by_a, by_b), (by_b, by_b), (by_a, left), (by_b, left))
+            )
+            determinant = aa * bb - ab * ab
+            a_drawn = a_drawn + (bb * la - ab * lb) / determinant
+            b_drawn = b_drawn + (aa * lb - ab * la) / determinant
+    return a_drawn[:, 0], b_drawn[:, 0]
 
 
 @dataclass(frozen=True)
@@ -170,19 +239,19 @@ class PointSums:
     squares: FloatArray
 
 
-def point_sums(table: FloatArray) -> PointSums:
-    """Of a table (points, seeds), NaN where a run has no value."""
-    return _weighted(table, np.ones((1, table.shape[1])), 0)
+def point_sums(table: SeedTable) -> PointSums:
+    """The sums over all runs."""
+    return _weighted(table, np.ones((1, table.value.shape[1])), 0)
 
 
-def resampled_sums(table: FloatArray) -> PointSums:
+def resampled_sums(table: SeedTable) -> PointSums:
     """The same of resamples of the seeds: a seed brings its runs of all points, or none."""
-    return _weighted(table, drawn(table.shape[1]).astype(np.float64))
+    return _weighted(table, drawn_by_seed(table.seed)[0].astype(np.float64))
 
 
-def _weighted(table: FloatArray, weight: FloatArray, row: int | slice = slice(None)) -> PointSums:
-    there = np.isfinite(table)
-    value = np.where(there, table, 0.0)
+def _weighted(table: SeedTable, weight: FloatArray, row: int | slice = slice(None)) -> PointSums:
+    there = np.isfinite(table.value)
+    value = np.where(there, table.value, 0.0)
     count, total, squares = (weight @ of.T for of in (there.astype(np.float64), value, value**2))
     return PointSums(count[row], total[row], squares[row])
 
@@ -203,19 +272,20 @@ class ChangePoint:
     gain: float  # by how much BIC is lower than that of a constant, > 0
 
 
-def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL) -> ChangePoint | None:
+def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL) -> ChangePoint | None:
     """The step along a parameter (points,), strictly rising, of the responses (points, seeds), NaN: no value.
 
     Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant does as well, or
     fewer than two points have values.
     """
-    full = np.isfinite(table).any(axis=1)
-    parameter, table = parameter[full], table[full]
+    value, seed = SeedTable.of(table)
+    full = np.isfinite(value).any(axis=1)
+    parameter, value = parameter[full], value[full]
     if len(parameter) < 2:
         return None
-    mean = float(np.nanmean(table))
-    table = table - mean  # centred, so that sums of squares keep their digits
-    sums = point_sums(table)
+    mean = float(np.nanmean(value))
+    centred = SeedTable(value - mean, seed)  # so that sums of squares keep their digits
+    sums = point_sums(centred)
     residual = _residuals(sums)
     split = int(np.argmin(residual))
     gain = _gain(sums, float(residual[split]), mean)
@@ -224,8 +294,8 @@ def change_point(parameter: FloatArray, table: FloatArray, level: float = LEVEL)
     places = 0.5 * (parameter[:-1] + parameter[1:])
     below, above = _levels(sums)
     effect = float(above[split] - below[split])
-    resampled_place, resampled_effect = _resampled(table, places)
-    seeds = table.shape[1]
+    resampled_place, resampled_effect = _resampled(centred, places)
+    seeds = len(np.unique(seed))
     deviation = math.sqrt(float(residual[split]) / max(float(sums.count.sum()) - 2.0, 1.0))
     return ChangePoint(
         after=float(parameter[split]),
@@ -266,7 +336,7 @@ def _gain(sums: PointSums, residual: float, mean: float) -> float:
     return n * math.log(constant / max(residual, SAME_VALUES * constant)) - MORE_PARAMETERS * math.log(n)
 
 
-def _resampled(table: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _resampled(table: SeedTable, places: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Places and effects of the best steps of resampled seeds, each (resamples,)."""
     sums = resampled_sums(table)
     split: IntArray = np.argmin(_residuals(sums), axis=1)

@@ -1,6 +1,7 @@
 """A sample in a few numbers, with intervals that cover what they say, and as people read it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from swarmwire.metrics.statistics.bootstrap import (
     binomial_interval,
     block_means,
     drawn,
+    drawn_by_seed,
     mean_difference_interval,
     percentile_interval,
     resampled_means,
@@ -78,9 +80,41 @@ def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
         assert medians[resample] == pytest.approx(np.median(np.repeat(np.sort(value), counts)))
 
 
-def test_means_of_rows_are_resampled_alike():
-    rows = np.random.default_rng(1).normal(size=(3, 8))
-    np.testing.assert_allclose(resampled_means(rows)[:, 1], resampled_means(rows[1]), atol=1e-6)
+@given(st.lists(st.tuples(st.floats(-5.0, 5.0), st.integers(0, 3)), min_size=2, max_size=12))
+def test_whole_seeds_are_resampled(rows):
+    value, seed = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    counts, seeds = drawn_by_seed(seed)
+    means, medians = resampled_means(value, seed), resampled_medians(value, seed)
+    assert seeds == len(set(seed.tolist()))
+    for resample in range(5):
+        # Where each value has a seed of its own, the n-th count of a median is that of the n-th in rising order.
+        often, of = counts[resample].astype(int), np.sort(value) if seeds == len(value) else value
+        assert all(len(set(often[seed == one].tolist())) == 1 for one in seed)
+        assert means[resample] == pytest.approx(np.repeat(value, often).mean(), abs=1e-6)
+        assert medians[resample] == pytest.approx(np.median(np.repeat(of, often)))
+
+
+def tiled(sample, copies):
+    columns = {name: np.tile(getattr(sample, name), copies) for name in ("value", "observed", "seed")}
+    return replace(sample, **columns)
+
+
+def test_runs_of_one_seed_tell_no_more_than_one_of_them():
+    """Points of equal values: pooled over five of them the interval is that of one."""
+    sample = numbers([3.0, 1.0, 4.0, 1.5, 9.0, 2.0, 6.0, 5.0])
+    one, three, five = (summary(tiled(sample, copies)) for copies in (1, 3, 5))
+    assert (five.n, five.seeds) == (40, 8)
+    assert five.mean_interval == pytest.approx(one.mean_interval, rel=1e-6)
+    assert five.q50_interval == three.q50_interval
+    assert five.q50_interval.low < five.q50 < five.q50_interval.high
+
+
+def test_times_of_one_seed_tell_no_more_than_one_of_them():
+    sample = times([3.0, 1.0, 4.0, 10.0, 9.0, 10.0], [True, True, True, False, True, False])
+    two, four = summary(tiled(sample, 2)), summary(tiled(sample, 4))
+    assert two.q50_interval == four.q50_interval
+    assert two.mean_interval == pytest.approx(four.mean_interval, rel=1e-6)
+    assert two.mean_interval.low < two.mean < two.mean_interval.high
 
 
 def test_an_interval_of_what_may_be_infinite_is_open_and_of_what_is_unknown_unknown():
