@@ -78,8 +78,11 @@ def measuring(scenario: Scenario) -> MetricSelection:
 
 
 def conditions(scenario: Scenario) -> list[Condition]:
-    """What ends an arena before its time, in the scenario's order."""
-    return [Condition(table.metric, *table.comparison, table.hold_s) for table in scenario.stops().values()]
+    """The stop conditions, in the scenario's order."""
+    return [
+        Condition(table.metric, *table.comparison, table.hold_s, table.keep_running)
+        for table in scenario.stops().values()
+    ]
 
 
 def _item(place: int, item: str | MetricTable, beside: Path) -> MetricEntry:

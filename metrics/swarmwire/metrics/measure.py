@@ -141,6 +141,7 @@ class Condition:
     comparison: Comparison
     limit: float
     hold_s: float = 0.0  # how long it must compare so, in every tick
+    keep_running: bool = False  # only its time is noted; the arena runs on
 
     def __str__(self) -> str:
         """In words: "order at least 0.9 for 5 s"."""
@@ -154,8 +155,8 @@ class StopConditions(Observer):
     Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.
 
     A condition holds in an arena once it has been true in every tick from one at t0 on, and t0 is `hold_s` ago; the
-    arena is over then, and t0 its stop time. What has no value is not true. Of several conditions any will do; of those
-    that come to hold in the same tick the first is named.
+    arena is over then, unless the condition keeps it running. Its stop time is the t0 of the first condition to hold,
+    of several in one tick the first in the list. What has no value is not true.
     """
 
     def __init__(self, metrics: Metrics, conditions: Sequence[Condition]) -> None:
@@ -169,14 +170,16 @@ class StopConditions(Observer):
         self._limit: FloatArray = self._sign * np.array([of.limit for of in conditions])[:, None]
         self._strict: BoolArray = np.array([of.comparison in ("above", "below") for of in conditions])[:, None]
         self._hold_ns: IntArray = np.array([to_ns(of.hold_s) for of in conditions], np.int64)[:, None]
+        self._ends: BoolArray = np.array([not of.keep_running for of in conditions])[:, None]
 
     def begin(self, static: Static) -> None:
         """Start afresh."""
         self._true: BoolArray = np.zeros((len(self._conditions), static.arenas), np.bool_)  # in the last tick
         self._since_ns: IntArray = np.zeros(self._true.shape, np.int64)  # where true: since when
         self._over: BoolArray = np.zeros(static.arenas, np.bool_)
-        self._by: IntArray = np.zeros(static.arenas, np.int64)  # where over: number of the condition
-        self._stop_ns: IntArray = np.zeros(static.arenas, np.int64)  # where over
+        self._held: BoolArray = np.zeros(static.arenas, np.bool_)  # where any condition has come to hold
+        self._by: IntArray = np.zeros(static.arenas, np.int64)  # where held: number of the first condition
+        self._stop_ns: IntArray = np.zeros(static.arenas, np.int64)  # where held
 
     def see(self, truth: Truth) -> None:
         """Judge a tick."""
@@ -185,23 +188,24 @@ class StopConditions(Observer):
         self._since_ns[true & ~self._true] = truth.time_ns
         self._true = true
         holds = true & (truth.time_ns - self._since_ns >= self._hold_ns)
-        new = np.flatnonzero(holds.any(axis=0) & ~self._over)
+        new = np.flatnonzero(holds.any(axis=0) & ~self._held)
         if len(new):
             self._by[new] = holds[:, new].argmax(axis=0)
             self._stop_ns[new] = self._since_ns[self._by[new], new]
-            self._over[new] = True
+            self._held[new] = True
+        self._over |= (holds & self._ends).any(axis=0)
 
     def done(self) -> BoolArray | None:
         """Which arenas have been found over so far, (arenas,); None: none."""
         return self._over if self._over.any() else None
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """When each arena was over, in s from the start of the run, and by which condition; None where it was not."""
+        """When which condition came to hold in each arena first, in s from the start of the run; None: none did."""
         stops = [self._stop(arena) for arena in range(len(self._over))]
         return {"stop": [str(condition) for condition in self._conditions], "stops": stops}
 
     def _stop(self, arena: int) -> dict[str, Any]:
-        if not self._over[arena]:
+        if not self._held[arena]:
             return {"stop_time_s": None, "stopped_by": None}
         by = self._conditions[int(self._by[arena])]
         return {"stop_time_s": to_s(int(self._stop_ns[arena])), "stopped_by": str(by)}

@@ -50,14 +50,16 @@ def write_campaign(
     limit_s: float = LIMIT_S,
     failed: Collection[int] = (),
     missing: Collection[int] = (),
+    stopped: Mapping[int, float] | None = None,
     parts: int = 0,
     draws: int = 0,
 ) -> Path:
     """Write a campaign's folder and return its path.
 
     Every parameter's every value is met with every other's, unless `points` are told. `failed` and `missing` are
-    numbers of runs; with `parts` the rows stand in so many files, as of one that goes on. What a run draws belongs to
-    `draws` and to the run's number. A time is null where it is None or beyond `limit_s`.
+    numbers of runs, `stopped` of those that a stop condition ended, with the time in s. With `parts` the rows stand in
+    so many files, as of a campaign that goes on. What a run draws belongs to `draws` and to the run's number. A time is
+    null where it is None or beyond `limit_s`.
     """
     varied = {"radio.loss": [0.0, 0.2, 0.4]} if vary is None else dict(vary)
     if points is None:
@@ -68,7 +70,8 @@ def write_campaign(
     (folder / "scenario").mkdir()
     (folder / "scenario" / "scenario.toml").write_text(f'name = "{name}"\n')
     rows = [
-        _row(run, point, seed, numbers, times, limit_s, failed=run in failed, draws=draws)
+        _row(run, point, seed, numbers, times, (stopped or {}).get(run, limit_s), failed=run in failed, draws=draws)
+        | ({"ended": "stopped"} if run in (stopped or {}) else {})
         for run, (point, seed) in enumerate(itertools.product(points, seeds))
     ]
     frame = pl.DataFrame(

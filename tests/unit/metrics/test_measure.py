@@ -263,6 +263,12 @@ def test_of_several_conditions_any_is_enough_and_the_first_is_named():
     assert one([1, 1, 1], first, second)[:2] == (0.0, str(second))
 
 
+def test_a_condition_that_keeps_the_arena_running_only_notes_its_time():
+    aligned, slow = Condition("script", "at_least", 1.0, keep_running=True), script("at_least", 3.0)
+    assert one([0, 1, 0, 1], aligned) == (0.1, str(aligned), None)
+    assert one([0, 1, 0, 3, 0], aligned, slow) == (0.1, str(aligned), 3)
+
+
 def test_a_count_is_compared_by_its_total():
     assert one([1, 2, 0, 3], Condition("tallied", "at_least", 6.0), kind=Tallied)[2] == 3
 

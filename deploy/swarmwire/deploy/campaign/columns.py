@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
 from swarmwire.deploy.scenario_parts import conditions, measuring
-from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response
+from swarmwire.metrics.campaign.spec import FAILED, STOP_TIME, Campaign, Response
 from swarmwire.world.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import polars as pl
 
-STOP_TIME = "stop_time_s"
-STOPPED = "when this began to hold: {}"
+BEGAN_TO_HOLD = "when this began to hold: {}"
 RADIO = "radio."  # how columns of packets begin
 RADIO_HELP = {
     "sent": ("", "packets sent"),
@@ -90,7 +89,7 @@ def responses_of(scenarios: Iterable[Scenario]) -> tuple[Response, ...]:
             if before.hold_s < response.hold_s:  # it is varied: what all runs can tell of
                 found[response.column] = before = replace(before, hold_s=response.hold_s)
             if before.column == STOP_TIME and before.help != response.help:
-                found[STOP_TIME] = replace(before, help=STOPPED.format("the stop condition"))
+                found[STOP_TIME] = replace(before, help=BEGAN_TO_HOLD.format("the stop condition"))
     return tuple(sorted(found.values(), key=_rank))
 
 
@@ -101,7 +100,7 @@ def _rank(response: Response) -> tuple[bool, bool, bool]:
 def _responses(scenario: Scenario) -> Iterator[Response]:
     if stops := conditions(scenario):
         hold_s = max(stop.hold_s for stop in stops)
-        yield Response(STOP_TIME, "s", "time", STOPPED.format(" or ".join(map(str, stops))), hold_s=hold_s)
+        yield Response(STOP_TIME, "s", "time", BEGAN_TO_HOLD.format(" or ".join(map(str, stops))), hold_s=hold_s)
     for metric in measuring(scenario).metrics:
         if metric.kind == "time":
             hold_s = float(getattr(metric, "hold_s", 0.0))

@@ -150,14 +150,15 @@ def _summary(letter: str, of: Summary) -> dict[str, float]:
 def cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
     """The texts of a row, one for each of COLUMNS."""
     of = row.difference
+    shown, interval = (of.mean, of.mean_interval) if of.is_discrete else (of.median, of.median_interval)
     unit = f" [{row.response.unit}]" if row.response.unit else ""
     return (
         row.response.column + unit,
         _place(comparison, row),
         quartiles_text(row.first),
         quartiles_text(row.second),
-        number_text(of.median, sign=True),
-        interval_text(of.median_interval, sign=True),
+        number_text(shown, sign=True) + (" (mean)" if of.is_discrete else ""),
+        interval_text(interval, sign=True),
         number_text(of.delta, sign=True),
         p_text(of.p),
         str(of.pairs) if of.pairs else f"none ({row.first.n}, {row.second.n})",
@@ -179,9 +180,13 @@ def notes(comparison: Comparison) -> list[str]:
     lines = [
         f"{letter}: {of.text} ({_state(of)})" for letter, of in (("A", comparison.first), ("B", comparison.second))
     ]
-    lines.append("A and B: median (quartiles); > means later than the runs were watched.")
+    lines.append("A and B: median (quartiles); > means later than the runs were observed.")
+    lines += _stopped_first(comparison)
     tests = dict.fromkeys(row.difference.test for row in comparison.rows)
     lines += [MEANINGS[test] for test in tests]
+    if any(row.difference.is_discrete for row in comparison.rows):
+        lines.append("(mean): the outcome has few distinct values, so B - A and its interval are of the means.")
+    lines += _other_signs(comparison)
     lines.append(f"interval: where B - A lies with {percent} confidence, by the bootstrap.")
     lines.append(
         "delta (Cliff's): share of pairs of runs in which B is greater, less the share in which A is; -1 to 1."
@@ -189,6 +194,37 @@ def notes(comparison: Comparison) -> list[str]:
     if len(comparison.rows) > 1:
         chance = len(comparison.rows) * (1.0 - comparison.level)
         lines.append(f"Of {len(comparison.rows)} rows about {chance:.1g} would leave 0 out of the interval by chance.")
+    return lines
+
+
+def _other_signs(comparison: Comparison) -> list[str]:
+    """A note where the medians seem to say the opposite of B - A."""
+    places = [
+        f"{row.response.column} at {_place(comparison, row)}"
+        for row in comparison.rows
+        if row.difference.pairs and (row.second.q50 - row.first.q50) * row.difference.median < 0.0
+    ]
+    if not places:
+        return []
+    return [
+        f"{'; '.join(places)}: B - A and the medians of A and B differ in sign. B - A is the median of the differences "
+        "within seeds, which need not be the difference of the medians."
+    ]
+
+
+def _stopped_first(comparison: Comparison) -> list[str]:
+    """A warning of each time before which a stop condition ended runs."""
+    lines: list[str] = []
+    for column in dict.fromkeys(row.response.column for row in comparison.rows):
+        found = [of for row in comparison.rows if row.response.column == column for of in (row.first, row.second)]
+        count = sum(of.stopped_first for of in found)
+        if count:
+            shortest = min(of.shortest for of in found if of.stopped_first)
+            lines.append(
+                f"{column}: [stop] ended {count} of {sum(of.n for of in found)} runs before it, the first after "
+                f"{number_text(shortest)} s. If the condition has to do with the event, medians, B - A and p mislead; "
+                "keep_running = true in [stop] avoids this."
+            )
     return lines
 
 

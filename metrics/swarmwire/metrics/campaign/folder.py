@@ -19,6 +19,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.spec import (
     FAILED,
     PARTS,
+    STOP_TIME,
+    STOPPED,
     SUMMARY,
     Campaign,
     Point,
@@ -134,8 +136,9 @@ class CampaignFolder:
         value, end_s = self._numbers(response.column)[order], self._numbers(SIM_TIME)[order]
         seed, well = self._column("seed")[order].astype(np.int64), self._ended_well[order]
         edges = np.searchsorted(self._column("point")[order], np.arange(len(self.points) + 1)).tolist()
+        stopped = self._stopped[order] & (response.column != STOP_TIME)
         return tuple(
-            _sample(response, value[here], end_s[here], seed[here], well[here])
+            _sample(response, value[here], end_s[here], seed[here], well[here], stopped[here])
             for here in (slice(start, end) for start, end in pairwise(edges))
         )
 
@@ -143,6 +146,11 @@ class CampaignFolder:
     def _ended_well(self) -> BoolArray:
         """Of each run (runs,) whether it did; comparing texts takes longer than a sample."""
         return self.runs.select(pl.col("ended") != FAILED).to_series().to_numpy()
+
+    @cached_property
+    def _stopped(self) -> BoolArray:
+        """Of each run (runs,) whether a stop condition ended it."""
+        return self.runs.select(pl.col("ended") == STOPPED).to_series().to_numpy()
 
     def _column(self, name: str) -> AnyArray:
         return self.runs[name].to_numpy()
@@ -184,10 +192,13 @@ def response_sample(response: Response, value: FloatArray, end_s: FloatArray, se
     return time_sample(np.where(observed, value, response.watched_s(end_s)), observed, seed)
 
 
-def _sample(response: Response, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray) -> Sample:
+def _sample(
+    response: Response, value: FloatArray, end_s: FloatArray, seed: IntArray, well: BoolArray, stopped: BoolArray
+) -> Sample:
     """Of all runs of a point, of which those that ended well have a part in it."""
-    failed = int(np.count_nonzero(~well))
-    return replace(response_sample(response, value[well], end_s[well], seed[well]), failed=failed)
+    sample = response_sample(response, value[well], end_s[well], seed[well])
+    first = sample.value[~sample.observed & stopped[well]] if response.kind == "time" else np.empty(0)
+    return replace(sample, failed=int(np.count_nonzero(~well)), stopped_first=first)
 
 
 @dataclass(frozen=True)

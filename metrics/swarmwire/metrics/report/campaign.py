@@ -36,10 +36,12 @@ MAX_POINTS = 60  # beyond which tables are by the values of each parameter
 _MAX_OPEN_ROWS = 20  # of tables after the first that are not folded
 _ALWAYS = (
     "Values. Quartiles of numbers are interpolated linearly (Hyndman and Fan, The American Statistician 50, 1996, "
-    "type 7). Intervals hold with 95 % confidence; those of medians and means of numbers are expanded bootstrap "
-    f"percentiles ({RESAMPLES:,} resamples, down to {MIN_RESAMPLES:,} of very large samples; Efron, Annals of "
-    "Statistics 7, 1979; Hesterberg, The American Statistician 69, 2015). Draws are keyed, so that the same data "
-    "give the same intervals.",
+    "type 7). Intervals hold with 95 % confidence; those of medians and means of numbers, and of all statistics over "
+    "several design points, are expanded bootstrap percentiles over seeds "
+    f"({RESAMPLES:,} resamples, down to {MIN_RESAMPLES:,} of very large samples; Efron, Annals of Statistics 7, 1979; "
+    "Field and Welsh, Journal of the Royal Statistical Society B 69, 2007; Hesterberg, The American Statistician 69, "
+    "2015). A seed that is drawn brings its runs of all design points. Draws are keyed, so that the same data give the "
+    "same intervals.",
 )
 _OF_SECTIONS = {
     "times": (
@@ -48,8 +50,10 @@ _OF_SECTIONS = {
         "those of Kaplan and Meier's estimate (Journal of the American Statistical Association 53, 1958), their "
         "intervals Brookmeyer and Crowley's (Biometrics 38, 1982) with the log-log band; where the estimate does "
         "not come down to a quartile it is beyond the limit, and so said (>). Ticks on curves are censored runs. "
-        "Where runs stop early, values at the end and sums are of runs of different lengths: what stopped them is "
-        "selected."
+        'Runs in the column "stopped first" were ended by a stop condition before the event. The estimate treats '
+        "them as censored by chance. If the condition has to do with the event, it misleads: run again with "
+        "`keep_running = true` in `[stop]`. Where runs stop early, values at the end and sums are of runs of different "
+        "lengths."
     ),
     "Survival": (
         "Shares of runs. Intervals are Wilson's score intervals (Journal of the American Statistical Association 22, "
@@ -63,12 +67,14 @@ _OF_SECTIONS = {
     ),
     "Resilience": (
         "Resilience. a + b f and a exp(b f) are fitted by least squares to all runs at loss f, relative to the mean "
-        "at the least loss; AIC = n ln(RSS / n) + 2 · 3, and a difference of less than 2 says little (Burnham and "
-        "Anderson, Model Selection, 2002)."
+        "at the least loss; intervals resample seeds, and so include the error of that mean. AIC = n ln(RSS / n) + "
+        "2 · 3, and a difference of less than 2 says little (Burnham and Anderson, Model Selection, 2002)."
     ),
     "Scaling": (
         "Scaling. Karp and Flatt's fraction e = (1/X − 1/s) / (1 − 1/s) of speed-up X with s times as many robots "
-        "(Communications of the ACM 33, 1990), as used of swarms by Harwell and Gini (arXiv 1907.03880)."
+        "(Communications of the ACM 33, 1990), as used of swarms by Harwell and Gini (arXiv 1907.03880). Times are "
+        "means of min(time, h) by Kaplan and Meier's estimate, where h is the time up to which every run of every "
+        "size was observed. Intervals resample seeds, of all sizes together."
     ),
 }
 
@@ -125,7 +131,9 @@ def summary_section(samples: Samples, chosen: ChosenResponses) -> Section:
     if len(samples.folder.points) > MAX_POINTS:
         parts.append(
             f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
-            "parameter, over all values of the others. `summary.parquet` has every run."
+            "parameter, over all values of the others. Quartiles are those of all these runs. Intervals are about "
+            "other seeds at the same design points: whole seeds are resampled, so they do not shrink with the number "
+            "of points. `summary.parquet` has every run."
         )
     for place, response in enumerate(chosen.shown):
         folded = place > 0 and len(groups) > _MAX_OPEN_ROWS
@@ -163,15 +171,20 @@ def _table(
     summaries = [samples.summary(response, group.points) for group in groups]
     rounding = _rounding(summaries)
     some_undefined = any(found.undefined for found in summaries)
-    header = [*columns, "n", "median", "quartiles", "95 % interval of the median"]
+    pooled = any(found.seeds < found.n for found in summaries)
+    some_stopped = any(found.stopped_first for found in summaries)
+    header = [*columns, *(["runs", "seeds"] if pooled else ["n"]), "median", "quartiles", "95 % interval of the median"]
     header += ["not reached"] if response.kind == "time" else []
+    header += ["stopped first"] if some_stopped else []
     header += ["undefined"] if some_undefined else []
     rows = [
         (
             *group.cells,
             str(found.n),
+            *([str(found.seeds)] if pooled else []),
             *_figures(found, response, rounding),
             *([_share(found)] if response.kind == "time" else []),
+            *([_stopped_first(found)] if some_stopped else []),
             *([str(found.undefined)] if some_undefined else []),
         )
         for group, found in zip(groups, summaries, strict=True)
@@ -218,6 +231,11 @@ def _span(low: str, high: str) -> str:
 
 def _share(found: Summary) -> str:
     return f"{100.0 * found.censored:.0f} %" if math.isfinite(found.censored) else "–"
+
+
+def _stopped_first(found: Summary) -> str:
+    """Runs that a stop condition ended before the time, and the shortest observation of these."""
+    return f"{found.stopped_first} of {found.n}, from {number_text(found.shortest)} s" if found.stopped_first else "–"
 
 
 def _rounding(summaries: Sequence[Summary]) -> Rounding:

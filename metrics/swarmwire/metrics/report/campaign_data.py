@@ -216,6 +216,7 @@ class Samples:
             kind=response.kind,
             failed=sum(part.failed for part in parts),
             undefined=sum(part.undefined for part in parts),
+            stopped_first=np.concatenate([part.stopped_first for part in parts] or [np.empty(0)]),
         )
 
     def all(self, response: Response) -> Sample:

@@ -21,7 +21,9 @@ from swarmwire.metrics.report.campaign_data import (
     rounding_of,
 )
 from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
-from swarmwire.metrics.statistics.sample import Interval, SeedTable
+from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
+from swarmwire.metrics.statistics.sample import Interval, Sample, SeedTable
+from swarmwire.metrics.statistics.survival import common_horizon, kaplan_meier, resampled_restricted_means
 from swarmwire.metrics.statistics.trends import (
     MIN_STRESSES,
     Degradation,
@@ -31,7 +33,7 @@ from swarmwire.metrics.statistics.trends import (
     relative_means,
     scaling,
 )
-from swarmwire.metrics.text import listed, number, sentence
+from swarmwire.metrics.text import listed, number, number_text, sentence
 
 _LOSSES = ("share", "loss")  # last words of parameters of loss
 _GRID = 60
@@ -72,11 +74,15 @@ def resilience_curve(
     return figure
 
 
-def scaling_curve(robots: FloatArray, value: FloatArray, title: str, level: float) -> Any:
-    """The figure of a value (k,) over numbers of robots (k,); `level`: the value of ideal scaling."""
+def scaling_curve(
+    robots: FloatArray, value: FloatArray, intervals: Sequence[Interval], title: str, level: float
+) -> Any:
+    """The figure of a value (k,) and its intervals over numbers of robots (k,); `level`: the value of ideal scaling."""
     figure, axes = column_axes(title, "robots")
     axes.axhline(level, color=SOFT, lw=0.7, ls="--", zorder=1)
     known = np.isfinite(value)
+    low, high = np.array(intervals).T
+    axes.vlines(robots[known], low[known], high[known], color=CURVE, lw=1.0)
     axes.plot(robots[known], value[known], "o-", color=CURVE, lw=1.3, ms=3.6)
     if fits_log(robots):
         set_log(axes.xaxis)
@@ -106,7 +112,7 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
         return None
     grows = f" Not falling, and so without a curve: {listed(list(dict.fromkeys(growing)))}." if growing else ""
     text = (
-        "Remaining share of a response: its mean relative to that without loss, with 95 % intervals of the means. A "
+        "Remaining share of a response: its mean relative to that without loss, with 95 % intervals over seeds. A "
         "time counts by its reciprocal (a rate), and as 0 if it is never reached. A line and an "
         f"exponential are fitted to all runs; the red one has the lower AIC.{grows}"
     )
@@ -178,38 +184,79 @@ def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | 
     if not parts:
         return None
     text = (
-        "Speed-up X is the mean time of the smallest swarm over that of N robots, a run that was cut off counting "
-        "with the time until then; efficiency is X per robot, 1 where each does as much as one of the smallest "
-        "swarm (dashed). The serial fraction of Karp and Flatt is the share of the work that does not gain from "
-        "more robots: 0 at best, 1 if they gain nothing, more if they are in one another's way."
+        "Speed-up X is the mean time of the smallest swarm over that of N robots, with 95 % intervals over seeds; "
+        "efficiency is X per robot, 1 where each does as much as one of the smallest swarm (dashed). Times count up to "
+        "one restriction time for all N, in the caption. The serial fraction of Karp and Flatt is the share of the "
+        "work that does not gain from more robots: 0 at best, 1 if they gain nothing, more if they are in one "
+        "another's way."
     )
     return Section("Scaling", (text, *parts))
 
 
+@dataclass(frozen=True)
+class _Scaled:
+    """Mean times of several sizes up to one restriction time, and their scaling with intervals over seeds."""
+
+    mean_s: FloatArray  # (sizes,)
+    horizon_s: float
+    found: Scaling
+    intervals: dict[str, list[Interval]]  # by name of a field of `found`
+
+
+def _scaled(robots: FloatArray, samples: Sequence[Sample]) -> _Scaled:
+    horizon = common_horizon(samples)
+    means = np.array([kaplan_meier(sample).restricted_mean(horizon) for sample in samples])
+    seeds = np.unique(np.concatenate([sample.seed for sample in samples]))
+    counts = drawn(len(seeds))
+    resampled = [
+        resampled_restricted_means(sample, counts[:, np.searchsorted(seeds, sample.seed)], horizon)
+        for sample in samples
+    ]
+    of_resamples = scaling(robots, np.stack(resampled, axis=1), is_time=True)
+    intervals = {
+        name: [percentile_interval(column, len(seeds)) for column in getattr(of_resamples, name).T]
+        for name in ("speed_up", "efficiency", "serial_fraction")
+    }
+    return _Scaled(means, horizon, scaling(robots, means, is_time=True), intervals)
+
+
 def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure | Table]:
     assert levels.number is not None
-    means = np.array([samples.summary(response, tuple(levels.points(level))).mean for level in range(len(levels))])
-    if not np.isfinite(means).any() or not means[0] > 0.0:
+    by_size = [samples.sample(response, tuple(levels.points(level))) for level in range(len(levels))]
+    full = [place for place, sample in enumerate(by_size) if len(sample)]
+    if len(full) < 2 or full[0] != 0 or not by_size[0].value.max() > 0.0:
         return []
-    found = scaling(levels.number, means, is_time=True)
+    robots, labels = levels.number[full], [levels.labels[place] for place in full]
+    scaled = _scaled(robots, [by_size[place] for place in full])
     figures: list[Figure | Table] = []
-    kinds = (("efficiency", found.efficiency, 1.0), ("serial fraction", found.serial_fraction, 0.0))
-    for what, value, level in kinds:
+    for field, level in (("efficiency", 1.0), ("serial_fraction", 0.0)):
+        what = field.replace("_", " ")
         name = figure_name(what, response.column, levels.path)
-        drawn = scaling_curve(levels.number, value, what, level)
-        figures.append(
-            Figure(name, as_svg(drawn, name), f"{what.capitalize()} of {response_title(response)}, `{levels.path}`.")
-        )
-    return [*figures, _table(response, levels, means.tolist(), found)]
+        drawn_curve = scaling_curve(robots, getattr(scaled.found, field), scaled.intervals[field], what, level)
+        caption = f"{what.capitalize()} of {response_title(response)}, `{levels.path}`."
+        figures.append(Figure(name, as_svg(drawn_curve, name), caption))
+    return [*figures, _table(response, levels.path, labels, scaled)]
 
 
-def _table(response: Response, levels: Levels, means: list[float], found: Scaling) -> Table:
-    rounded = rounding_of(means).text
+def _table(response: Response, path: str, labels: Sequence[str], scaled: _Scaled) -> Table:
+    rounded = rounding_of(scaled.mean_s.tolist()).text
     rows = tuple(
-        (label, rounded(mean), *map(Rounding(3).text, values))
-        for label, mean, *values in zip(
-            levels.labels, means, found.speed_up, found.efficiency, found.serial_fraction, strict=True
+        (
+            label,
+            rounded(mean),
+            *(
+                _with_interval(getattr(scaled.found, name)[place], scaled.intervals[name][place])
+                for name in scaled.intervals
+            ),
         )
+        for place, (label, mean) in enumerate(zip(labels, scaled.mean_s.tolist(), strict=True))
     )
-    header = (levels.path, f"mean time in {response.unit}", "speed-up", "efficiency", "serial fraction")
-    return Table(header, rows, f"Scaling of {response_title(response)}")
+    header = (path, f"mean time in {response.unit}", "speed-up", "efficiency", "serial fraction")
+    restricted = f"{number_text(scaled.horizon_s)} {response.unit}"
+    return Table(header, rows, f"Scaling of {response_title(response)}, each time counted up to {restricted}")
+
+
+def _with_interval(value: float, interval: Interval) -> str:
+    text = Rounding(3).text
+    known = np.isfinite(interval).all() and interval.low < interval.high
+    return f"{text(value)} ({text(interval.low)} to {text(interval.high)})" if known else text(value)

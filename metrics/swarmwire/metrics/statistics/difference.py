@@ -14,10 +14,18 @@ from scipy import stats
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval, resampled_means, resampled_medians
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
-from swarmwire.metrics.statistics.survival import kaplan_meier, log_rank, paired_p, resampled_quantiles, surely_less
+from swarmwire.metrics.statistics.survival import (
+    common_horizon,
+    kaplan_meier,
+    log_rank,
+    paired_p,
+    resampled_quantiles,
+    surely_less,
+)
 
 Test = Literal["Wilcoxon signed-rank", "Mann-Whitney", "paired Gehan", "log-rank"]
 MIN_PAIRS = 2
+MAX_DISCRETE = 10  # distinct values of a discrete outcome, in both samples
 
 
 def cliffs_delta(first: Sample, second: Sample) -> float:
@@ -85,7 +93,8 @@ class Difference:
     median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond the observed times
     mean: float  # of times: of min(time, horizon)
     mean_interval: Interval  # bootstrap
-    horizon: float  # of times: up to when every run was watched; inf of numbers
+    horizon: float  # of times: up to when every run was observed; inf of numbers
+    is_discrete: bool  # numbers of few values, whose medians hardly move: the mean tells more
     delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values of both
     g: float  # Hedges'; NaN of times
     p: float  # two-sided, of the test; NaN: not defined
@@ -99,19 +108,25 @@ def difference(first: Sample, second: Sample, level: float = LEVEL) -> Differenc
     one, other = (first.of_seeds(seeds), second.of_seeds(seeds)) if paired else (first, second)
     if not (len(one) and len(other)):
         test: Test = "log-rank" if first.kind == "time" else "Mann-Whitney"
-        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, math.inf, math.nan, math.nan, math.nan, test)
+        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, math.inf, False, math.nan, math.nan, math.nan, test)
     pairs = len(seeds) if paired else 0
     delta = cliffs_delta(second, first)
     if first.kind == "time":
-        horizon = _horizon(one, other)
+        horizon = common_horizon([one, other])
         least = (np.minimum(one.value, horizon), np.minimum(other.value, horizon))
         p, test = (paired_p(one, other), "paired Gehan") if paired else (log_rank(one, other).p, "log-rank")
         median, mean = _medians_of_times(one, other, paired, level), _means(*least, paired, level)
-        return Difference(pairs, *median, *mean, horizon, delta, math.nan, p, test)
+        return Difference(pairs, *median, *mean, horizon, False, delta, math.nan, p, test)
     p, test = _p_of_numbers(one.value, other.value, paired)
     median, mean = _medians(one.value, other.value, paired, level), _means(one.value, other.value, paired, level)
     g = hedges_g(second.value, first.value)
-    return Difference(pairs, *median, *mean, math.inf, delta, g, p, test)
+    return Difference(pairs, *median, *mean, math.inf, _is_discrete(one.value, other.value), delta, g, p, test)
+
+
+def _is_discrete(one: FloatArray, other: FloatArray) -> bool:
+    """Whether there are few distinct values, most of them more than once."""
+    distinct = len(np.unique(np.concatenate([one, other])))
+    return distinct <= min(MAX_DISCRETE, (len(one) + len(other)) // 2)
 
 
 def _medians(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tuple[float, Interval]:
@@ -145,12 +160,6 @@ def _medians_of_times(one: Sample, other: Sample, paired: bool, level: float) ->
     unknown, n = np.isnan(resampled), min(len(one), len(other))
     low = percentile_interval(np.where(unknown, -np.inf, resampled), n, level).low
     return median, Interval(low, percentile_interval(np.where(unknown, np.inf, resampled), n, level).high)
-
-
-def _horizon(one: Sample, other: Sample) -> float:
-    """Up to when every run was watched: the first end of one that still waited; the last time if none did."""
-    ends = np.concatenate([one.value[~one.observed], other.value[~other.observed]])
-    return float(ends.min()) if len(ends) else float(max(one.value.max(), other.value.max()))
 
 
 def _p_of_numbers(one: FloatArray, other: FloatArray, paired: bool) -> tuple[float, Test]:

@@ -1,7 +1,7 @@
 """Samples of the results of runs, right-censored where a run ended first, and intervals of confidence."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -23,6 +23,9 @@ class Sample:
     kind: Kind = "number"  # quantiles of times are Kaplan and Meier's, censored or not
     failed: int = 0  # runs that ended in an error
     undefined: int = 0  # runs that ended well with nothing to measure
+    # (k,) Of a time: how long runs were observed that a stop condition ended before it. If the condition has to do with
+    # the event, they are not censored by chance, and estimates mislead.
+    stopped_first: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @cached_property
     def censored(self) -> float:

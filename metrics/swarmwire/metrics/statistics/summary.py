@@ -30,6 +30,8 @@ class Summary:
     failed: int  # runs that ended in an error
     undefined: int  # runs that ended well with nothing to measure
     censored: float  # share of the values, 0 to 1; 0 for numbers
+    stopped_first: int  # runs that a stop condition ended before the time, and so not by chance
+    shortest: float  # observation of these runs; NaN of none
     q25: float
     q50: float
     q75: float
@@ -47,7 +49,7 @@ def summary(sample: Sample, level: float = LEVEL) -> Summary:
     """
     if not len(sample):
         nan = math.nan
-        return Summary(0, 0, sample.failed, sample.undefined, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan)
+        return Summary(0, 0, sample.failed, sample.undefined, nan, 0, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan)
     describe = _times if sample.kind == "time" else _numbers
     return describe(sample, level)
 
@@ -58,7 +60,8 @@ def _numbers(sample: Sample, level: float) -> Summary:
     median = percentile_interval(resampled_medians(value, sample.seed), seeds, level)
     mean = percentile_interval(resampled_means(value, sample.seed), seeds, level)
     counts = len(sample), seeds, sample.failed, sample.undefined
-    return Summary(*counts, 0.0, q25, q50, q75, float(value.mean()), median, mean, float(value.max()))
+    quartiles = q25, q50, q75
+    return Summary(*counts, 0.0, 0, math.nan, *quartiles, float(value.mean()), median, mean, float(value.max()))
 
 
 def _times(sample: Sample, level: float) -> Summary:
@@ -70,6 +73,8 @@ def _times(sample: Sample, level: float) -> Summary:
         sample.failed,
         sample.undefined,
         sample.censored,
+        len(sample.stopped_first),
+        float(sample.stopped_first.min()) if len(sample.stopped_first) else math.nan,
         curve.quantile(0.25),
         curve.quantile(0.5),
         curve.quantile(0.75),

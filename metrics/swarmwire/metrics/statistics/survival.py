@@ -6,6 +6,7 @@ still counts among them.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any, NamedTuple
@@ -128,6 +129,12 @@ def _resampled(sample: Sample, drawn: Counts) -> tuple[FloatArray, FloatArray]:
     at_risk = np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]
     events = counts * sample.observed[order]
     return sample.value[order], np.cumprod(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
+
+
+def common_horizon(samples: Sequence[Sample]) -> float:
+    """Up to when every run was observed: the first end of one that still waited; the last time if none did."""
+    ends = np.concatenate([sample.value[~sample.observed] for sample in samples])
+    return float(ends.min()) if len(ends) else max(float(sample.value.max()) for sample in samples)
 
 
 class LogRank(NamedTuple):

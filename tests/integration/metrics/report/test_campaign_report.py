@@ -110,6 +110,32 @@ def test_many_points_are_put_together_into_ranges(tmp_path):
     assert rows[0][1] == "0.000–0.090"
 
 
+def test_pooled_tables_count_runs_and_seeds(tmp_path):
+    vary = {"radio.loss": [place / 100 for place in range(16)], "robots.flock.count": [1, 2, 3, 4, 5]}
+    _, shown = of(ordinary(tmp_path, vary=vary, seeds=FEW), ["order"])
+    rows = shown.table("parameter", "value")
+    assert [row[2:4] for row in rows] == [["30", "6"]] * 16 + [["96", "6"]] * 5
+
+
+def test_runs_that_a_stop_condition_ended_first_have_a_column(tmp_path):
+    times = {"slow_s": lambda *_: 60.0}
+    _, shown = of(ordinary(tmp_path, times=times, stopped={0: 8.5, 1: 20.0}), ["slow_s"])
+    rows = shown.table("radio.loss", "n")
+    assert [row[-1] for row in rows] == ["2 of 6, from 8.5 s", "–", "–", "–"]
+
+
+def test_scaling_has_intervals_and_one_restriction_time(tmp_path):
+    def time_s(point, rng):
+        return float(rng.exponential(100.0 / point["robots.flock.count"]))
+
+    _, shown = of(ordinary(tmp_path, vary={"robots.flock.count": COUNTS}, seeds=range(30), times={"task_s": time_s}))
+    rows = shown.table("robots.flock.count", "mean time in s")
+    assert rows[0][2:] == ["1.000", "1.000", "–"]
+    for row in rows[1:]:
+        value, low, high = (float(part) for part in row[2].replace("(", "").replace(")", "").replace("to ", "").split())
+        assert low < value < high
+
+
 def test_numbers_in_the_table_are_those_of_the_runs(tmp_path):
     values = iter([3.0, 1.0, 2.0, 5.0, 4.0, *[7.5] * 5])
     numbers = {"gap_m.final": lambda *_: next(values)}
@@ -364,7 +390,9 @@ def test_resilience_and_scaling_are_drawn_of_a_few_points():
     share = np.array([0.0, 0.5])
     shapes = [FittedShape("linear", share, 1.0 - share, better=True)]
     assert as_svg(resilience_curve(share, 1.0 - share, share, share, shapes, "what", "x"), "a")
-    assert as_svg(scaling_curve(np.array([5.0, 50.0, 500.0]), np.array([np.nan, 1.0, 2.0]), "what", 1.0), "a")
+    assert as_svg(
+        scaling_curve(np.array([5.0, 50.0, 500.0]), np.array([np.nan, 1.0, 2.0]), [(1.0, 2.0)] * 3, "what", 1.0), "a"
+    )
 
 
 @pytest.mark.parametrize(

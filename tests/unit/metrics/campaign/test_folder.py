@@ -89,6 +89,15 @@ def test_a_time_that_never_came_is_censored_where_its_run_ended(tmp_path):
     assert soon.observed.all()
 
 
+def test_runs_that_a_stop_condition_ended_before_the_time_are_counted(tmp_path):
+    times = {"slow_s": lambda *_: 60.0, "soon_s": lambda *_: 3.0, "stop_time_s": lambda *_: None}
+    folder = write_campaign(tmp_path / "a", times=times, stopped={0: 8.5, 2: 20.0})
+    slow, soon, stop = (CampaignFolder(folder).sample(name, 0) for name in times)
+    assert slow.stopped_first.tolist() == [8.5, 20.0]
+    assert not len(soon.stopped_first)
+    assert not len(stop.stopped_first)  # of itself it is the end of the run
+
+
 def test_a_number_that_was_not_to_be_measured_is_undefined(tmp_path):
     numbers = {"gap_m.final": lambda _, rng: None if rng.random() < 0.5 else 1.0}
     sample = CampaignFolder(write_campaign(tmp_path / "a", numbers=numbers)).sample("gap_m", 0)
@@ -282,6 +291,44 @@ def test_the_table_says_how_many_failed_are_missing_and_what_it_shows(tmp_path, 
     assert all(text in told for text in (f"A: {plain} (30 ", f"B: {part} (", "29 of 30", "2 failed", "95 %"))
     assert [len(cells(found, row)) for row in found.rows] == [len(COLUMNS)] * 9
     assert cells(found, found.rows[0])[-1] == "8"
+
+
+def test_times_of_runs_that_a_stop_condition_ended_are_warned_of(tmp_path, plain):
+    times = {"slow_s": lambda *_: 60.0}
+    cut, whole = (
+        write_campaign(tmp_path / name, times=times, stopped=stopped)
+        for name, stopped in (("cut", {0: 8.5, 11: 30.0}), ("whole", None))
+    )
+    warned = [line for line in notes(compared(cut, whole, "slow_s")) if line.startswith("slow_s:")]
+    assert len(warned) == 1
+    assert "2 of 60" in warned[0]
+    assert "8.5 s" in warned[0]
+    assert not [line for line in notes(compared(plain, plain)) if "[stop]" in line]
+
+
+def test_of_a_discrete_outcome_the_means_are_compared(tmp_path):
+    one, other = (
+        write_campaign(tmp_path / str(share), numbers={"groups.final": lambda _, rng, p=share: float(rng.random() < p)})
+        for share in (0.1, 0.4)
+    )
+    found = compared(one, other, "groups")
+    row = found.rows[0]
+    assert cells(found, row)[4].endswith("(mean)")
+    assert float(cells(found, row)[4].split()[0]) == pytest.approx(row.difference.mean, abs=0.005)
+    assert any(line.startswith("(mean)") for line in notes(found))
+
+
+def test_medians_of_another_sign_than_the_difference_are_noted(tmp_path):
+    """Seeds 1 to 3: A 0, 10, 11 and B 1, 9.5, 12: differences 1, -0.5, 1 beside medians 10 and 9.5."""
+    values = {"a": iter([0.0, 10.0, 11.0]), "b": iter([1.0, 9.5, 12.0])}
+    one, other = (
+        write_campaign(
+            tmp_path / name, {}, points=[{}], seeds=(1, 2, 3), numbers={"gap_m.final": lambda *_, of=of: next(of)}
+        )
+        for name, of in values.items()
+    )
+    found = compared(one, other, "gap_m")
+    assert any(line.startswith("gap_m.final at all") and "sign" in line for line in notes(found))
 
 
 def test_samples_without_a_seed_in_common_are_said_to_be(tmp_path, plain):

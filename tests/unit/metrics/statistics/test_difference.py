@@ -45,6 +45,18 @@ def test_what_seeds_share_does_not_blur_a_difference():
     assert (apart.pairs, apart.test) == (0, "Mann-Whitney")
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "discrete"),
+    [
+        ([1.0, 1.0, 2.0, 1.0], [1.0, 2.0, 2.0, 1.0], True),
+        ([0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8], False),
+        (np.repeat(np.arange(11.0), 4), np.repeat(np.arange(11.0), 4), False),
+    ],
+)
+def test_numbers_of_few_values_are_discrete(one, other, discrete):
+    assert difference(numbers(one), numbers(other)).is_discrete == discrete
+
+
 @settings(max_examples=4)  # each resamples two samples, twice
 @given(number_samples, number_samples)
 def test_turning_the_two_turns_the_sign(one, other):

@@ -207,6 +207,9 @@ class StopTable(Table):
     """When it is below this."""
     hold_s: float = Field(default=0.0, ge=0, le=1e9, json_schema_extra={"unit": "s"})
     """How long that must hold, in every tick; with 0 the first tick in which it does is enough."""
+    keep_running: bool = False
+    """Whether the arena runs on to `duration_s`, so that other times and final values are not cut; only the time of
+    stopping is recorded then."""
 
     @model_validator(mode="after")
     def _one_comparison(self) -> "StopTable":
