@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import custom_class, entry_points_of
 from swarmwire.metrics.metric import Kind, Metric, Need
-from swarmwire.metrics.network.age_of_information import AgeOfInformation
+from swarmwire.metrics.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
 from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent
 from swarmwire.metrics.network.delivery import Airtime, LinkPacketDeliveryRatio, PacketDeliveryRatio, Throughput
 from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
@@ -43,6 +43,7 @@ METRICS: Mapping[str, type[Metric]] = {
         RejoinWorst,
         Unrejoined,
         AgeOfInformation,
+        PeakAgeOfInformation,
         Throughput,
         Airtime,
         Collisions,

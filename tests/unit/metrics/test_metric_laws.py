@@ -104,6 +104,7 @@ LAWS = {name: Laws() for name in METRICS} | {
     "rejoin_median": FRAGMENTS,
     "rejoin_worst": FRAGMENTS,
     "age_of_information": Laws(radio=True, pause=a_tick_older),
+    "peak_age_of_information": WINDOW,
     "throughput": Laws(nobody=0.0, lone=0.0, radio=True, pause=nothing),
     "airtime": Laws(lone=0.0, radio=True, pause=None),
     "pdr": WINDOW,

@@ -69,6 +69,7 @@ def plan_of(spec: SweepSpec) -> Plan:
     for vary in spec.varied:
         if vary.path in FIXED or vary.path == "format":
             raise vary.refused(f"expected another path: {vary.path} cannot vary")
+        _refuse_overrides_of(vary, spec.overrides)
     points = points_of(spec.design, spec.varied, spec.points, spec.design_seed, whole_numbers(scenario))
     if len(points) * len(spec.seeds) > MAX_RUNS:
         raise BadInput("--seeds", "", f"expected at most {MAX_RUNS} runs, got {len(points) * len(spec.seeds)}")
@@ -96,6 +97,15 @@ def _scenario_of(spec: SweepSpec) -> Scenario:
     if isinstance(given, Scenario):
         return scenario_from(mapping_of(given), given.source, spec.overrides)
     return load_scenario(given, spec.overrides)
+
+
+def _refuse_overrides_of(vary: Vary, overrides: Sequence[str]) -> None:
+    """BadInput for an override of all points that the values of each point would replace."""
+    for override in overrides:
+        path = override.partition("=")[0].strip()
+        if f"{path}.".startswith(f"{vary.path}."):
+            expected = f"expected a path that does not vary: {vary.where} replaces this value at every point"
+            raise BadInput(f"--set {override}", path, expected)
 
 
 def overrides_of(point: Point) -> list[str]:

@@ -127,6 +127,10 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     console.print(_worth(tuned, tuned.best, tuned.check))
     of, difference, interval = gained(tuned.check, tuned.tuning.goal)
     console.print(f"best less own on fresh seeds, {of}: {difference_text(difference, interval)}", markup=False)
+    for search in tuned.tuning.searches:
+        if (end := search.end_at(tuned.best.parameters[search.path])) is not None:
+            text = f"{search.path} is best at the end of its range, {parameter_text(end)}: search further there"
+            console.print(text, markup=False, soft_wrap=True)
     if failed:
         example = f"trial {failed[0].number}: {failed[0].why}"
         text = f"failed: {len(failed)} of {len(tuned.trials)} trials, such as {example}"

@@ -113,6 +113,7 @@ MAX_PARALLEL = 1000
 OPTION = "--check-seeds"
 ABOUT = "tuning.json"
 FORMAT = 1
+NEAR_END = 0.01  # of a range
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,16 @@ class Search:
     def trials(self) -> tuple[Any, ...]:
         """Values that must be fit for the scenario: all choices, or both ends."""
         return self.choices or (self._number(self.low), self._number(self.high))
+
+    def end_at(self, parameter: Parameter) -> float | None:
+        """The end of the range at which the parameter is, within 1 % of the range; None: at neither, or a choice."""
+        if self.choices:
+            return None
+        low, high, at = self.low, self.high, float(parameter)
+        if self.log:
+            low, high, at = math.log(low), math.log(high), math.log(at)
+        margin = NEAR_END * (high - low)
+        return self.low if at <= low + margin else self.high if at >= high - margin else None
 
     def value(self, parameter: Parameter) -> Any:
         """The scenario's value that a parameter stands for."""

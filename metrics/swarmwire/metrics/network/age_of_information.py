@@ -1,4 +1,4 @@
-"""Age of information: how old the newest is that robots know of one another."""
+"""Age of information: how old the newest is that robots know of one another, and how old it gets before an update."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -12,6 +12,7 @@ from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.network.delivery import OfWindow, Window
 
 MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1
@@ -54,17 +55,75 @@ class AgeOfInformation(Metric):
         return measure
 
 
+@dataclass(frozen=True)
+class PeakAgeOfInformation(OfWindow):
+    """Mean over updates in the last `window_s` of t - u: t when a newer packet was received, u when the last was sent.
+
+    The age of a pair falls with each update; its value just before is its peak. A first packet has no peak, and one
+    that a newer one overtook is no update. Pairs are those of `age_of_information`. NaN without an update.
+
+    Source: M. Costa, M. Codreanu, A. Ephremides, On the age of information in status update systems with packet
+    management, IEEE Transactions on Information Theory 62(4), 2016.
+    """
+
+    name = "peak_age_of_information"
+    help = "age of what a robot knew of another just before a newer packet came, mean over such updates in the window"
+    unit = "s"
+    needs = ()
+    bounds = (0.0, None)
+
+    def begin(self, static: Static) -> Measure:
+        """A fresh measure, which keeps when the newest packet of each pair was sent, and the window's ticks."""
+        place, sent_at_ns = _places(static)
+        window = Window(static, self.window_s, 2)
+
+        def measure(view: TickView) -> FloatArray | float:
+            ended = view.truth.finished
+            if ended is None:
+                return np.nan
+            peaks = np.zeros((2, static.arenas), np.int64)
+            by_time = np.argsort(ended.final_at_ns, kind="stable")
+            links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns, ended.final_at_ns
+            _add_peaks(by_time, *links, place, sent_at_ns, peaks)
+            total_ns, updates = window.add(peaks)
+            return total_ns / np.where(updates > 0, updates * NS_PER_S, np.nan)
+
+        return measure
+
+
+@njit()
+def _add_peaks(by_time, fate, arena, receiver, sender, sent_at_ns, final_at_ns, place, newest_ns, peaks):
+    """Put in what was received; add the sum of peaks in ns and their number, (2, arenas)."""
+    for i in by_time:
+        if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:
+            continue
+        a, s, r = arena[i], sender[i], place[receiver[i]]
+        before_ns = newest_ns[a, s, r]
+        if sent_at_ns[i] > before_ns:
+            newest_ns[a, s, r] = sent_at_ns[i]
+            if before_ns != NEVER:
+                peaks[0, a] += final_at_ns[i] - before_ns
+                peaks[1, a] += 1
+
+
+def _places(static: Static) -> tuple[IntArray, IntArray]:
+    """The place of each robot among receivers (robots,), and when the newest of each pair was sent: never yet.
+
+    The latter is (arenas, robots, receivers), by sender first: rows of a packet stand together, and so do the places
+    that they write to.
+    """
+    every = -(-static.robots * static.robots // MAX_PAIRS)  # robots from one receiver to the next
+    index = np.arange(static.robots)
+    place = np.where(index % every == 0, index // every, NOT_COUNTED)
+    return place, np.full((static.arenas, static.robots, -(-static.robots // every)), NEVER, np.int64)
+
+
 class Newest:
     """When the newest packet of each pair was sent, with its sum over pairs of robots alive, in ns."""
 
     def __init__(self, static: Static) -> None:
         arenas, robots = static.arenas, static.robots
-        self._every = -(-robots * robots // MAX_PAIRS)  # robots from one receiver to the next
-        receivers = -(-robots // self._every)
-        index = np.arange(robots)
-        self._place: IntArray = np.where(index % self._every == 0, index // self._every, NOT_COUNTED)  # as a receiver
-        # By sender first: rows of a packet stand together, and so do the places that they write to.
-        self._sent_at_ns: IntArray = np.full((arenas, robots, receivers), NEVER, np.int64)
+        self._place, self._sent_at_ns = _places(static)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
         self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
@@ -90,7 +149,7 @@ class Newest:
 
     def _count_again(self) -> None:
         counts = self._sent_at_ns != NEVER
-        counts &= self._alive[:, :, None] & self._alive[:, None, :: self._every]
+        counts &= self._alive[:, :, None] & self._alive[:, None, self._place != NOT_COUNTED]
         self._pairs = np.count_nonzero(counts, axis=(1, 2))
         by_sender_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
         self._total_ns = [sum(own) for own in by_sender_ns.tolist()]

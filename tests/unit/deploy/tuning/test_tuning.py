@@ -22,6 +22,21 @@ def test_a_range_holds_numbers_whole_ones_where_the_scenarios_are():
     assert search("a=0.02:0.2").override(0.1) == "a=0.1"
 
 
+@pytest.mark.parametrize(
+    ("text", "value", "end"),
+    [
+        ("a=0:1", 0.995, 1.0),
+        ("a=0:1", 0.005, 0.0),
+        ("a=0:1", 0.5, None),
+        ("a=1:10000:log", 1.05, 1.0),
+        ("a=1:10000:log", 150.0, None),
+        ("a=discs,pymunk", "discs", None),
+    ],
+)
+def test_a_value_at_the_end_of_its_range_is_known(text, value, end):
+    assert search(text).end_at(value) == end
+
+
 def test_choices_are_toml_values_known_by_their_texts():
     found = search("a=[4.0, 4.0],[8.0, 8.0]")
     assert found.names == ("[4.0, 4.0]", "[8.0, 8.0]")

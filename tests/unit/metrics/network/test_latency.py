@@ -144,6 +144,25 @@ def test_age_is_the_mean_over_pairs_of_the_time_since_the_newest_was_sent():
     assert np.isnan(found[:, 1]).all()
 
 
+def received_at(sent_at_ms, final_at_ms):
+    """Packets from robot 0 to 1."""
+    columns = {"sent_at_ns": MS * np.array(sent_at_ms), "final_at_ns": MS * np.array(final_at_ms)}
+    return replace(links_received([0] * len(sent_at_ms), [1] * len(sent_at_ms), sent_at_ms), **columns)
+
+
+def test_a_peak_is_the_age_just_before_a_newer_packet_came():
+    of = static(2)
+    told = [
+        received_at([30], [60]),  # the first: no peak
+        received_at([110, 150], [190, 170]),  # 170 - 30; the other comes too late
+        replace(received_at([210], [230]), fate=np.array([Fate.LOST])),
+        received_at([310], [330]),  # 330 - 150
+    ]
+    seen = [truth(of, tick, finished=one) for tick, one in enumerate(told)]
+    found = in_each_tick(of, seen, "peak_age_of_information")[:, 0]
+    assert found.ravel().tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.14, 0.14, 0.16)]
+
+
 def test_a_pair_that_went_out_of_reach_ages_on():
     of, nothing = static(2), links_received([], [], [])
     apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
