@@ -21,17 +21,14 @@ from swarmwire.metrics.report.campaign_data import (
     rounding_of,
 )
 from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
-from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
-from swarmwire.metrics.statistics.sample import Interval, Sample, SeedTable
-from swarmwire.metrics.statistics.survival import common_horizon, kaplan_meier, resampled_restricted_means
+from swarmwire.metrics.statistics.sample import Interval, SeedTable
+from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
 from swarmwire.metrics.statistics.trends import (
     MIN_STRESSES,
     Degradation,
     Fit,
-    Scaling,
     degradation,
     relative_means,
-    scaling,
 )
 from swarmwire.metrics.text import listed, number, number_text, sentence
 
@@ -193,33 +190,6 @@ def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | 
     return Section("Scaling", (text, *parts))
 
 
-@dataclass(frozen=True)
-class _Scaled:
-    """Mean times of several sizes up to one restriction time, and their scaling with intervals over seeds."""
-
-    mean_s: FloatArray  # (sizes,)
-    horizon_s: float
-    found: Scaling
-    intervals: dict[str, list[Interval]]  # by name of a field of `found`
-
-
-def _scaled(robots: FloatArray, samples: Sequence[Sample]) -> _Scaled:
-    horizon = common_horizon(samples)
-    means = np.array([kaplan_meier(sample).restricted_mean(horizon) for sample in samples])
-    seeds = np.unique(np.concatenate([sample.seed for sample in samples]))
-    counts = drawn(len(seeds))
-    resampled = [
-        resampled_restricted_means(sample, counts[:, np.searchsorted(seeds, sample.seed)], horizon)
-        for sample in samples
-    ]
-    of_resamples = scaling(robots, np.stack(resampled, axis=1), is_time=True)
-    intervals = {
-        name: [percentile_interval(column, len(seeds)) for column in getattr(of_resamples, name).T]
-        for name in ("speed_up", "efficiency", "serial_fraction")
-    }
-    return _Scaled(means, horizon, scaling(robots, means, is_time=True), intervals)
-
-
 def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure | Table]:
     assert levels.number is not None
     by_size = [samples.sample(response, tuple(levels.points(level))) for level in range(len(levels))]
@@ -227,32 +197,32 @@ def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure 
     if len(full) < 2 or full[0] != 0 or not by_size[0].value.max() > 0.0:
         return []
     robots, labels = levels.number[full], [levels.labels[place] for place in full]
-    scaled = _scaled(robots, [by_size[place] for place in full])
+    scaled = scaling_of_times(robots, [by_size[place] for place in full])
     figures: list[Figure | Table] = []
     for field, level in (("efficiency", 1.0), ("serial_fraction", 0.0)):
         what = field.replace("_", " ")
         name = figure_name(what, response.column, levels.path)
-        drawn_curve = scaling_curve(robots, getattr(scaled.found, field), scaled.intervals[field], what, level)
+        drawn_curve = scaling_curve(robots, getattr(scaled.scaling, field), scaled.intervals[field], what, level)
         caption = f"{what.capitalize()} of {response_title(response)}, `{levels.path}`."
         figures.append(Figure(name, as_svg(drawn_curve, name), caption))
     return [*figures, _table(response, levels.path, labels, scaled)]
 
 
-def _table(response: Response, path: str, labels: Sequence[str], scaled: _Scaled) -> Table:
-    rounded = rounding_of(scaled.mean_s.tolist()).text
+def _table(response: Response, path: str, labels: Sequence[str], scaled: ScaledTimes) -> Table:
+    rounded = rounding_of(scaled.mean.tolist()).text
     rows = tuple(
         (
             label,
             rounded(mean),
             *(
-                _with_interval(getattr(scaled.found, name)[place], scaled.intervals[name][place])
+                _with_interval(getattr(scaled.scaling, name)[place], scaled.intervals[name][place])
                 for name in scaled.intervals
             ),
         )
-        for place, (label, mean) in enumerate(zip(labels, scaled.mean_s.tolist(), strict=True))
+        for place, (label, mean) in enumerate(zip(labels, scaled.mean.tolist(), strict=True))
     )
     header = (path, f"mean time in {response.unit}", "speed-up", "efficiency", "serial fraction")
-    restricted = f"{number_text(scaled.horizon_s)} {response.unit}"
+    restricted = f"{number_text(scaled.horizon)} {response.unit}"
     return Table(header, rows, f"Scaling of {response_title(response)}, each time counted up to {restricted}")
 
 

@@ -12,7 +12,8 @@ from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title
 from swarmwire.metrics.report.page import Figure, Section, as_svg
-from swarmwire.metrics.statistics.bootstrap import binomial_interval
+from swarmwire.metrics.statistics.bootstrap import binomial_interval, percentile_interval, resampled_means
+from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.metrics.text import number, sentence
 
@@ -22,11 +23,10 @@ _LEGEND_IN = 0.72
 _MAX_CORNERS, _MAX_TICKS = 300, 60
 
 
-def share_curve(x: FloatArray, reached: FloatArray, runs: FloatArray, title: str, x_label: str) -> Any:
-    """The figure of the share of `runs` (k,) that reached something, over x (k,), with Wilson's 95 % intervals."""
+def share_curve(x: FloatArray, share: FloatArray, intervals: Sequence[Interval], title: str, x_label: str) -> Any:
+    """The figure of the share of runs (k,) that reached something, and its intervals, over x (k,)."""
     figure, axes = column_axes(title, x_label)
-    low, high = binomial_interval(reached, runs)
-    share = reached / np.where(runs > 0, runs, np.nan)
+    low, high = np.array(intervals).T
     axes.vlines(x, low, high, color=CURVE, lw=1.0, zorder=3, clip_on=False)
     axes.plot(x, share, "o-", color=CURVE, lw=1.3, ms=3.6, zorder=4, clip_on=False)
     axes.set_ylim(0.0, 1.03)
@@ -87,9 +87,10 @@ def survival_section(samples: Samples, times: tuple[Response, ...]) -> Section |
     if not figures:
         return None
     text = (
-        "Over a number: the share of runs in which it happened before they ended, with Wilson's 95 % intervals. Over "
-        "time: the share of runs in which it has not happened yet, by Kaplan and Meier's estimate; a curve falls with "
-        "each run in which it happens, a tick on it is a run that ended before."
+        "Over a number: the share of runs in which it happened before they ended, with 95 % intervals (Wilson's; over "
+        "several design points by the bootstrap of seeds). Over time: the share of runs in which it has not happened "
+        "yet, by Kaplan and Meier's estimate; a curve falls with each run in which it happens, a tick on it is a run "
+        "that ended before."
     )
     return Section("Survival", (text, *figures))
 
@@ -98,13 +99,26 @@ def _share_figure(samples: Samples, response: Response, levels: Levels) -> Figur
     assert levels.number is not None
     name = figure_name("reached", response.column, levels.path)
     found = [samples.sample(response, tuple(levels.points(level))) for level in range(len(levels))]
-    reached = np.array([float(sample.observed.sum()) for sample in found])
-    runs = np.array([float(len(sample)) for sample in found])
+    share = np.array([1.0 - sample.censored for sample in found])
     limit = samples.limit(response)
     within = "" if limit is None else f" within {number(limit)} {response.unit}"
-    drawn = share_curve(levels.number, reached, runs, f"share of runs that reach it{within}", levels.path)
+    drawn = share_curve(
+        levels.number,
+        share,
+        [share_interval(sample) for sample in found],
+        f"share of runs that reach it{within}",
+        levels.path,
+    )
     caption = f"{sentence(response_title(response))}: share of runs that reach it{within}, over `{levels.path}`."
     return Figure(name, as_svg(drawn, name), caption)
+
+
+def share_interval(sample: Sample) -> Interval:
+    """Of the share of runs that reached it: Wilson's, over seeds where several runs have the same seed."""
+    if sample.seeds == len(sample):
+        low, high = binomial_interval(np.array([sample.observed.sum()]), np.array([len(sample)]))
+        return Interval(float(low[0]), float(high[0]))
+    return percentile_interval(resampled_means(sample.observed.astype(np.float64), sample.seed), sample.seeds)
 
 
 def _survival_figure(samples: Samples, response: Response, levels: Levels | None) -> Figure:

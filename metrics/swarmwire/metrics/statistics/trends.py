@@ -17,7 +17,6 @@ import numpy as np
 from scipy import optimize
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.statistics.bootstrap import drawn_by_seed, percentile_interval
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, SeedTable
 
@@ -195,39 +194,6 @@ def _refitted(form: Form, drawn: _Relative, a: float, b: float) -> tuple[FloatAr
             a_drawn = a_drawn + (bb * la - ab * lb) / determinant
             b_drawn = b_drawn + (aa * lb - ab * la) / determinant
     return a_drawn[:, 0], b_drawn[:, 0]
-
-
-@dataclass(frozen=True)
-class Scaling:
-    """Relative to the smallest swarm, of N0 robots; each array is of the response's shape, NaN where that is NaN or 0.
-
-    With N0 = 1 these are P(N) / (N P(1)), or T(1) / (N T(N)), and the fraction of Karp and Flatt (Comm. ACM 33, 1990),
-    as used of swarms by Harwell and Gini (arXiv 1907.03880).
-    """
-
-    robots: FloatArray  # (sizes,) N
-    reference: float  # N0
-    speed_up: FloatArray  # X = P(N) / P(N0), or T(N0) / T(N)
-    efficiency: FloatArray  # E = X N0 / N: 1 if each robot does as much as one of the smallest swarm
-    serial_fraction: FloatArray  # e = (1/X - 1/s) / (1 - 1/s), s = N / N0: 0 if E is 1, 1 if more robots gain nothing
-
-
-def scaling(robots: FloatArray, response: FloatArray, *, is_time: bool) -> Scaling:
-    """The scaling of a response (…, sizes) over numbers of robots (sizes,): work done, or the time of a task.
-
-    Leading axes may be resamples. BadInput unless there are at least two sizes, all positive, each once.
-    """
-    if len(robots) < 2 or len(np.unique(robots)) < len(robots) or robots.min() <= 0.0:
-        raise BadInput("", "robots", f"expected at least two sizes, positive and each once, got {robots.tolist()}")
-    smallest = int(np.argmin(robots))
-    known = np.where(response != 0.0, response, np.nan)
-    speed_up = known / known[..., smallest : smallest + 1]
-    if is_time:
-        speed_up = 1.0 / speed_up
-    times = robots / robots[smallest]
-    more = np.where(times > 1.0, 1.0 - 1.0 / times, np.nan)  # of the smallest itself there is no fraction
-    serial = (1.0 / speed_up - 1.0 / times) / more
-    return Scaling(robots, float(robots[smallest]), speed_up, speed_up / times, serial)
 
 
 @dataclass(frozen=True)

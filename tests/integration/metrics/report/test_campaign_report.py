@@ -18,6 +18,7 @@ from swarmwire.metrics.report.campaign_models import FittedShape, resilience_cur
 from swarmwire.metrics.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
 from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
 from swarmwire.metrics.report.page import as_svg, page, write_report
+from swarmwire.metrics.statistics.sample import Interval
 from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.report import Page, check_alone
 
@@ -434,12 +435,13 @@ def test_nothing_reaches_beyond_a_phones_screen(tmp_path, browser):
     assert f"is {PHONE_PX} of {PHONE_PX} px, beyond: </body>" in ended.stdout
 
 
-def test_the_share_of_runs_is_drawn_with_wilsons_interval():
-    axes = share_curve(np.array([0.0, 0.5]), np.array([10.0, 5.0]), np.array([10.0, 10.0]), "what", "x").axes[0]
+def test_the_share_of_runs_is_drawn_with_its_intervals():
+    intervals = [Interval(0.7225, 1.0), Interval(0.2366, 0.7634)]
+    axes = share_curve(np.array([0.0, 0.5]), np.array([1.0, 0.5]), intervals, "what", "x").axes[0]
     np.testing.assert_allclose(axes.lines[0].get_xydata(), [[0.0, 1.0], [0.5, 0.5]])
-    (intervals,) = axes.collections
+    (drawn,) = axes.collections
     np.testing.assert_allclose(
-        [segment[:, 1] for segment in intervals.get_segments()], [[0.7225, 1.0], [0.2366, 0.7634]], atol=1e-4
+        [segment[:, 1] for segment in drawn.get_segments()], [[0.7225, 1.0], [0.2366, 0.7634]], atol=1e-4
     )
 
 

@@ -222,6 +222,29 @@ def test_losses_of_links_arenas_and_directions_are_their_own():
     assert is_mean((there == there.transpose(1, 0, 2)).mean(axis=2)[pairs], 0.5)
 
 
+def test_symmetric_bursts_hit_both_directions_of_a_link_together():
+    bursts = Bursts(0.5, 0.5, symmetric=True)
+    lost = losses(bursts, 0.1, 400)
+    there, pairs = lost.reshape(ROBOTS, ROBOTS, -1), np.triu_indices(ROBOTS, 1)
+    assert np.array_equal(there[pairs], there.transpose(1, 0, 2)[pairs])
+    assert is_mean(there[pairs].mean(axis=1), 0.5)
+    neighbours = there[0, 1:-1] == there[0, 2:]  # two links of one robot
+    assert is_mean(neighbours.mean(axis=1), 0.5)
+
+
+def test_of_a_symmetric_link_times_may_come_in_any_order():
+    """The way back is 0.1 s earlier but handled later; the correlation is exp(-(a + b) 0.1 s) all the same."""
+    states, ticks, one = BurstLinks(Bursts(0.5, 0.5, symmetric=True), KEYS[:1], 2 * LINKS), 400, np.arange(LINKS)
+    there, back = np.zeros((LINKS, ticks)), np.zeros((LINKS, ticks))
+    for tick in range(ticks):
+        sequence, at_ns = np.full(LINKS, tick), np.full(LINKS, (tick + 1) * NS_PER_S)
+        there[:, tick] = states.lost(one, one + LINKS, sequence, at_ns)
+        back[:, tick] = states.lost(one + LINKS, one, sequence, at_ns - NS_PER_S // 10)
+    covariance = ((there - 0.5) * (back - 0.5)).mean(axis=1)
+    assert is_mean(covariance / 0.25, np.exp(-0.4))
+    assert is_mean(back.mean(axis=1), 0.5)
+
+
 def packets(seed: int, count: int) -> tuple[np.ndarray, ...]:
     """Packets of random links in the order of their time, with the sequence numbers of their senders."""
     draws = np.random.default_rng(seed)

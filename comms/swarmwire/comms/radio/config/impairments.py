@@ -5,7 +5,7 @@ No kernels here: a scenario is read without a compiler.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
@@ -39,11 +39,16 @@ class BurstsTable:
     )
     loss_bad: float = parameter(1.0, help="probability that a packet is lost in a burst: 1-h", at_least=0, at_most=1)
     loss_good: float = parameter(0.0, help="probability that a packet is lost otherwise: 1-k", at_least=0, at_most=1)
+    symmetric: bool = parameter(False, help="whether both directions of a link are bad at the same time")
 
     def made(self) -> "Bursts":
         """The bursts; BadInput, which names the key in this table, if it says too much or too little."""
         spells, mean, steps = self._given("bad_s", "good_s"), self._given("mean_loss"), self._given(*STEPS)
-        losses = {"loss_bad": self.loss_bad, "loss_good": self.loss_good}
+        losses: dict[str, Any] = {
+            "loss_bad": self.loss_bad,
+            "loss_good": self.loss_good,
+            "symmetric": self.symmetric,
+        }
         if steps and (spells or mean):
             either = "expected either bad_s with good_s or mean_loss, or p, r and interval_s"
             raise BadInput("", next(iter(steps)), f"{either}; got {' and '.join((*spells, *mean, *steps))}")
@@ -75,6 +80,7 @@ class Bursts:
     good_s: float = parameter(10.0, help="mean time between bursts: 1 / a", unit="s", above=0, at_most=MAX_S)
     loss_bad: float = parameter(1.0, help="probability that a packet is lost in a burst", at_least=0, at_most=1)
     loss_good: float = parameter(0.0, help="probability that a packet is lost otherwise", at_least=0, at_most=1)
+    symmetric: bool = parameter(False, help="whether both directions of a link are bad at the same time")
 
     @property
     def bad_share(self) -> float:
@@ -87,7 +93,9 @@ class Bursts:
         return self.bad_share * self.loss_bad + (1.0 - self.bad_share) * self.loss_good
 
 
-def bursts_of_mean(mean_loss: float, loss_bad: float, loss_good: float, bad_s: float = 0.5) -> Bursts:
+def bursts_of_mean(
+    mean_loss: float, loss_bad: float, loss_good: float, bad_s: float = 0.5, symmetric: bool = False
+) -> Bursts:
     """Bursts of `bad_s` that are so far apart that this share of packets is lost in the long run.
 
     The share of time that is bad is (mean_loss - loss_good) / (loss_bad - loss_good). BadInput for a mean below
@@ -98,22 +106,24 @@ def bursts_of_mean(mean_loss: float, loss_bad: float, loss_good: float, bad_s: f
         raise BadInput("", "mean_loss", f"{between}; got {mean_loss:g}")
     if mean_loss == loss_good:
         # Never bad is no finite spell; a burst that loses no more than the time between is none.
-        return Bursts(bad_s, MAX_S, loss_good, loss_good)
+        return Bursts(bad_s, MAX_S, loss_good, loss_good, symmetric)
     good_s = bad_s * (loss_bad - mean_loss) / (mean_loss - loss_good)
     if good_s > MAX_S:
         seldom = f"bursts of {bad_s:g} s would be more than {MAX_S:g} s apart"
         raise BadInput("", "mean_loss", f"expected loss_good, {loss_good:g}, or more above it: {seldom}")
-    return Bursts(bad_s, good_s, loss_bad, loss_good)
+    return Bursts(bad_s, good_s, loss_bad, loss_good, symmetric)
 
 
-def bursts_from_steps(p: float, r: float, loss_bad: float, loss_good: float, interval_s: float) -> Bursts:
+def bursts_from_steps(
+    p: float, r: float, loss_bad: float, loss_good: float, interval_s: float, symmetric: bool = False
+) -> Bursts:
     """The chain that packets `interval_s` apart see as the one of netem's `gemodel p r 1-h 1-k`; needs p + r < 1.
 
     p and r are the probabilities from one packet to the next that good turns bad and bad good: (a + b) interval =
     -ln(1 - p - r), and a / b = p / r.
     """
     relaxation_s = -interval_s / math.log1p(-(p + r))
-    return Bursts(relaxation_s * (p + r) / r, relaxation_s * (p + r) / p, loss_bad, loss_good)
+    return Bursts(relaxation_s * (p + r) / r, relaxation_s * (p + r) / p, loss_bad, loss_good, symmetric)
 
 
 DISTRIBUTIONS = ("uniform", "normal", "lognormal", "pareto")

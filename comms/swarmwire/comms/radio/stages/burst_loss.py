@@ -3,7 +3,10 @@
 The chain of E. N. Gilbert (Bell Syst. Tech. J. 39, 1960) and E. O. Elliott (42, 1963) in continuous time, so that a
 burst's duration does not depend on the packet rate: good turns bad at rate a, bad turns good at rate b, and
 
-    P(bad at t + dt) = pi + (bad at t - pi) exp(-(a + b) dt),     pi = a / (a + b).
+    P(bad at t + dt) = pi + (bad at t - pi) exp(-(a + b) |dt|),     pi = a / (a + b).
+
+A chain of two states is reversible, so the same holds for dt < 0. That is needed where both directions of a link share
+a state (`symmetric`): within a tick, packets of different senders are not in the order of their times.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -49,8 +52,9 @@ class BurstParams(NamedTuple):
     """The hash table of link states, and the parameters of the chain, as input of kernels."""
 
     rows: int  # number of robots of all arenas
-    link: IntArray  # (capacity,) sender x rows + receiver, or NO_LINK
-    at_ns: IntArray  # (capacity,) time of its last use
+    symmetric: bool  # both directions of a link share a state
+    link: IntArray  # (capacity,) one end x rows + the other, or NO_LINK
+    at_ns: IntArray  # (capacity,) latest time for which its state is known
     bad: BoolArray  # (capacity,)
     links: IntArray  # (1,) number of links in the table
     a: float  # in 1/s: good turns bad
@@ -75,28 +79,41 @@ def burst_loss(params, frame):
     """BURST by the link's state, which changes with the time since its last frame; acknowledgements always pass."""
     if frame.is_ack:
         return RECEIVED
-    link = frame.sender * params.rows + frame.receiver
+    one, other = frame.sender, frame.receiver
+    if params.symmetric:
+        one, other = min(one, other), max(one, other)
+    link = one * params.rows + other
     at = _place(params.link, link)
     silent_s = np.inf
     if params.link[at] == NO_LINK:
         params.link[at] = link
         params.links[0] += 1
     else:
-        silent_s = (frame.at_ns - params.at_ns[at]) / NS_PER_S
+        silent_s = abs(frame.at_ns - params.at_ns[at]) / NS_PER_S
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, STATE + frame.attempt)
     bad = bad_after(params.bad[at], silent_s, params.a, params.b, u)
-    params.at_ns[at], params.bad[at] = frame.at_ns, bad
+    if frame.at_ns >= params.at_ns[at]:
+        params.at_ns[at], params.bad[at] = frame.at_ns, bad
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, LOSS + frame.attempt)
     return BURST if u < (params.loss_bad if bad else params.loss_good) else RECEIVED
 
 
 NO_BURSTS = BurstParams(
-    0, np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.bool_), np.zeros(1, np.int64), 1.0, 1.0, 0.0, 0.0
+    0,
+    False,
+    np.empty(0, np.int64),
+    np.empty(0, np.int64),
+    np.empty(0, np.bool_),
+    np.zeros(1, np.int64),
+    1.0,
+    1.0,
+    0.0,
+    0.0,
 )
 
 
 class BurstLoss(LossModel):
-    """The Gilbert-Elliott chain for each directed link, in continuous time.
+    """The Gilbert-Elliott chain in continuous time, for each directed link, or for both directions of one together.
 
     The states are in a sparse table: a hash by sender and receiver row, open addressing, at most half full. A link that
     was silent for so long that its past has no effect is dropped, which changes nothing.
@@ -129,7 +146,8 @@ class BurstLoss(LossModel):
             self._rebuild(from_ns, links)
         a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
         loss_bad, loss_good = float(self._bursts.loss_bad), float(self._bursts.loss_good)
-        return BurstParams(self._rows, self._link, self._at_ns, self._bad, self._links, a, b, loss_bad, loss_good)
+        table = self._link, self._at_ns, self._bad, self._links
+        return BurstParams(self._rows, self._bursts.symmetric, *table, a, b, loss_bad, loss_good)
 
     @property
     def passing(self) -> float:
