@@ -39,8 +39,9 @@ class Coverage(OfCoverage):
     tick, not on the way between two. On a torus distances are the shortest. From 0 to 1, and never less than before;
     NaN if no cell is free.
 
-    Known value: of N robots that go straight in random directions at v for t over an area A, 1 - exp(-N (pi R^2 + 2 R v
-    t) / A) is covered, R being `sensing_m` (B. O. Koopman, The theory of search II, Operations Research 4 (5), 1956).
+    Known value: N robots that go straight in random directions at v for t over an area A without walls cover
+    1 - (1 - a / A)^N, where a = pi R^2 + 2 R v t and R is `sensing_m`; for many robots 1 - exp(-N a / A) (B. O.
+    Koopman, The theory of search II, Operations Research 4 (5), 1956).
     """
 
     name = "coverage"

@@ -190,7 +190,7 @@ def test_a_step_is_found_with_its_size():
 
 
 def test_where_nothing_changes_a_step_is_found_in_one_case_of_a_hundred_at_most():
-    """0.4 % expected; more than 5 of 200 would be found by chance once in a million lists of seeds."""
+    """Of 200, more than 5 would be found by chance once in a thousand lists of seeds; these are fixed."""
     assert sum(change_point(LOSS, noise(seed)) is not None for seed in range(200)) <= 5
 
 
