@@ -69,9 +69,10 @@ def write_campaign(
     (folder / "campaign.json").write_text(json.dumps(about, indent=2))
     (folder / "scenario").mkdir()
     (folder / "scenario" / "scenario.toml").write_text(f'name = "{name}"\n')
-    rows = [
-        _row(run, point, seed, numbers, times, (stopped or {}).get(run, limit_s), failed=run in failed, draws=draws)
-        | ({"ended": "stopped"} if run in (stopped or {}) else {})
+    stops = stopped or {}
+    rows: list[dict[str, Any]] = [
+        _row(run, point, seed, numbers, times, stops.get(run, limit_s), failed=run in failed, draws=draws)
+        | ({"ended": "stopped"} if run in stops else {})
         for run, (point, seed) in enumerate(itertools.product(points, seeds))
     ]
     frame = pl.DataFrame(

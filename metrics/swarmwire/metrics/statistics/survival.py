@@ -128,7 +128,8 @@ def _resampled(sample: Sample, drawn: Counts) -> tuple[FloatArray, FloatArray]:
     counts = drawn[:, order].astype(np.float64)
     at_risk = np.cumsum(counts[:, ::-1], axis=1)[:, ::-1]
     events = counts * sample.observed[order]
-    return sample.value[order], np.cumprod(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
+    survival: FloatArray = np.multiply.accumulate(1.0 - events / np.maximum(at_risk, 1.0), axis=1)
+    return sample.value[order], survival
 
 
 def common_horizon(samples: Sequence[Sample]) -> float:
