@@ -184,6 +184,14 @@ def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
     assert (held.help, held.hold_s) == ("when this began to hold: the stop condition", 3.0)
 
 
+@pytest.mark.parametrize("override", ["radio.loss=0.1", " radio.loss = 0.1"])
+def test_an_override_of_a_path_that_varies_is_refused(scenario, override):
+    with pytest.raises(BadInput) as refused:
+        plan(scenario, "radio.loss=0,0.5", overrides=(override,))
+    assert refused.value.key == "radio.loss"
+    assert refused.value.where == f"--set {override}"
+
+
 @pytest.mark.parametrize(
     ("texts", "told"),
     [
