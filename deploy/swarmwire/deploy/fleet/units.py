@@ -52,7 +52,8 @@ async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         if state["current"] is None:
             raise HostFailed("there is no release to start", "swarmwire robots deploy")
-        if state["ActiveState"] == "active" and (state["status"] or {}).get("state") == STOP_REQUESTED:
+        status: dict[str, str] = state["status"] or {}
+        if state["ActiveState"] == "active" and status.get("state") == STOP_REQUESTED:
             raise HostFailed("an emergency stop keeps its motors off", "swarmwire robots stop, then start")
         if state["ActiveState"] == "active":
             return Result(robot.name, True, f"runs already: {state['running'] or state['current']}")
