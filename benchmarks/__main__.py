@@ -14,6 +14,7 @@ from benchmarks.campaign import campaign
 from benchmarks.deploy_fleet import deploy_fleet
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
+from benchmarks.interfaces import interfaces, interfaces_start
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import BOID, processes
 from benchmarks.radio import CASES as AIRS
@@ -48,6 +49,9 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "processes-1000": partial(processes, robots=1000, ticks=50, agent=BOID),
     "wire-over-floor": partial(wire_over_floor, robots=200, ticks=140),
     "realtime-50": partial(realtime, robots=50, runners=2, subtick_s=0.001, duration_s=30.0),
+    "interfaces-disk": partial(interfaces, radio="disk", robots=20, duration_s=20.0),
+    "interfaces-wifi": partial(interfaces, radio="wifi", robots=20, duration_s=20.0),
+    "interfaces-start-50": partial(interfaces_start, robots=50),
     "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),

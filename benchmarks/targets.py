@@ -78,6 +78,13 @@ TARGETS = {
     "realtime-50": most(
         1.5, "50 robots that relay, 2 runners, 1 ms subtick: 99 % of packets are handed over no later than so after due"
     ),
+    "interfaces-disk": most(
+        3, "20 robots that send 50 frames of 200 bytes a second: 99 % are delivered no later than so after due"
+    ),
+    "interfaces-disk-cpu": most(60, "CPU of the world for a frame, beyond that of the same run without interfaces"),
+    "interfaces-wifi": most(3, "the same over `wifi-a-6M`"),
+    "interfaces-wifi-cpu": most(60, "its CPU"),
+    "interfaces-start-50": most(10, "50 robots with an interface and a program each, from the call to the first tick"),
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
     ),

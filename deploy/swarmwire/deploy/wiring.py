@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import cast
 
-from swarmwire.comms.clock import PreciseClock, WallClock
+from swarmwire.comms.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
@@ -207,7 +207,11 @@ class RunParts:
         if replay and replay.inputs:
             acting = ReplayedBackend(backend, replay.inputs, static.arenas * static.robots, static.rate_hz)
         if self._open_interfaces:
-            acting = InterfacesBackend(cast("TimedBackend", acting), self._open_interfaces.ports)
+            acting = InterfacesBackend(
+                cast("TimedBackend", acting),
+                self._open_interfaces.ports,
+                to_ns((self._subtick_s or 0.0) * self.factor),
+            )
         acting = self.folder.recorded(acting, self._from_outside)
         self.backend = backend
         self.loop = Loop(

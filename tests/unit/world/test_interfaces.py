@@ -1,7 +1,7 @@
 """Addresses of robots' interfaces, and their frames as packets, without a kernel's devices."""
 
 import socket
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -10,11 +10,12 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.ethernet import FRAME_TAG, STATION_BROADCAST, exchanged, station
-from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets
+from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import LATE_S, MAX_READS, FramePorts
+from swarmwire.world.interfaces.backend import LATE_S, MAX_READS, FramePorts, InterfacesBackend
 from tests.support.clocks import MS, FakeClock
 
 ROBOTS = 3
@@ -178,6 +179,62 @@ def test_the_lateness_of_deliveries_is_counted(rig):
     assert report.delivery is not None
     assert report.delivery.count == 3
     assert report.delivery.worst_s == pytest.approx(LATE_S, rel=0.01)
+
+
+class Medium:
+    """A medium that keeps what is sent, and from which nothing is received."""
+
+    def __init__(self) -> None:
+        self.puts: list[tuple[int, list[int]]] = []
+
+    def send(self, put: SubtickPackets) -> None:
+        self.puts.append((put.at_ns, put.sent.sender.tolist()))
+
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
+        return ReceivedPackets.none(), NO_TX_STATUSES
+
+
+class Ticking:
+    """A backend whose tick is the given advances of its medium."""
+
+    def __init__(self, advances: list[Callable[[SubtickMedium], None]]) -> None:
+        self._advances = advances
+        self.start = self.act = self.close = None
+
+    def act_in_time(self, tick, readings, received, tx_status, medium) -> None:
+        for advance in self._advances:
+            advance(medium)
+
+
+def test_frames_of_several_robots_are_sent_at_moments_of_their_own_within_the_next_subtick(rig):
+    """All at the same moment, they would collide on a radio with carrier sense."""
+
+    def first(medium: SubtickMedium) -> None:
+        for robot in (2, 0, 1, 0):
+            rig.sends(robot, STATION_BROADCAST)
+        medium.advance(10 * MS)
+
+    medium = Medium()
+    ticking = Ticking([first, lambda medium: medium.advance(11 * MS), lambda medium: medium.advance(12 * MS)])
+    InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    times_ns = [at_ns for at_ns, _ in medium.puts]
+    assert times_ns == sorted(set(times_ns))
+    assert 10 * MS < times_ns[0] < times_ns[-1] < 11 * MS
+    assert sorted(senders for _, senders in medium.puts) == [[0, 0], [1], [2]]
+    assert rig.ports.report().sent == 4
+
+
+def test_the_frames_of_one_robot_alone_do_not_wait_and_keep_their_order(rig):
+    def first(medium: SubtickMedium) -> None:
+        for to in (1, 2, 1):
+            rig.sends(0, station(to))
+        medium.advance(10 * MS)
+
+    medium = Medium()
+    message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.of([b"\1\0"])))
+    ticking = Ticking([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
+    InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    assert medium.puts == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
 
 
 def test_a_device_that_refuses_a_frame_ends_nothing(rig):

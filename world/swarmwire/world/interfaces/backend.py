@@ -1,8 +1,8 @@
 """Frames of robots' interfaces on the radio medium, beside the agents' messages.
 
 `FramePorts` reads the frames that programs sent from the TAP devices, and writes received ones to them.
-`InterfacesBackend` gives a backend in real time a medium on which frames travel, too: in every sub-tick it puts what
-the devices hold on the medium, as packets sent at that moment, and writes what has been received. The backend inside
+`InterfacesBackend` gives a backend in real time a medium on which frames travel, too: in every sub-tick it reads what
+the devices hold, which is sent within the next one (`spread`), and writes what has been received. The backend inside
 sees the agents' packets alone.
 """
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import to_ns
+from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, addressee, exchanged
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
@@ -26,7 +27,10 @@ from swarmwire.world.interfaces.namespaces import RobotInterface
 
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
+MAX_PARTS = 256  # of lateness that are kept before they are counted, which costs as much as many of them
+SPREAD_KEY, SPREAD = derive_key("frames"), purpose("send time of frames")
 LATE_S = 0.003  # wall time after its due time from which a delivered frame counts as late
+_NOTHING = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ class FramePorts:
             self._epoll.register(tap, select.EPOLLIN)
         self._counts = Counter[str]()
         self._delivery = LatencyHistogram()
+        self._lateness: list[IntArray] = []  # in wall time, of deliveries that are not in the histogram yet
         self._sent = self._sent_bytes = self._delivered = self._delivered_bytes = self._late = 0
 
     def take(self) -> SentPackets:
@@ -71,28 +76,37 @@ class FramePorts:
                 payloads.append(exchanged(frame))
         if not robots:
             return SentPackets.none()
-        self._sent += len(robots)
-        self._sent_bytes += sum(map(len, payloads))
         return SentPackets(np.array(robots), np.array(to), Payloads.of(payloads))
+
+    def count_sent(self, frames: SentPackets) -> None:
+        """Count frames that are on the medium now."""
+        self._sent += len(frames)
+        self._sent_bytes += len(frames.payloads.data)
 
     def deliver(self, received: ReceivedPackets) -> ReceivedPackets:
         """Write the frames among these packets to their receivers' devices; returns the other packets."""
         if not len(received):
             return received
-        is_frame = (received.payloads.tags() == FRAME_TAG)[received.payload]
-        places = np.flatnonzero(is_frame)
+        payloads = received.payloads
+        is_frame = (payloads.tags() == FRAME_TAG)[received.payload]
+        places = is_frame.nonzero()[0]
         if not len(places):
             return received
-        rows = {row: exchanged(received.payloads.row(row)) for row in np.unique(received.payload[places]).tolist()}
-        # In the order of time, also of receivers that answer one another.
-        order = places[np.argsort(received.received_at_ns[places], kind="stable")]
-        for receiver, row in zip(received.receiver[order].tolist(), received.payload[order].tolist(), strict=True):
-            self._write(receiver, rows[row])
-        self._count_lateness(received.received_at_ns[order])
-        return received.select(np.flatnonzero(~is_frame))
+        at_ns = received.received_at_ns[places]
+        if len(places) > 1:  # in the order of time, also of receivers that answer one another
+            order = at_ns.argsort(kind="stable")
+            places, at_ns = places[order], at_ns[order]
+        frames: dict[int, bytes] = {}
+        for receiver, row in zip(received.receiver[places].tolist(), received.payload[places].tolist(), strict=True):
+            if row not in frames:
+                frames[row] = exchanged(payloads.row(row))
+            self._write(receiver, frames[row])
+        self._count_lateness(at_ns)
+        return received.select((~is_frame).nonzero()[0]) if len(places) < len(received) else received.select(_NOTHING)
 
     def report(self) -> InterfacesReport:
         """The frames so far."""
+        self._add_lateness()
         return InterfacesReport(
             self._sent,
             self._sent_bytes,
@@ -127,6 +141,13 @@ class FramePorts:
 
     def _count_lateness(self, received_at_ns: IntArray) -> None:
         late_ns = self._pace.behind_ns(received_at_ns)
+        self._lateness.append(late_ns)
+        if len(self._lateness) == MAX_PARTS:
+            self._add_lateness()
+
+    def _add_lateness(self) -> None:
+        late_ns = np.concatenate([_NOTHING, *self._lateness])
+        self._lateness.clear()
         self._delivery.add(late_ns)
         self._late += int((late_ns > to_ns(LATE_S)).sum())
 
@@ -143,8 +164,11 @@ def _frames(tap: int) -> list[bytes]:
 class InterfacesBackend:
     """A backend in real time with frames of interfaces beside its packets."""
 
-    def __init__(self, backend: TimedBackend, ports: FramePorts) -> None:
-        self._backend, self._ports = backend, ports
+    def __init__(self, backend: TimedBackend, ports: FramePorts, subtick_ns: int) -> None:
+        """`subtick_ns` is the interval at which frames are read, in simulated time."""
+        self._backend, self._ports, self._subtick_ns = backend, ports, subtick_ns
+        self._waiting: list[SubtickPackets] = []  # in order, from one tick into the next
+        self._reads = 0
         self.start, self.act, self.close = backend.start, backend.act, backend.close
 
     def act_in_time(
@@ -152,25 +176,58 @@ class InterfacesBackend:
     ) -> Actions:
         """As of the backend, whose medium also carries frames."""
         messages = self._ports.deliver(received)
-        return self._backend.act_in_time(tick, readings, messages, tx_status, _MediumWithFrames(medium, self._ports))
+        return self._backend.act_in_time(tick, readings, messages, tx_status, _MediumWithFrames(medium, self))
 
     def counts(self) -> dict[str, int]:
         """Faults of the backend and of the interfaces, by name."""
         return {**self._backend.counts(), **self._ports.counts()}
 
+    def send_waiting(self, medium: SubtickMedium, until_ns: int) -> None:
+        """Put the frames on the medium whose time has come."""
+        while self._waiting and self._waiting[0].at_ns <= until_ns:
+            put = self._waiting.pop(0)
+            self._ports.count_sent(put.sent)
+            medium.send(put)
+
+    def exchange(self, received: ReceivedPackets, now_ns: int) -> ReceivedPackets:
+        """Deliver frames and read new ones; returns the packets that are no frames."""
+        messages, frames = self._ports.deliver(received), self._ports.take()
+        if len(frames):
+            from_ns = max(now_ns, self._waiting[-1].at_ns) if self._waiting else now_ns
+            self._waiting += spread(frames, from_ns, self._subtick_ns, self._reads)
+            self._reads += 1
+        return messages
+
+
+def spread(frames: SentPackets, from_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
+    """The frames of one reading, each robot's at a moment of its own within the subtick from `from_ns` on.
+
+    Programs sent them at any moment of the subtick before. All at once they would collide, since a station that finds
+    the medium idle sends at once. The frames of one robot alone need not wait. `number` of the reading keys the draws.
+    """
+    senders = np.unique(frames.sender)
+    if len(senders) == 1:
+        return [SubtickPackets(from_ns, None, frames)]
+    offsets_ns = (uniform(SPREAD_KEY, senders, number, 0, SPREAD) * subtick_ns).astype(np.int64)
+    return [
+        SubtickPackets(from_ns + int(offsets_ns[k]), None, frames.select(np.flatnonzero(frames.sender == senders[k])))
+        for k in offsets_ns.argsort(kind="stable").tolist()
+    ]
+
 
 class _MediumWithFrames:
     """A medium during a tick that takes frames from devices, and delivers frames to them."""
 
-    def __init__(self, medium: SubtickMedium, ports: FramePorts) -> None:
-        self._medium, self._ports = medium, ports
-        self.send = medium.send
+    def __init__(self, medium: SubtickMedium, frames: InterfacesBackend) -> None:
+        self._medium, self._frames = medium, frames
+
+    def send(self, put: SubtickPackets) -> None:
+        """As of the medium."""
+        self._frames.send_waiting(self._medium, put.at_ns)
+        self._medium.send(put)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """As of the medium, without frames; those that programs sent by now are sent at `until_ns`."""
+        """As of the medium, without frames; those that programs have sent by now are sent from `until_ns` on."""
+        self._frames.send_waiting(self._medium, until_ns)
         received, tx_status = self._medium.advance(until_ns)
-        messages = self._ports.deliver(received)
-        frames = self._ports.take()
-        if len(frames):
-            self._medium.send(SubtickPackets(until_ns, None, frames))
-        return messages, tx_status
+        return self._frames.exchange(received, until_ns), tx_status
