@@ -1,0 +1,116 @@
+"""Unmodified cflib against emulated Crazyflies that move as they are told."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event, Thread
+
+import cflib.crtp
+import numpy as np
+import pytest
+from cflib.crazyflie import Crazyflie
+from cflib.crazyflie.log import LogConfig
+from cflib.crazyflie.syncCrazyflie import SyncCrazyflie
+from cflib.crazyflie.syncLogger import SyncLogger
+from cflib.positioning.motion_commander import MotionCommander
+from cflib.utils.multiranger import Multiranger
+
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.errors import BadInput
+from swarmwire.world.gateways.crazyflie import CrazyflieGateway
+
+TICK_S = 0.02
+
+
+class Room:
+    """A gateway of one Crazyflie, and a thread that moves it as it is told: flow and IMU are exact."""
+
+    def __init__(self) -> None:
+        self.clock = WallClock()
+        self.gateway = CrazyflieGateway(["a-0"], load_body("crazyflie"), "", None, self.clock)
+        (self.uri,) = self.gateway.open()
+        self.travelled_m = np.zeros(2)  # ahead and to the left
+        self.turned_rad = 0.0
+        self._ended = Event()
+        self._thread = Thread(target=self._pass, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End both."""
+        self._ended.set()
+        self._thread.join()
+        self.gateway.close()
+
+    def _pass(self) -> None:
+        tick, speeds = 0, np.zeros(3)
+        began_ns = self.clock.now_ns()
+        while not self._ended.is_set():
+            fields = {"flow.forward_mps": speeds[:1], "flow.left_mps": speeds[1:2], "imu.turn_radps": speeds[2:]}
+            fields["scan.range_m"] = np.array([[1.5, 0.4, np.inf, 2.0]])
+            fields["battery.voltage_v"] = np.array([3.9])
+            time_ns = round(tick * TICK_S * NS_PER_S)
+            self.gateway.publish(time_ns, fields, np.array([True]))
+            self.clock.sleep_until(began_ns + time_ns)
+            told = self.gateway.take()
+            if told.drive[0]:
+                speeds = np.array([told.linear_mps[0], told.lateral_mps[0], told.angular_radps[0]])
+            self.travelled_m += speeds[:2] * TICK_S
+            self.turned_rad += float(speeds[2]) * TICK_S
+            tick += 1
+
+
+@pytest.fixture
+def room() -> Iterator[Room]:
+    cflib.crtp.CLASSES.clear()
+    cflib.crtp.CLASSES.append(cflib.crtp.UdpDriver)  # the others look for USB devices
+    made = Room()
+    yield made
+    made.close()
+
+
+def test_motion_commander_and_multiranger_fly_it(room: Room, tmp_path: Path) -> None:
+    with SyncCrazyflie(room.uri, cf=Crazyflie(rw_cache=str(tmp_path))) as scf:
+        scf.wait_for_params()
+        assert scf.cf.param.get_value("deck.bcMultiranger") == "1"
+        assert scf.cf.supervisor.can_fly
+        with MotionCommander(scf, default_height=0.3) as commander, Multiranger(scf) as ranger:
+            commander.forward(0.3, velocity=0.5)
+            assert (ranger.front, ranger.left, ranger.back, ranger.right) == (1.5, 0.4, None, 2.0)
+            assert ranger.down == pytest.approx(0.3, abs=0.05)
+            commander.turn_left(45)
+            assert scf.cf.supervisor.is_flying
+    assert room.travelled_m == pytest.approx([0.3, 0.0], abs=0.15)  # set-points and ticks are not in step
+    assert room.turned_rad == pytest.approx(np.pi / 4, abs=0.4)
+    assert room.gateway.counts() == {}
+
+
+def test_the_high_level_commander_flies_to_a_place_and_logs_say_so(room: Room) -> None:
+    with SyncCrazyflie(room.uri, cf=Crazyflie()) as scf:
+        scf.wait_for_params()
+        commander = scf.cf.high_level_commander
+        commander.takeoff(0.5, 0.5, yaw=None)
+        place = LogConfig(name="place", period_in_ms=50)
+        for axis in "xyz":
+            place.add_variable(f"stateEstimate.{axis}", "float")
+        with SyncLogger(scf, place) as logger:
+            until(logger, lambda of: of["stateEstimate.z"] > 0.4)
+            commander.go_to(0.4, -0.2, 0.6, 0.0, 1.0)
+            until(
+                logger, lambda of: abs(of["stateEstimate.x"] - 0.4) < 0.05 and abs(of["stateEstimate.y"] + 0.2) < 0.05
+            )
+            commander.land(0.0, 0.5, yaw=None)
+            until(logger, lambda of: of["stateEstimate.z"] < 0.05)
+    assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
+
+
+def until(logger: SyncLogger, holds) -> None:
+    """Read on until it holds; the test's time-out ends what never does."""
+    for _, values, _ in logger:
+        if holds(values):
+            return
+
+
+def test_an_address_that_is_taken_is_refused(room: Room) -> None:
+    second = CrazyflieGateway(["a-0"], load_body("crazyflie"), room.uri.removeprefix("udp://"), None, room.clock)
+    with pytest.raises(BadInput, match="gateway crazyflie: address"):
+        second.open()

@@ -1,0 +1,209 @@
+"""The flight of an emulated Crazyflie: the supervisor, the height, and the speeds that the world gives it.
+
+The world moves robots in the plane, so the height is kept here: it follows the set-points at the firmware's limit, and
+falls when the motors are off. Sources: crazyflie-firmware src/modules/src/supervisor.c (states and times), commander.c
+(priorities), controller/position_controller_pid.c and platform_defaults_cf2.h (gain 2/s and limit 1 m/s towards a
+place).
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+
+import numpy as np
+
+from swarmwire.comms.angles import wrap_angle
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.robots.crazyflie.readings import (
+    ARMED_BIT,
+    CAN_FLY_BIT,
+    FLYING_BIT,
+    G_MPS2,
+    LOCKED_BIT,
+    turned,
+)
+from swarmwire.world.gateways.crazyflie.setpoints import OFF, Plane, Setpoint, setpoint_at
+from swarmwire.world.gateways.crazyflie.trajectories import Planner
+
+LEVEL_OUT_MS, SHUT_DOWN_MS, LANDED_MS, WATCHDOG_MS = 500, 2000, 2000, 1000
+GAIN_PER_S, MAX_MPS, MAX_TURN_RADPS = 2.0, 1.0, 3.5
+STEP_S = 0.01  # of the height
+AUTO_ARMED_BIT, PLANNER_ON_BIT, PLANNER_DONE_BIT, PLANNER_OFF_BIT = 2, 8, 9, 10
+
+
+class State(Enum):
+    """Of the supervisor; a locked Crazyflie runs no motor until it is switched on again."""
+
+    READY = "ready to fly"
+    FLYING = "flying"
+    LEVEL_OUT = "level out"  # no set-point for half a second
+    LOCKED = "locked"
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Speeds in the body's frame; zero on the floor."""
+
+    forward_mps: float = 0.0
+    left_mps: float = 0.0
+    turn_radps: float = 0.0
+
+
+REST = Motion()
+
+
+class Estimate:
+    """The state estimate: place, heading and speed, by the sensors that the body has.
+
+    With positioning and a compass they are in the arena's frame, else they begin at 0 and drift: the place is that of
+    the flow, the heading that of the gyro.
+
+    Attributes:
+        x_m, y_m, yaw_rad: place and heading.
+        body_mps: speed ahead and to the left.
+    """
+
+    def __init__(self) -> None:
+        self.x_m = self.y_m = self.yaw_rad = 0.0
+        self.body_mps: Plane = (0.0, 0.0)
+
+    def reset(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """Begin at this place."""
+        self.x_m, self.y_m, self.yaw_rad = x_m, y_m, yaw_rad
+
+    def follow(self, row: dict[str, FloatArray], motion: Motion, passed_s: float) -> None:
+        """Take in readings ("sensor.field" -> () or (width,)); what is lost or absent is taken from `motion`."""
+
+        def read(name: str, default: float) -> float:
+            value = float(row[name]) if name in row else default
+            return value if isfinite(value) else default
+
+        flow = read("flow.forward_mps", motion.forward_mps), read("flow.left_mps", motion.left_mps)
+        yaw = wrap_angle(self.yaw_rad + passed_s * read("imu.turn_radps", motion.turn_radps))
+        dx, dy = turned(*flow, self.yaw_rad)
+        self.body_mps, self.yaw_rad = flow, read("compass.heading_rad", yaw)
+        self.x_m = read("positioning.x_m", self.x_m + passed_s * dx)
+        self.y_m = read("positioning.y_m", self.y_m + passed_s * dy)
+
+    def place(self, height_m: float) -> FloatArray:
+        """x, y, height and yaw, (4,)."""
+        return np.array([self.x_m, self.y_m, height_m, self.yaw_rad])
+
+
+class Flight:
+    """One flight after another.
+
+    Attributes:
+        state: of the supervisor.
+        planner: the high-level commander.
+        estimate: of place and heading.
+        height_m, climb_mps: the true ones.
+        setpoint: what it follows now.
+        motion: the speeds now.
+    """
+
+    def __init__(self) -> None:
+        self.state, self.planner, self.estimate = State.READY, Planner(), Estimate()
+        self.height_m = self.climb_mps = 0.0
+        self.setpoint, self.motion = OFF, REST
+        self._low_level: tuple[Setpoint, int] | None = None  # the newest of a client, and when it came; none: planner
+        self._watchdog_ms: int | None = None
+        self._thrust_ms = -LANDED_MS
+
+    def set(self, setpoint: Setpoint, now_ms: int) -> None:
+        """A client's set-point: it has priority until `relax`."""
+        self._low_level = setpoint, now_ms
+        self.planner.stop()
+
+    def relax(self) -> None:
+        """The planner may fly again."""
+        self._low_level = None
+
+    def emergency_stop(self) -> None:
+        """Motors off for good."""
+        self.state = State.LOCKED
+
+    def feed_watchdog(self, now_ms: int) -> None:
+        """From the first call on there must be one each second."""
+        self._watchdog_ms = now_ms
+
+    def info(self, now_s: float) -> int:
+        """The log variable supervisor.info."""
+        locked, flying = self.state is State.LOCKED, self.state in (State.FLYING, State.LEVEL_OUT)
+        bits = {
+            ARMED_BIT: not locked,
+            AUTO_ARMED_BIT: True,
+            CAN_FLY_BIT: not locked,
+            FLYING_BIT: flying,
+            LOCKED_BIT: locked,
+            PLANNER_ON_BIT: self.planner.state != "idle",
+            PLANNER_DONE_BIT: self.planner.is_finished(now_s),
+            PLANNER_OFF_BIT: False,
+        }
+        return sum(1 << bit for bit, is_set in bits.items() if is_set)
+
+    def step(self, now_ms: int, passed_s: float) -> None:
+        """Follow the set-points for this long, up to now."""
+        setpoint, age_ms = self._chosen(now_ms)
+        self._supervise(setpoint, age_ms, now_ms)
+        self.setpoint = OFF if self.state is State.LOCKED else setpoint
+        for _ in range(round(passed_s / STEP_S)):
+            self._move_up(self.setpoint)
+        self.motion = self._motion(self.setpoint)
+
+    def _chosen(self, now_ms: int) -> tuple[Setpoint, int]:
+        """The set-point that counts, and how old it is in ms."""
+        if self._low_level is not None:
+            setpoint, came_ms = self._low_level
+            return setpoint, now_ms - came_ms
+        goal = self.planner.goal(0.001 * now_ms)
+        return OFF if goal is None else setpoint_at(goal), 0
+
+    def _supervise(self, setpoint: Setpoint, age_ms: int, now_ms: int) -> None:
+        if setpoint.flies and self.state is not State.LOCKED:
+            self._thrust_ms = now_ms
+        has_thrust = now_ms - self._thrust_ms < LANDED_MS
+        if self._watchdog_ms is not None and now_ms - self._watchdog_ms >= WATCHDOG_MS:
+            self.state = State.LOCKED
+        if self.state is State.READY and setpoint.flies:
+            self.state = State.FLYING
+        if self.state in (State.FLYING, State.LEVEL_OUT):
+            if age_ms > SHUT_DOWN_MS:
+                self.state = State.LOCKED
+            elif age_ms > LEVEL_OUT_MS:
+                self.state = State.LEVEL_OUT
+            else:
+                self.state = State.FLYING if has_thrust else State.READY
+
+    def _move_up(self, setpoint: Setpoint) -> None:
+        if not setpoint.flies:
+            self.climb_mps -= G_MPS2 * STEP_S
+        elif setpoint.height_m is None:
+            self.climb_mps = _limited(setpoint.climb_mps or 0.0, MAX_MPS)
+        else:
+            towards = GAIN_PER_S * (setpoint.height_m - self.height_m)
+            self.climb_mps = _limited(towards + (setpoint.climb_mps or 0.0), MAX_MPS)
+        self.height_m += self.climb_mps * STEP_S
+        if self.height_m <= 0.0:
+            self.height_m = self.climb_mps = 0.0
+
+    def _motion(self, setpoint: Setpoint) -> Motion:
+        if not setpoint.flies or self.height_m <= 0.0 or self.state is State.LEVEL_OUT:
+            return REST
+        estimate = self.estimate
+        turn = setpoint.turn_radps or 0.0
+        if setpoint.heading_rad is not None:
+            turn += GAIN_PER_S * wrap_angle(setpoint.heading_rad - estimate.yaw_rad)
+        if setpoint.body_mps is not None:
+            forward, left = setpoint.body_mps
+        else:
+            x_mps, y_mps = setpoint.world_mps or (0.0, 0.0)
+            if setpoint.place_m is not None:
+                x_mps = _limited(x_mps + GAIN_PER_S * (setpoint.place_m[0] - estimate.x_m), MAX_MPS)
+                y_mps = _limited(y_mps + GAIN_PER_S * (setpoint.place_m[1] - estimate.y_m), MAX_MPS)
+            forward, left = turned(x_mps, y_mps, -estimate.yaw_rad)
+        return Motion(forward, left, _limited(turn, MAX_TURN_RADPS))
+
+
+def _limited(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

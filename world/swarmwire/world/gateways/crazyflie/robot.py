@@ -1,0 +1,328 @@
+"""One emulated Crazyflie: what it answers to CRTP packets, what it logs, and how it flies. No I/O, no clock."""
+
+from collections import Counter
+from collections.abc import Callable
+from math import degrees, radians
+from struct import calcsize, unpack_from
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.crazyflie.readings import (
+    ARMED_BIT,
+    CAN_FLY_BIT,
+    DIRECTIONS_DEG,
+    FLYING_BIT,
+    G_MPS2,
+    LOW_POWER,
+    NO_RANGE_MM,
+    SOLID_COLOUR,
+    to_mm,
+    turned,
+    yaw_of,
+)
+from swarmwire.world.gateways.crazyflie.crtp import Errno, Packet, Port, decoded
+from swarmwire.world.gateways.crazyflie.flight import Flight, State
+from swarmwire.world.gateways.crazyflie.logs import VARIABLES, Logs
+from swarmwire.world.gateways.crazyflie.parameters import Parameters
+from swarmwire.world.gateways.crazyflie.setpoints import OFF, setpoint_of
+from swarmwire.world.gateways.crazyflie.trajectories import Piece, pieces_of
+
+PROTOCOL_VERSION = 12  # crtp.h
+FIRMWARE, DEVICE = b"emulated", b"CF21"
+GREETING = b"Bitcraze Crazyflie".ljust(30, b"\0")
+MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
+SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
+MAX_TRAJECTORIES = 10
+INFO = Packet(Port.LINK, 3, b"")  # the null packet
+
+
+class EmulatedCrazyflie:
+    """A Crazyflie that has just been switched on.
+
+    Attributes:
+        flight: where it is and how it moves.
+    """
+
+    def __init__(self, body: Body, counts: Counter[str]) -> None:
+        self._body, self._counts = body, counts
+        self.flight, self._logs = Flight(), Logs()
+        decks = {
+            "deck.bcMultiranger": body.scan is not None,
+            "deck.bcFlow2": "flow" in body.sensors,
+            "deck.bcZRanger2": "flow" in body.sensors,
+            "deck.bcLedRing": body.led_count > 0,
+            "deck.bcLighthouse4": "positioning" in body.sensors,
+        }
+        self._parameters = Parameters(decks, self._parameter_written)
+        self._memory = bytearray(MEMORY_BYTES)
+        self._trajectories: dict[int, list[Piece]] = {}
+        self._values = dict.fromkeys(VARIABLES, 0.0)
+        self._now_ms = 0
+        self._moved_ms: int | None = None
+        self._said_locked = False
+        self._answers: dict[int, Callable[[int, bytes], Packet | None]] = {
+            Port.PARAM: lambda channel, data: self._reply(Port.PARAM, channel, self._parameters.answer(channel, data)),
+            Port.LOG: lambda channel, data: self._reply(
+                Port.LOG, channel, self._logs.answer(channel, data, self._now_ms)
+            ),
+            Port.LINK: self._link,
+            Port.PLATFORM: self._platform,
+            Port.MEMORY: self._memory_access,
+            Port.COMMANDER: self._attitude,
+            Port.SETPOINT: self._setpoint,
+            Port.HIGH_LEVEL: self._high_level,
+            Port.LOCALIZATION: self._localization,
+            Port.SUPERVISOR: self._supervisor,
+        }
+
+    @property
+    def colour(self) -> int:
+        """0xRRGGBB of the LED ring; only its solid colour is shown."""
+        if self._parameters["ring.effect"] != SOLID_COLOUR:
+            return 0
+        red, green, blue = (int(self._parameters[f"ring.solid{name}"]) for name in ("Red", "Green", "Blue"))
+        return red << 16 | green << 8 | blue
+
+    def receive(self, datagram: bytes) -> bytes | None:
+        """The answer to a datagram; None: there is none. What it cannot do is counted."""
+        try:
+            packet = decoded(datagram)
+        except BadFrame as bad:
+            self._counts[bad.fault] += 1
+            return None
+        answer = self._answers.get(packet.port)
+        if answer is None:
+            self._counts["unknown_ports"] += 1
+            return None
+        reply = answer(packet.channel, packet.data)
+        return None if reply is None else reply.encoded()
+
+    def sense(self, time_ns: int, row: dict[str, FloatArray]) -> list[bytes]:
+        """Take in the readings of this time ("sensor.field" -> () or (width,)); the datagrams that are due."""
+        now_ms = time_ns // 1_000_000
+        self.flight.estimate.follow(row, self.flight.motion, 0.001 * (now_ms - self._now_ms))
+        self._now_ms = now_ms
+        self._fill(row)
+        sent = [Packet(Port.LOG, Logs.DATA, data) for data in self._logs.due(now_ms, self._values)]
+        if self.flight.state is State.LOCKED and not self._said_locked:
+            self._said_locked = True
+            sent.append(Packet(Port.CONSOLE, 0, b"SUP: Locked, reboot required\n"))
+        return [packet.encoded() for packet in sent]
+
+    def fly(self) -> None:
+        """Follow the set-points up to the time of the newest readings."""
+        passed_ms = 0 if self._moved_ms is None else self._now_ms - self._moved_ms
+        self._moved_ms = self._now_ms
+        self.flight.step(self._now_ms, 0.001 * passed_ms)
+
+    def _reply(self, port: int, channel: int, data: bytes | None) -> Packet | None:
+        return None if data is None else Packet(port, channel, data)
+
+    def _refuse(self, what: str) -> None:
+        self._counts[what] += 1
+
+    def _link(self, channel: int, data: bytes) -> Packet | None:
+        """Echo, source, sink, and the null packet, which a scan answers to."""
+        return (Packet(Port.LINK, 0, data), Packet(Port.LINK, 1, GREETING), None, INFO)[channel]
+
+    def _platform(self, channel: int, data: bytes) -> Packet | None:
+        if channel == 1 and data[:1] in (b"\0", b"\1", b"\2"):
+            told = (PROTOCOL_VERSION.to_bytes(4, "little"), FIRMWARE, DEVICE)[data[0]]
+            return Packet(Port.PLATFORM, 1, data[:1] + told)
+        if channel == 0 and data[:1] in (b"\1", b"\2"):  # arming and recovery, as clients of older firmware ask
+            return self._supervisor(1, data)
+        self._refuse("platform_commands_refused")
+        return None
+
+    def _memory_access(self, channel: int, data: bytes) -> Packet | None:
+        """The only memory is that of trajectories."""
+        if channel == 0 and data[:1] == b"\1":
+            return Packet(Port.MEMORY, 0, b"\1\1")
+        if channel == 0 and data[:1] == b"\2":
+            return Packet(
+                Port.MEMORY, 0, data[:2] + bytes([MEMORY_TYPE]) + MEMORY_BYTES.to_bytes(4, "little") + bytes(8)
+            )
+        if channel not in (1, 2) or len(data) < 6:
+            return None
+        start = int.from_bytes(data[1:5], "little")
+        end = start + (data[5] if channel == 1 else len(data) - 5)
+        if data[0] != 0 or end > MEMORY_BYTES:
+            return Packet(Port.MEMORY, channel, data[:5] + bytes([Errno.EIO]))
+        if channel == 2:
+            self._memory[start:end] = data[5:]
+        return Packet(
+            Port.MEMORY, channel, data[:5] + bytes([Errno.OK]) + (self._memory[start:end] if channel == 1 else b"")
+        )
+
+    def _attitude(self, channel: int, data: bytes) -> None:
+        """Roll, pitch, yaw rate and thrust: only the motors' end, with which cflib also closes its link."""
+        if len(data) < calcsize("<fffH") or unpack_from("<fffH", data)[3] > 0:
+            self._refuse("attitudes_refused")
+            return
+        self.flight.set(OFF, self._now_ms)
+        self.flight.relax()
+
+    def _setpoint(self, channel: int, data: bytes) -> None:
+        if channel == 1:
+            self.flight.relax()
+            return
+        setpoint = setpoint_of(data)
+        if setpoint is None:
+            self._refuse("setpoints_refused")
+        else:
+            self.flight.set(setpoint, self._now_ms)
+
+    def _high_level(self, channel: int, data: bytes) -> Packet | None:
+        result = self._plan(data)
+        if result is not Errno.OK:
+            self._refuse("plans_refused")
+        return Packet(Port.HIGH_LEVEL, channel, data[:3].ljust(3, b"\0") + bytes([result]))
+
+    def _plan(self, data: bytes) -> Errno:
+        """A command to the planner: crtp_commander_high_level.c; spirals and compressed trajectories are refused."""
+        layouts = {0: "B", 3: "B", 4: "BBfffff", 5: "BBBBf", 6: "BBBIB", 7: "Bff?f", 8: "Bff?f"}
+        layouts |= {12: "BBBfffff", 13: "BBBBBf"}
+        layout = f"<{layouts.get(data[0], '')}" if data else "<"
+        if layout == "<" or len(data) < 1 + calcsize(layout):
+            return Errno.ENOEXEC
+        values: tuple[Any, ...] = unpack_from(layout, data, 1)
+        if not np.isfinite(np.array(values, float)).all():
+            return Errno.EINVAL
+        command, (first, *rest) = data[0], values
+        if command == 0:
+            self._parameters["hlCommander.groupmask"] = first
+        elif command == 6:
+            return self._define(first, *rest)
+        elif first and not first & int(self._parameters["hlCommander.groupmask"]):
+            return Errno.OK  # it is for others
+        elif command == 3:
+            self.flight.planner.stop()
+        elif command in (7, 8):
+            height_m, yaw_rad, keeps_yaw, duration_s = rest
+            yaw = None if keeps_yaw else yaw_rad
+            done = self.flight.planner.change_height(
+                self._here, height_m, yaw, duration_s, self._now_s, land=command == 8
+            )
+            return Errno.OK if done else Errno.ENOEXEC
+        elif command in (4, 12):
+            relative, linear = rest[0], rest[1] if command == 12 else 0
+            *there, duration_s = rest[-5:]
+            self.flight.planner.go_to(
+                self._here, np.array(there), duration_s, self._now_s, relative=bool(relative), linear=bool(linear)
+            )
+        else:
+            return self._follow(*((rest[0], 0, *rest[1:]) if command == 5 else rest))
+        return Errno.OK
+
+    def _define(self, number: int, location: int, kind: int, offset: int, count: int) -> Errno:
+        pieces = pieces_of(bytes(self._memory), offset, count) if location == 1 and kind == 0 else None
+        if pieces is None or number >= MAX_TRAJECTORIES:
+            return Errno.ENOEXEC
+        self._trajectories[number] = pieces
+        return Errno.OK
+
+    def _follow(self, relative: int, relative_yaw: int, is_reversed: int, number: int, stretch: float) -> Errno:
+        if number not in self._trajectories or relative_yaw or stretch <= 0.0:
+            return Errno.ENOEXEC
+        pieces = self._trajectories[number]
+        self.flight.planner.follow(
+            pieces, self._here, stretch, self._now_s, relative=bool(relative), is_reversed=bool(is_reversed)
+        )
+        return Errno.OK
+
+    def _localization(self, channel: int, data: bytes) -> None:
+        """A place or pose from outside, which counts where the body has no positioning; and older emergency stops."""
+        if channel == 1 and data[:1] in (b"\3", b"\4"):
+            self._supervisor(1, data)
+        elif channel == 0 and len(data) == calcsize("<fff"):
+            self._placed(*unpack_from("<ff", data), self.flight.estimate.yaw_rad)
+        elif channel == 1 and data[:1] == b"\x08" and len(data) == calcsize("<B7f"):
+            x, y, _, *attitude = unpack_from("<7f", data, 1)
+            self._placed(x, y, yaw_of((attitude[0], attitude[1], attitude[2], attitude[3])))
+        else:
+            self._refuse("localization_refused")
+
+    def _placed(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        if np.isfinite([x_m, y_m, yaw_rad]).all():
+            self.flight.estimate.reset(x_m, y_m, yaw_rad)
+
+    def _supervisor(self, channel: int, data: bytes) -> Packet | None:
+        info, command = self.flight.info(self._now_s), data[0] if data else 0
+        armed = info >> ARMED_BIT & 1
+        if channel == 0 and 1 <= command <= 0x0B:
+            return Packet(Port.SUPERVISOR, 0, bytes([command | 0x80, info >> command - 1 & 1]))
+        if channel == 0 and command == 0x0C:
+            return Packet(Port.SUPERVISOR, 0, bytes([command | 0x80]) + info.to_bytes(2, "little"))
+        if channel == 1 and command == 3:
+            self.flight.emergency_stop()
+        elif channel == 1 and command == 4:
+            self.flight.feed_watchdog(self._now_ms)
+        elif channel == 1 and command == 1:  # it arms itself; to disarm it is refused
+            return Packet(Port.SUPERVISOR, 1, bytes([0x81, int(bool(armed) == (data[1:2] != b"\0")), armed]))
+        elif channel == 1 and command == 2:
+            return Packet(Port.SUPERVISOR, 1, bytes([0x82, armed, armed]))
+        return None
+
+    def _parameter_written(self, name: str) -> None:
+        value = self._parameters[name]
+        if name == "kalman.resetEstimation" and value:
+            x, y, yaw = (self._parameters[f"kalman.initial{of}"] for of in ("X", "Y", "Yaw"))
+            self.flight.estimate.reset(x, y, yaw)
+        elif name == "stabilizer.stop" and value:
+            self.flight.emergency_stop()
+        elif name == "ring.effect" and value not in (0, SOLID_COLOUR):
+            self._refuse("ring_effects_not_shown")
+
+    @property
+    def _now_s(self) -> float:
+        return 0.001 * self._now_ms
+
+    @property
+    def _here(self) -> FloatArray:
+        return self.flight.estimate.place(self.flight.height_m)
+
+    def _fill(self, row: dict[str, FloatArray]) -> None:
+        """The log variables now; a lost reading leaves them unchanged."""
+        flight, estimate = self.flight, self.flight.estimate
+        vx, vy = turned(*estimate.body_mps, estimate.yaw_rad)
+        x, y, z, yaw = estimate.x_m, estimate.y_m, flight.height_m, degrees(estimate.yaw_rad)
+        target = flight.setpoint.place_m or (0.0, 0.0)
+        info = flight.info(self._now_s)
+        told = {
+            **_named("stateEstimate", x=x, y=y, z=z, vx=vx, vy=vy, vz=flight.climb_mps, yaw=yaw),
+            **_named("stabilizer", yaw=yaw, thrust=36000.0 if flight.setpoint.flies else 0.0),
+            **_named("kalman", stateX=x, stateY=y, stateZ=z, varPX=SETTLED, varPY=SETTLED, varPZ=SETTLED),
+            **_named("ctrltarget", x=target[0], y=target[1], z=flight.setpoint.height_m or 0.0),
+            **_named("controller", yaw=degrees(flight.setpoint.heading_rad or 0.0)),
+            **_named("range", up=NO_RANGE_MM, zrange=1000.0 * z),
+            **_named("sys", canfly=info >> CAN_FLY_BIT & 1, isFlying=info >> FLYING_BIT & 1),
+            "supervisor.info": info,
+            "acc.z": 1.0,
+        }
+        self._values.update({name: value for name, value in told.items() if np.isfinite(value)})
+        self._fill_sensors(row)
+
+    def _fill_sensors(self, row: dict[str, FloatArray]) -> None:
+        if "scan.range_m" in row and not np.isnan(row["scan.range_m"]).any():
+            ranges = dict(zip(DIRECTIONS_DEG, to_mm(row["scan.range_m"]), strict=True))
+            self._values.update(_named("range", **ranges))
+        scaled = {
+            "imu.forward_mps2": ("acc.x", 1.0 / G_MPS2),
+            "imu.left_mps2": ("acc.y", 1.0 / G_MPS2),
+            "imu.turn_radps": ("gyro.z", 1.0 / radians(1.0)),
+            "battery.voltage_v": ("pm.vbat", 1.0),
+            "battery.charge": ("pm.batteryLevel", 100.0),
+        }
+        for field, (name, scale) in scaled.items():
+            if field in row and np.isfinite(row[field]):
+                self._values[name] = scale * float(row[field])
+        is_low = "battery.voltage_v" in row and self._values["pm.vbat"] < self._parameters["pm.lowVoltage"]
+        self._values["pm.state"] = LOW_POWER if is_low else 0
+
+
+def _named(group: str, **values: float) -> dict[str, float]:
+    return {f"{group}.{name}": value for name, value in values.items()}

@@ -1,0 +1,164 @@
+"""The high-level commander: takes off, lands, goes to places and flies uploaded trajectories along polynomials.
+
+Source: crazyflie-firmware src/modules/src/planner.c and crtp_commander_high_level.c: polynomials of seventh degree that
+begin and end without jerk; a landing that is over turns the motors off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import factorial
+from struct import unpack_from
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.angles import wrap_angle
+from swarmwire.comms.arrays import FloatArray
+
+DEGREE = 7
+PIECE_BYTES = 4 * (4 * (DEGREE + 1) + 1)  # float32: the coefficients of x, y, z and yaw, and the duration
+
+
+class Goal(NamedTuple):
+    """Where to be, and how fast: x, y, z in m and yaw in rad, (4,) each."""
+
+    place: FloatArray
+    velocity: FloatArray
+
+
+class Piece(NamedTuple):
+    """A polynomial of the time since its start: coefficients (4, 8), the constant first."""
+
+    duration_s: float
+    coefficients: FloatArray
+
+    def at(self, time_s: float) -> Goal:
+        """The goal at this time."""
+        powers = time_s ** np.arange(DEGREE + 1)
+        slopes = np.arange(1, DEGREE + 1) * powers[:-1]
+        return Goal(self.coefficients @ powers, self.coefficients[:, 1:] @ slopes)
+
+
+def piece_between(start: Goal, end: Goal, duration_s: float) -> Piece:
+    """The polynomial from start to end, with neither acceleration nor jerk at both."""
+    rows = [[_derivative(k, power, t) for power in range(DEGREE + 1)] for t in (0.0, 1.0) for k in range(4)]
+    zero = np.zeros(4)
+    ends = [start.place, start.velocity * duration_s, zero, zero, end.place, end.velocity * duration_s, zero, zero]
+    unit = np.linalg.solve(np.array(rows), np.array(ends)).T  # in time as a share of the duration
+    return Piece(duration_s, unit / duration_s ** np.arange(DEGREE + 1))
+
+
+def _derivative(order: int, power: int, time: float) -> float:
+    return 0.0 if power < order else factorial(power) / factorial(power - order) * time ** (power - order)
+
+
+def pieces_of(memory: bytes, offset: int, count: int) -> list[Piece] | None:
+    """Uploaded pieces; None if the memory does not hold so many, or one has no duration."""
+    if offset + count * PIECE_BYTES > len(memory) or count == 0:
+        return None
+    numbers = [unpack_from(f"<{PIECE_BYTES // 4}f", memory, offset + i * PIECE_BYTES) for i in range(count)]
+    pieces = [Piece(of[-1], np.array(of[:-1]).reshape(4, DEGREE + 1)) for of in numbers]
+    return pieces if all(np.isfinite(of).all() for of in numbers) and all(p.duration_s > 0.0 for p in pieces) else None
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Pieces one after another, from `began_s` on, `stretch` times as long, moved by `shift`."""
+
+    pieces: Sequence[Piece]
+    began_s: float
+    stretch: float = 1.0
+    is_reversed: bool = False
+    shift: FloatArray | None = None  # (4,)
+
+    @property
+    def duration_s(self) -> float:
+        """From start to end."""
+        return self.stretch * sum(piece.duration_s for piece in self.pieces)
+
+    def at(self, time_s: float) -> Goal:
+        """The goal at this time; after the end, the last place at rest."""
+        total_s = sum(piece.duration_s for piece in self.pieces)
+        passed_s = min(max((time_s - self.began_s) / self.stretch, 0.0), total_s)
+        within_s = total_s - passed_s if self.is_reversed else passed_s
+        *before, piece = self.pieces
+        for earlier in before:
+            if within_s <= earlier.duration_s:
+                piece = earlier
+                break
+            within_s -= earlier.duration_s
+        place, velocity = piece.at(min(within_s, piece.duration_s))
+        pace = 0.0 if passed_s >= total_s else (-1.0 if self.is_reversed else 1.0) / self.stretch
+        return Goal(place if self.shift is None else place + self.shift, np.multiply(velocity, pace))
+
+
+class Planner:
+    """What the high-level commander does: nothing (`idle`, motors off), `flying` (also in place), or `landing`."""
+
+    def __init__(self) -> None:
+        self.state: Literal["idle", "flying", "landing"] = "idle"
+        self._trajectory: Trajectory | None = None
+
+    def goal(self, now_s: float) -> Goal | None:
+        """Where to be now; None: motors off."""
+        if self._trajectory is None:
+            return None
+        if self.state == "landing" and self.is_finished(now_s):
+            self.stop()
+            return None
+        return self._trajectory.at(now_s)
+
+    def is_finished(self, now_s: float) -> bool:
+        """Whether the trajectory is over; true if there is none."""
+        of = self._trajectory
+        return of is None or now_s >= of.began_s + of.duration_s
+
+    def stop(self) -> None:
+        """Motors off."""
+        self.state, self._trajectory = "idle", None
+
+    def change_height(
+        self, here: FloatArray, height_m: float, yaw_rad: float | None, duration_s: float, now_s: float, *, land: bool
+    ) -> bool:
+        """Take off or land at this height, and turn to this yaw (None: as it is); false if that cannot be done now."""
+        if self.state == "landing" if land else self.state != "idle":
+            return False
+        there = here.copy()
+        there[2] = height_m
+        there[3] += 0.0 if yaw_rad is None else wrap_angle(yaw_rad - here[3])
+        rest = np.zeros(4)
+        self._begin([piece_between(Goal(here, rest), Goal(there, rest), max(duration_s, 1e-3))], now_s)
+        self.state = "landing" if land else "flying"
+        return True
+
+    def go_to(
+        self, here: FloatArray, there: FloatArray, duration_s: float, now_s: float, *, relative: bool, linear: bool
+    ) -> None:
+        """Go to a place (4,), which is relative to the present goal or absolute; from `here` if there is no goal."""
+        goal = self.goal(now_s) or Goal(here, np.zeros(4))
+        place = goal.place + there if relative else there.copy()
+        place[3] = goal.place[3] + wrap_angle(place[3] - goal.place[3])
+        duration_s = max(duration_s, 1e-3)
+        velocity = (place - goal.place) / duration_s if linear else np.zeros(4)
+        start = Goal(goal.place, velocity) if linear else goal
+        self._begin([piece_between(start, Goal(place, velocity), duration_s)], now_s)
+        self.state = "flying"
+
+    def follow(
+        self,
+        pieces: Sequence[Piece],
+        here: FloatArray,
+        stretch: float,
+        now_s: float,
+        *,
+        relative: bool,
+        is_reversed: bool,
+    ) -> None:
+        """Fly an uploaded trajectory, from here if it is relative."""
+        first = Trajectory(pieces, now_s, stretch, is_reversed).at(now_s).place
+        shift = (here - first) * (1.0, 1.0, 1.0, 0.0) if relative else None
+        self._trajectory = Trajectory(pieces, now_s, stretch, is_reversed, shift)
+        self.state = "flying"
+
+    def _begin(self, pieces: Sequence[Piece], now_s: float) -> None:
+        self._trajectory = Trajectory(pieces, now_s)
