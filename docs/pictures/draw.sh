@@ -30,6 +30,9 @@ swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.parts
 .ci/uv run --no-sync python -m docs.pictures.robots
 .ci/uv run --no-sync python -m docs.pictures.tick_figure
+if command -v babeld >/dev/null; then
+  .ci/uv run --no-sync python -m docs.pictures.routing
+fi
 if command -v chromium >/dev/null; then
   .ci/uv run --no-sync python -m docs.pictures.live_page
 fi

@@ -4,6 +4,7 @@ import socket
 from collections.abc import Callable, Generator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +17,10 @@ from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import LATE_S, MAX_READS, FramePorts, InterfacesBackend
+from swarmwire.world.scenario_file import load_scenario
 from tests.support.clocks import MS, FakeClock
 
+EXAMPLE = Path(__file__).parents[3] / "examples" / "interfaces" / "mesh.toml"
 ROBOTS = 3
 IPV4 = b"\x08\x00"
 ROUTES = """Iface	Destination	Gateway 	Flags	RefCnt	Use	Metric	Mask		MTU	Window	IRTT
@@ -242,3 +245,11 @@ def test_a_device_that_refuses_a_frame_ends_nothing(rig):
     rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
     assert rig.ports.counts() == {"frames_refused_by_device": 1}
     assert rig.ports.report().delivered == 0
+
+
+def test_the_example_s_robots_have_addresses_and_a_program():
+    scenario = load_scenario(EXAMPLE, [])
+    assert scenario.radio is not None
+    assert scenario.radio.interface is not None
+    assert len(addresses_of(scenario.radio.interface, len(scenario.robot_names()), scenario.radio.mtu_bytes, "")) == 10
+    assert "babeld" in scenario.robots["mesh"].program[-1]
