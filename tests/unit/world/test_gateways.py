@@ -16,6 +16,7 @@ from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways import gateway
 from swarmwire.world.gateways.backend import GatewayBackend, GatewayGroup
+from swarmwire.world.gateways.crazyflie import CrazyflieGateway
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.gateway import Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway
@@ -326,7 +327,9 @@ def said(kind: type[Gateway], body: str) -> str:
     return "; ".join(kind(("a-0",), load_body(body), "", kind.options(), WallClock()).differences())
 
 
-@pytest.mark.parametrize(("kind", "body"), [(Epuck2Gateway, "epuck2"), (Ros2Gateway, "turtlebot3-burger")])
+@pytest.mark.parametrize(
+    ("kind", "body"), [(CrazyflieGateway, "crazyflie"), (Epuck2Gateway, "epuck2"), (Ros2Gateway, "turtlebot3-burger")]
+)
 def test_of_the_robot_itself_nothing_is_said(kind, body) -> None:
     assert said(kind, body) == ""
 
