@@ -81,7 +81,7 @@ class AgentExecutor:
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Keep an inbox between ticks until the robots step or read it; drop the part of other robots."""
-        rows = np.concatenate([agents.group.rows for agents in self._groups.values()])
+        rows = np.concatenate([NO_ROWS, *(agents.group.rows for agents in self._groups.values())])
         new = Inbox(received, tx_status).of(np.sort(rows))
         if new:
             self._waiting = self._waiting.followed_by(new) if self._waiting else new

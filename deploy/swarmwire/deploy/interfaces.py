@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +31,7 @@ from swarmwire.world.interfaces.namespaces import (
     missing_right,
 )
 from swarmwire.world.interfaces.programs import Programs, RobotProgram, hosts
+from swarmwire.world.interfaces.relays import Relay, Relays
 from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"
@@ -42,11 +43,21 @@ DESCRIPTORS = 2  # of each robot: its device and its namespace
 class OpenInterfaces:
     """The interfaces of a run that has begun."""
 
+    interfaces: tuple[RobotInterface, ...]  # of the robots
     ports: FramePorts
     programs: Programs
     places: tuple[Place, ...]  # of the robots
     addresses: tuple[Addresses, ...]  # of the robots
     folder: Path | None  # the run folder
+
+    @contextmanager
+    def with_gateways(self, static: Static, addresses: Mapping[str, str]) -> Generator[None]:
+        """Within the context each robot's gateway, at `addresses` by robot, is also at that address on the robot."""
+        robots = {static.robot_names.index(name): address for name, address in addresses.items()}
+        self.programs.gateways.update(robots)
+        places = [(self.interfaces[robot], *_host_and_port(address)) for robot, address in robots.items()]
+        with closing(Relays([Relay(*place) for place in places])):
+            yield
 
 
 class RunInterfaces:
@@ -102,7 +113,7 @@ class RunInterfaces:
             names.write_text(hosts(static.robot_names, addresses))
             places = _places(static, interfaces, names)
             programs = stack.enter_context(closing(self._new_programs(static, places, addresses, files)))
-            yield OpenInterfaces(ports, programs, places, addresses, folder)
+            yield OpenInterfaces(tuple(interfaces), ports, programs, places, addresses, folder)
 
     def _new_programs(
         self, static: Static, places: Sequence[Place], addresses: Sequence[Addresses], files: Path
@@ -137,6 +148,12 @@ class RunInterfaces:
         assert self._radio
         assert self._radio.interface
         return addresses_of(self._radio.interface, robots, self._radio.mtu_bytes, self._scenario.source)
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    """Of "HOST:PORT", and of an endpoint of zenoh such as "tcp/HOST:PORT"."""
+    host, _, port = address.partition("/")[2].rpartition(":") if "/" in address else address.rpartition(":")
+    return host, int(port)
 
 
 def _near(scenario: Scenario) -> Path:

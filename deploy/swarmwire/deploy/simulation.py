@@ -123,6 +123,7 @@ class Simulation:
             parts.begin()
             stack.enter_context(parts.interfaces())
             self.served = stack.enter_context(parts.served())
+            stack.enter_context(parts.gateways_on_robots(self.served))
             listening = self.config.listening
             if parts.published and listening and listening.observed:  # an endpoint is refused before agents join
                 stack.callback(parts.published.close)

@@ -1,7 +1,7 @@
 """The parts of a run, made from its config and connected; and its observers, in one ordered list."""
 
 from collections.abc import Generator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import cast
 
@@ -179,6 +179,13 @@ class RunParts:
         """The robots have their network interfaces within the context, if the scenario has some."""
         with self._interfaces.opened(self.world.static, self.pace, self.folder.path) as self._open_interfaces:
             yield
+
+    def gateways_on_robots(self, served: Served | None) -> AbstractContextManager[None]:
+        """The gateways' servers are also within the robots' namespaces in the context, if there are both."""
+        if served is None or self._open_interfaces is None:
+            return nullcontext()
+        addresses = {robot.name: robot.address for robot in served.robots}
+        return self._open_interfaces.with_gateways(self.world.static, addresses)
 
     def new_backend(self, served: Served | None) -> AbstractContextManager[AgentBackend]:
         """The agents, ended with the context."""

@@ -35,11 +35,15 @@ class Programs:
 
     A program starts with the run, and again when its robot is revived. The death of a robot ends it, since a robot's
     battery powers its computer, too. All other ends are events; such a program stays ended.
+
+    Attributes:
+        gateways: by robot index, the address of its gateway, for its environment.
     """
 
     def __init__(self, programs: Mapping[int, RobotProgram], folder: Path, robots: int) -> None:
         """`programs` by robot index; output and scratch folders are below `folder`."""
         self._programs, self._folder, self._robots = programs, folder, robots
+        self.gateways: dict[int, str] = {}
         self._running: dict[int, subprocess.Popen[bytes]] = {}
         self._alive: BoolArray = np.ones(robots, np.bool_)
 
@@ -88,9 +92,12 @@ class Programs:
                 stdout=log,
                 stderr=log,
                 cwd=program.working_folder,
-                env={**os.environ, **_environment(robot, name, program.addresses, scratch)},
+                env={**os.environ, **_environment(robot, name, program.addresses, scratch), **self._gateway(robot)},
                 start_new_session=True,
             )
+
+    def _gateway(self, robot: int) -> dict[str, str]:
+        return {"ROBOT_GATEWAY": self.gateways[robot]} if robot in self.gateways else {}
 
     def _end(self, robot: int) -> None:
         process = self._running.pop(robot, None)
