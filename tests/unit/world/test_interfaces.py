@@ -50,6 +50,9 @@ class Rig:
         self.devices[robot].program.send(frame)
         return frame
 
+    def takes(self) -> SentPackets:
+        return SentPackets.joined(self.ports.take())
+
     def gets(self, robot: int) -> list[bytes]:
         found: list[bytes] = []
         while True:
@@ -134,7 +137,7 @@ def test_a_radio_too_small_for_ipv4_is_refused():
 )
 def test_a_frame_is_a_packet_of_its_length_to_whom_it_is_addressed(rig, to, expected):
     frame = rig.sends(1, to)
-    sent = rig.ports.take()
+    sent = rig.takes()
     assert (sent.sender.tolist(), sent.to.tolist()) == ([1], [expected])
     assert exchanged(sent.payloads.row(0)) == frame
     assert sent.payloads.tags().tolist() == [FRAME_TAG]
@@ -143,12 +146,12 @@ def test_a_frame_is_a_packet_of_its_length_to_whom_it_is_addressed(rig, to, expe
 @pytest.mark.parametrize("to", [bytes.fromhex("025357000000"), bytes.fromhex("0a0b0c0d0e0f"), station(ROBOTS)])
 def test_an_address_of_no_robot_is_beyond_all_robots(rig, to):
     rig.sends(0, to)
-    assert rig.ports.take().to[0] >= ROBOTS
+    assert rig.takes().to[0] >= ROBOTS
 
 
 def test_frames_in_the_name_of_another_station_are_counted_and_dropped(rig):
     rig.sends(0, station(1), source=station(2))
-    assert not len(rig.ports.take())
+    assert not len(rig.takes())
     assert rig.ports.counts() == {"frames_of_other_stations": 1}
 
 
@@ -156,7 +159,7 @@ def test_a_flood_of_one_robot_waits_for_the_next_subtick(rig):
     for _ in range(MAX_READS + 1):
         rig.sends(0, station(1))
     rig.sends(2, station(1))
-    assert [len(rig.ports.take()) for _ in range(3)] == [MAX_READS + 1, 1, 0]
+    assert [len(rig.takes()) for _ in range(3)] == [MAX_READS + 1, 1, 0]
 
 
 def test_received_frames_go_to_their_devices_and_messages_to_agents(rig):

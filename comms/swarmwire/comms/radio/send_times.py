@@ -46,7 +46,7 @@ class SendTimes:
 
 
 @njit()
-def keyed_ns(keys, tick, draw_purpose, width_ns):
+def keyed_ns(keys: KeyArray, tick: int, draw_purpose: int, width_ns: IntArray) -> IntArray:
     """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, draw_purpose)."""
     robots = len(width_ns)
     draws = np.empty(len(keys) * robots, np.int64)

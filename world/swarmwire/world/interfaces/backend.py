@@ -17,10 +17,11 @@ import numpy as np
 
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import to_ns
-from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.draws import derive_key, purpose
 from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, addressee, exchanged
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.radio.send_times import keyed_ns
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.interfaces.namespaces import RobotInterface
@@ -28,7 +29,7 @@ from swarmwire.world.interfaces.namespaces import RobotInterface
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
 MAX_PARTS = 256  # of lateness that are kept before they are counted, which costs as much as many of them
-SPREAD_KEY, SPREAD = derive_key("frames"), purpose("send time of frames")
+SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
 LATE_S = 0.003  # wall time after its due time from which a delivered frame counts as late
 _NOTHING = np.empty(0, np.int64)
 
@@ -59,24 +60,21 @@ class FramePorts:
         self._lateness: list[IntArray] = []  # in wall time, of deliveries that are not in the histogram yet
         self._sent = self._sent_bytes = self._delivered = self._delivered_bytes = self._late = 0
 
-    def take(self) -> SentPackets:
-        """The frames that the robots' programs sent since the last call, each as a packet."""
-        robots: list[int] = []
+    def take(self) -> list[SentPackets]:
+        """The frames that programs sent since the last call, each as a packet: of each robot with some."""
+        return [sent for tap, _ in self._epoll.poll(0) if len(sent := self._sent_by(self._robot_of[tap]))]
+
+    def _sent_by(self, robot: int) -> SentPackets:
+        own = self._interfaces[robot].addresses.mac
         to: list[int] = []
         payloads: list[bytes] = []
-        for tap, _ in self._epoll.poll(0):
-            robot = self._robot_of[tap]
-            address = self._interfaces[robot].addresses.mac
-            for frame in _frames(tap):
-                if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] != address:
-                    self._counts["frames_of_other_stations"] += 1  # a bridge: an ad hoc station cannot send as another
-                    continue
-                robots.append(robot)
-                to.append(addressee(frame))
-                payloads.append(exchanged(frame))
-        if not robots:
-            return SentPackets.none()
-        return SentPackets(np.array(robots), np.array(to), Payloads.of(payloads))
+        for frame in _frames(self._interfaces[robot].tap):
+            if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] != own:
+                self._counts["frames_of_other_stations"] += 1  # a bridge: an ad hoc station cannot send as another
+                continue
+            to.append(addressee(frame))
+            payloads.append(exchanged(frame))
+        return SentPackets(np.full(len(to), robot), np.array(to, np.int64), Payloads.of(payloads))
 
     def count_sent(self, frames: SentPackets) -> None:
         """Count frames that are on the medium now."""
@@ -192,27 +190,24 @@ class InterfacesBackend:
     def exchange(self, received: ReceivedPackets, now_ns: int) -> ReceivedPackets:
         """Deliver frames and read new ones; returns the packets that are no frames."""
         messages, frames = self._ports.deliver(received), self._ports.take()
-        if len(frames):
+        if frames:
             from_ns = max(now_ns, self._waiting[-1].at_ns) if self._waiting else now_ns
             self._waiting += spread(frames, from_ns, self._subtick_ns, self._reads)
             self._reads += 1
         return messages
 
 
-def spread(frames: SentPackets, from_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
-    """The frames of one reading, each robot's at a moment of its own within the subtick from `from_ns` on.
+def spread(frames: Sequence[SentPackets], from_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
+    """The frames of one reading, by robot, each robot's at a moment of its own within the subtick from `from_ns` on.
 
     Programs sent them at any moment of the subtick before. All at once they would collide, since a station that finds
     the medium idle sends at once. The frames of one robot alone need not wait. `number` of the reading keys the draws.
     """
-    senders = np.unique(frames.sender)
-    if len(senders) == 1:
-        return [SubtickPackets(from_ns, None, frames)]
-    offsets_ns = (uniform(SPREAD_KEY, senders, number, 0, SPREAD) * subtick_ns).astype(np.int64)
-    return [
-        SubtickPackets(from_ns + int(offsets_ns[k]), None, frames.select(np.flatnonzero(frames.sender == senders[k])))
-        for k in offsets_ns.argsort(kind="stable").tolist()
-    ]
+    if len(frames) == 1:
+        return [SubtickPackets(from_ns, None, frames[0])]
+    offsets_ns = keyed_ns(SPREAD_KEY, number, SPREAD, np.full(len(frames), subtick_ns)).tolist()
+    order = sorted(range(len(frames)), key=offsets_ns.__getitem__)
+    return [SubtickPackets(from_ns + offsets_ns[k], None, frames[k]) for k in order]
 
 
 class _MediumWithFrames:
