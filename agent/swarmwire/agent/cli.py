@@ -176,7 +176,7 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
         return ENDED
     try:
         driver.open()
-        driver.stop()
+        driver.emergency_stop()
     finally:
         driver.close()
     if not parsed.standby:  # the guard reports it

@@ -81,6 +81,10 @@ class Driver(ABC):
     def stop(self) -> None:
         """Motors off at once. Without a connection nothing happens; only DriverLost is raised."""
 
+    def emergency_stop(self) -> None:
+        """Motors off at once and for good, also where that makes the robot fall; by default as `stop`."""
+        self.stop()
+
     @abstractmethod
     def counts(self) -> dict[str, int]:
         """Faults so far, by name: garbage, reconnections, timeouts."""

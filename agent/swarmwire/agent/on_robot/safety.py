@@ -99,7 +99,7 @@ class Motors:
             return
         self._driver.act(command)
         if self.control.stopped:  # it came during the call, and the command may have overtaken it
-            self._driver.stop()
+            self._driver.emergency_stop()
 
     def stop(self) -> None:
         """Motors off at once. The loop stops a robot that is out of reach as soon as it answers again."""
@@ -110,7 +110,7 @@ class Motors:
 
     def _stop_or_raise(self) -> None:
         """Motors off at once; DriverLost if the robot is out of reach, since it may still move."""
-        self._driver.stop()
+        self._driver.emergency_stop()
         if not self.reachable:
             raise DriverLost(OUT_OF_REACH)
 

@@ -111,6 +111,9 @@ class Robot:
         self.told.append("act")
         self.on_act()
 
+    def emergency_stop(self) -> None:
+        self.stop()
+
     def stop(self) -> None:
         if not self.reachable:
             raise DriverLost("nobody answers")

@@ -1,0 +1,224 @@
+"""The driver of a Crazyflie: what it measures, and how it is taken off, flown, landed and stopped."""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from math import isfinite, nan, radians
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, check_cflib
+from swarmwire.agent.drivers.crazyflie.pilot import Pilot
+from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.clock import DatedClock, to_ns
+from swarmwire.comms.config import parameter
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.robots.crazyflie.readings import (
+    ARMED_BIT,
+    CRASHED_BIT,
+    DIRECTIONS_DEG,
+    G_MPS2,
+    LOCKED_BIT,
+    OWN_SENSORS,
+    POSITIONED_SENSORS,
+    SOLID_COLOUR,
+    check_fits,
+    from_mm,
+    turned,
+)
+
+BLOCKS = (
+    (
+        "stateEstimate.x",
+        "stateEstimate.y",
+        "stateEstimate.z",
+        "stateEstimate.vx",
+        "stateEstimate.vy",
+        "stateEstimate.yaw",
+    ),
+    (*(f"range.{name}" for name in DIRECTIONS_DEG), "pm.vbat", "supervisor.info"),
+    ("acc.x", "acc.y", "gyro.z"),
+)
+ON_FLOOR_M = 0.1
+RESET_S = 0.1
+
+
+@dataclass(frozen=True)
+class CrazyflieOptions:
+    """Positioning, and timeouts."""
+
+    positioned: bool = parameter(
+        False, help="a positioning system (Lighthouse, Loco, motion capture) gives the state estimate the arena's frame"
+    )
+    climb_mps: float = parameter(0.3, help="speed of take-off and landing", unit="m/s", above=0, at_most=1)
+    settle_s: float = parameter(2.0, help="wait for the state estimate after its reset", unit="s", at_least=0)
+    connect_s: float = parameter(15.0, help="the robot must be connected within", unit="s", above=0)
+    silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
+
+
+class CrazyflieDriver(Driver):
+    """One Crazyflie, by radio or UDP. It takes off with the first command, and hovers at its body's altitude.
+
+    `stop` lets it hover on the spot, and lands it after two seconds without a command; `close` lands it;
+    `emergency_stop` switches the motors off in the air, and it must be switched on again.
+    """
+
+    options: ClassVar[type] = CrazyflieOptions
+    body_name: ClassVar[str] = "crazyflie"
+
+    def __init__(self, address: str, body: Body, options: Any, clock: DatedClock) -> None:
+        """As `Driver`; BadInput also if cflib is not installed."""
+        super().__init__(address, body, options, clock)
+        if not address.startswith(("radio://", "udp://", "usb://")):
+            expected = f'expected a URI of cflib, "radio://0/80/2M/E7E7E7E7E7" or "udp://host:port"; got {address!r}'
+            raise BadInput("driver crazyflie", "address", expected)
+        check_fits(body)
+        check_cflib()
+        self._options: CrazyflieOptions = options
+        self._counts: Counter[str] = Counter()
+        self._link: CrazyflieLink | None = None
+        self._pilot: Pilot | None = None
+
+    @property
+    def measures(self) -> frozenset[str]:
+        """As `Driver.measures`: `positioning` and `compass` only with `positioned`."""
+        frame = POSITIONED_SENSORS if self._options.positioned else frozenset[str]()
+        return (OWN_SENSORS | frame) & self.body.sensors.keys()
+
+    def open(self) -> None:
+        """As `Driver.open`; DriverLost also if the robot is locked. One that flies hovers on."""
+        self._disconnect()
+        link = CrazyflieLink(self.address, BLOCKS, self._options.connect_s, self.clock)
+        self._link = link
+        self._counts["connections"] += 1
+        height_m = self._first_height(link)
+        if height_m < ON_FLOOR_M:
+            link.set("kalman.resetEstimation", 1)
+            self._wait(RESET_S)
+            link.set("kalman.resetEstimation", 0)
+            self._wait(self._options.settle_s)
+        if self.body.led_count:
+            link.set("ring.effect", SOLID_COLOUR)
+        self._check(link)
+        from_m = height_m if height_m >= ON_FLOOR_M else 0.0
+        self._pilot = Pilot(link, self.body.altitude_m, self._options.climb_mps, from_m, self.clock)
+
+    def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
+        """As `Driver.sense`: the newest log variables, without waiting; nan before the first."""
+        link = self._connected()
+        fields = self._fields(link.values())
+        return {name: value for name, value in fields.items() if name.partition(".")[0] in sensors & self.measures}
+
+    def act(self, command: Command) -> None:
+        """As `Driver.act`: within the body's limits; the first command takes off."""
+        link = self._connected()
+        speeds = command.linear_mps, command.lateral_mps, command.angular_radps
+        if not all(map(isfinite, speeds)):
+            self._counts["not_finite"] += 1
+            speeds = 0.0, 0.0, 0.0
+        most = self.body.max_linear_mps, self.body.max_linear_mps, self.body.max_angular_radps
+        forward, left, turn = (max(-limit, min(limit, of)) for of, limit in zip(speeds, most, strict=True))
+        for colour in command.leds.values():
+            for name, shift in (("Red", 16), ("Green", 8), ("Blue", 0)):
+                link.set(f"ring.solid{name}", colour >> shift & 0xFF)
+        if not int(link.values().get("supervisor.info", 0)) >> ARMED_BIT & 1:
+            link.arm()
+        if self._pilot is not None:
+            self._pilot.command(replace(command, linear_mps=forward, lateral_mps=left, angular_radps=turn))
+
+    def stop(self) -> None:
+        """As `Driver.stop`, in the air: hover on the spot, then land."""
+        pilot = self._pilot
+        if pilot is not None:
+            pilot.hold()
+
+    def emergency_stop(self) -> None:
+        """As `Driver.emergency_stop`: the motors are off at once, also in the air."""
+        pilot = self._pilot
+        if pilot is not None:
+            pilot.cut()
+
+    def counts(self) -> dict[str, int]:
+        """As `Driver.counts`."""
+        return dict(self._counts)
+
+    def close(self) -> None:
+        """As `Driver.close`: land first."""
+        self._disconnect()
+
+    def _disconnect(self) -> None:
+        pilot, link = self._pilot, self._link
+        if pilot is not None:
+            pilot.land()  # meanwhile an emergency stop still reaches it
+        self._pilot = self._link = None
+        if link is not None:
+            link.close()
+
+    def _connected(self) -> CrazyflieLink:
+        link = self._link
+        if link is None:
+            raise DriverLost(f"the Crazyflie at {self.address} is not connected")
+        self._check(link)
+        return link
+
+    def _check(self, link: CrazyflieLink) -> None:
+        info = int(link.values().get("supervisor.info", 0))
+        why = link.lost
+        if link.silent_s > self._options.silent_s:
+            why = f"it has been silent for {link.silent_s:.1f} s"
+        if info >> LOCKED_BIT & 1 or info >> CRASHED_BIT & 1:
+            why = "it is locked or crashed: switch it off and on"
+        if why:
+            self._disconnect()
+            raise DriverLost(f"the Crazyflie at {self.address} is lost: {why}")
+
+    def _first_height(self, link: CrazyflieLink) -> float:
+        """Wait for the first log variables; its height."""
+        until_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
+        while len(link.values()) < sum(map(len, BLOCKS)):
+            if self.clock.now_ns() > until_ns:
+                self._disconnect()
+                raise DriverLost(f"the Crazyflie at {self.address} does not log")
+            self._wait(0.01)
+        return link.values()["stateEstimate.z"]
+
+    def _wait(self, time_s: float) -> None:
+        self.clock.sleep_until(self.clock.now_ns() + to_ns(time_s))
+
+    def _fields(self, values: dict[str, float]) -> dict[str, FloatArray]:
+        """Readings of all sensors."""
+
+        def read(name: str) -> float:
+            return values.get(name, nan)
+
+        yaw = radians(read("stateEstimate.yaw"))
+        forward, left = turned(read("stateEstimate.vx"), read("stateEstimate.vy"), -yaw)
+        volts = read("pm.vbat")
+        told = {
+            "flow.forward_mps": forward,
+            "flow.left_mps": left,
+            "imu.forward_mps2": G_MPS2 * read("acc.x"),
+            "imu.left_mps2": G_MPS2 * read("acc.y"),
+            "imu.turn_radps": radians(read("gyro.z")),
+            "positioning.x_m": read("stateEstimate.x"),
+            "positioning.y_m": read("stateEstimate.y"),
+            "compass.heading_rad": yaw,
+            "battery.voltage_v": volts,
+        }
+        fields = {name: np.array([value]) for name, value in told.items()}
+        battery = self.body.sensors.get("battery")
+        if battery is not None:
+            empty_v, full_v = getattr(battery, "empty_v", 3.0), getattr(battery, "full_v", 4.2)
+            fields["battery.charge"] = np.clip([(volts - empty_v) / (full_v - empty_v)], 0.0, 1.0)
+        ranges_mm = [read(f"range.{name}") for name in DIRECTIONS_DEG]
+        scan, proximity = self.body.scan, self.body.proximity
+        if scan is not None:
+            fields["scan.range_m"] = from_mm(ranges_mm, scan.range_m)[None, :]
+        if proximity is not None:
+            from_rim_m = np.maximum(from_mm(ranges_mm, 1e3) - self.body.radius_m, 0.0)
+            near = from_rim_m <= proximity.range_m
+            response = proximity.response.value(np.minimum(from_rim_m, proximity.range_m))
+            fields["proximity.value"] = np.where(near, response, 0.0)[None, :]
+        return fields

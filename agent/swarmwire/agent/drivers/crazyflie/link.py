@@ -1,0 +1,119 @@
+"""The connection to a Crazyflie by cflib: log variables in, set-points and parameters out."""
+
+# pyright: basic, reportUnknownMemberType=false, reportUnknownVariableType=false
+
+from collections.abc import Sequence
+from threading import Event, Lock
+from typing import Any
+
+from swarmwire.agent.drivers.driver import DriverLost
+from swarmwire.comms.clock import Clock, to_s
+from swarmwire.comms.errors import BadInput
+
+LOG_MS = 50
+
+
+def check_cflib() -> None:
+    """BadInput if cflib is not installed."""
+    try:
+        import cflib.crazyflie  # noqa: F401
+    except ImportError as error:
+        expected = "expected Bitcraze's cflib (GPL): pip install 'swarmwire-agent[crazyflie]'"
+        raise BadInput("driver crazyflie", "", f"{expected}; {error}") from error
+
+
+class CrazyflieLink:
+    """One connection; any thread may call it.
+
+    Attributes:
+        lost: why the connection ended; empty: it has not.
+    """
+
+    def __init__(self, uri: str, blocks: Sequence[Sequence[str]], connect_s: float, clock: Clock) -> None:
+        """Connect and have the variables of each block logged; DriverLost if that takes longer."""
+        import cflib.crtp
+        from cflib.crazyflie import Crazyflie
+
+        if not cflib.crtp.CLASSES:
+            cflib.crtp.init_drivers()
+        self.lost = ""
+        self._clock, self._lock = clock, Lock()
+        self._values: dict[str, float] = {}
+        self._heard_ns = clock.now_ns()
+        ready = Event()
+        self._cf: Any = Crazyflie()
+        self._cf.packet_received.add_callback(self._heard)
+        self._cf.fully_connected.add_callback(lambda _: ready.set())
+        for ended in (self._cf.connection_failed, self._cf.connection_lost):
+            ended.add_callback(self._ended)
+            ended.add_callback(lambda *_: ready.set())
+        self._cf.open_link(uri)
+        if not ready.wait(connect_s) or self.lost:
+            self.close()
+            raise DriverLost(f"no Crazyflie answers at {uri}: {self.lost or 'time is over'}")
+        self._log(blocks)
+
+    @property
+    def silent_s(self) -> float:
+        """Time since the newest packet; cflib asks for one ten times a second."""
+        return to_s(self._clock.now_ns() - self._heard_ns)
+
+    def values(self) -> dict[str, float]:
+        """The newest log variables that have arrived, by name."""
+        with self._lock:
+            return dict(self._values)
+
+    def hover(self, forward_mps: float, left_mps: float, turn_degps: float, height_m: float) -> None:
+        """Send a set-point."""
+        self._cf.commander.send_hover_setpoint(forward_mps, left_mps, turn_degps, height_m)
+
+    def off(self) -> None:
+        """Motors off, until the next set-point."""
+        self._cf.commander.send_stop_setpoint()
+        self._cf.commander.send_notify_setpoint_stop()
+
+    def height_m(self) -> float:
+        """The newest estimate; 0 before the first."""
+        return self.values().get("stateEstimate.z", 0.0)
+
+    def emergency_stop(self) -> None:
+        """Motors off until the Crazyflie is switched on again."""
+        self._cf.commander.send_stop_setpoint()
+        self._cf.supervisor.send_emergency_stop()
+
+    def arm(self) -> None:
+        """Let the motors run, on a Crazyflie that does not arm itself."""
+        self._cf.supervisor.send_arming_request(True)
+
+    def set(self, name: str, value: float) -> None:
+        """Set a parameter."""
+        self._cf.param.set_value(name, value)
+
+    def close(self) -> None:
+        """End the connection."""
+        self._cf.close_link()
+
+    def _log(self, blocks: Sequence[Sequence[str]]) -> None:
+        from cflib.crazyflie.log import LogConfig
+
+        for i, names in enumerate(blocks):
+            config = LogConfig(f"swarmwire-{i}", LOG_MS)
+            for name in names:
+                config.add_variable(name)
+            config.data_received_cb.add_callback(self._logged)
+            try:
+                self._cf.log.add_config(config)
+            except KeyError as error:
+                self.close()
+                raise DriverLost(f"the Crazyflie's firmware does not log {error}") from error
+            config.start()
+
+    def _logged(self, _: int, values: dict[str, float], __: object) -> None:
+        with self._lock:
+            self._values.update(values)
+
+    def _heard(self, _: object) -> None:
+        self._heard_ns = self._clock.now_ns()
+
+    def _ended(self, _: str, why: str) -> None:
+        self.lost = str(why).splitlines()[0] or "the link is lost"
