@@ -2,6 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false, reportUnknownVariableType=false
 
+import logging
 from collections.abc import Sequence
 from threading import Event, Lock
 from typing import Any
@@ -34,6 +35,8 @@ class CrazyflieLink:
         import cflib.crtp
         from cflib.crazyflie import Crazyflie
 
+        # Tables are not cached: agents of several processes would write the same files.
+        logging.getLogger("cflib.crazyflie.toccache").setLevel(logging.ERROR)
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
         self.lost = ""
