@@ -39,7 +39,7 @@ class Chatter(Agent):
 @pytest.mark.parametrize("radio", RADIOS)
 def test_a_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, radio):
     scenario = line(2).replace("still.py:Still", "chatter.py:Chatter") + RADIOS[radio]
-    options = ("--packets", "all", "--links", "--set", "duration_s=4")
+    options = ("--packets", "all", "--links", "--set", "duration_s=6")
     with running(tmp_path, scenario, *options, files={"chatter.py": CHATTER}) as world:
         ping = world.on("line-0", "ping", "-c", str(PINGS), "-i", "0.2", "-s", "32", world.address("line-1"))
         assert world.process.wait(60) == 0

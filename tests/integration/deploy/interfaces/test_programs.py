@@ -55,14 +55,18 @@ def test_a_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     assert repeat(world.folder).same
 
 
+def sleepers_of(pid: int) -> list[psutil.Process]:
+    """The processes named sleep below a process."""
+    return [process for process in psutil.Process(pid).children(recursive=True) if process.name() == "sleep"]
+
+
 def test_a_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
     script = "trap '' TERM; echo started; sleep 1000 & wait"
     kill = '\n[[events]]\ndo = "kill"\nrobots = { names = ["line-0"] }\nat_s = 0.5\nfor_s = 0.5\n'
     with running(tmp_path, with_program(line(2), "sh", "-c", script) + DISK + kill) as world:
         until(lambda: output(world.folder, "line-0").count("started") == 2)
         assert output(world.folder, "line-1").count("started") == 1
-        sleepers = [p for p in psutil.Process(world.process.pid).children(recursive=True) if p.name() == "sleep"]
-        assert len(sleepers) == 2
+        sleepers = until(lambda: sleepers_of(world.process.pid), lambda found: len(found) == 2)
         os.kill(world.process.pid, signal.SIGKILL)
         until(lambda: not any(process.is_running() for process in sleepers))
 
