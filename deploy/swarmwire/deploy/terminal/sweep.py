@@ -17,7 +17,7 @@ from swarmwire.metrics.campaign.spec import FAILED, FINAL, LINK_PDR, Campaign, R
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier
-from swarmwire.metrics.text import number_text
+from swarmwire.metrics.text import counted, number_text
 
 SHARE = 0.1  # a line each time that so much more is done
 MAX_POINTS = 20  # that are shown
@@ -85,8 +85,8 @@ class SweepProgress:
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
         """Say what runs."""
         self._done, self._failed = done, failed
-        points, seeds = len(campaign.points), len(campaign.seeds)
-        line = f"{campaign.name}: {points} points x {seeds} seeds = {campaign.runs} runs"
+        points, seeds = counted(len(campaign.points), "point"), counted(len(campaign.seeds), "seed")
+        line = f"{campaign.name}: {points} x {seeds} = {counted(campaign.runs, 'run')}"
         self._meter.begin((campaign.name, line), "runs", campaign.runs, done, "starting")
 
     def see(self, result: TaskResult) -> None:
