@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from dataclasses import asdict
 from importlib.resources import files
 from keyword import iskeyword
@@ -15,7 +16,8 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile, program
+from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile
+from swarmwire.deploy.terminal.programs import program
 
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
@@ -122,7 +124,7 @@ def new_command(
     typer.echo(f"made {folder}: {', '.join(path.name for path in made)}")
     typer.echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
     typer.echo(f"check it:  {program()} check {folder / 'scenario.toml'}")
-    typer.echo(f"test it:   python -m pytest {folder}")
+    typer.echo(f"test it:   {sys.executable} -m pytest {folder}")
 
 
 STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # red for the others

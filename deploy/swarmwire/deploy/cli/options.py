@@ -215,14 +215,6 @@ HUNG_UP = 129  # the terminal is gone, with a summary
 INTERRUPTED = 130  # Ctrl-C, with a summary
 
 
-def program() -> Path:
-    """This program as people can type it here: it need not be on their path, as with `uv run`."""
-    called = Path(sys.argv[0])
-    if called.name != "swarmwire":  # python -m
-        return Path("swarmwire")
-    return called.relative_to(Path.cwd()) if called.is_relative_to(Path.cwd()) else called
-
-
 @contextmanager
 def leaving_when_hung_up(interrupt: "Interrupt") -> Generator[None]:
     """Leave the command after the block if SIGHUP came in it, without a word: to print would fail."""

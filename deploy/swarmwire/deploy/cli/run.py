@@ -39,8 +39,8 @@ from swarmwire.deploy.cli.options import (
     Ui,
     View,
     leaving_when_hung_up,
-    program,
 )
+from swarmwire.deploy.terminal.programs import program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,7 +12,8 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
-from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up, program
+from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up
+from swarmwire.deploy.terminal.programs import program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.spec import Plan

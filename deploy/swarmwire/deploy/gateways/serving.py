@@ -22,6 +22,7 @@ from swarmwire.deploy.gateways.gateways import (
     listening_places,
     write_settings,
 )
+from swarmwire.deploy.terminal.programs import program
 from swarmwire.metrics.text import some
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
@@ -39,6 +40,13 @@ class ServedRobot:
     address: str  # as that driver takes it
     settings: Mapping[str, Any]  # of `swarmwire-agent`, as in `robot.toml`
     file: Path | None  # where these are written, if the run has a folder
+
+    @property
+    def command(self) -> str | None:
+        """The command that drives it, to be copied into a shell; None without a run folder."""
+        if self.file is None:
+            return None
+        return f"{quote(str(program('swarmwire-agent')))} run --config {quote(str(self.file))}"
 
 
 @dataclass(frozen=True)
@@ -194,9 +202,9 @@ class Undriven(Observer):
         if not robots:
             return
         names = some([robot.name for robot in robots], NAMED)
-        file = robots[0].file
-        command = f": swarmwire-agent run --config {quote(str(file))}" if file else ""
-        self._say(f"{verb} {names}{command}{' and so on' if file and len(robots) > 1 else ''}")
+        command = robots[0].command
+        more = " and so on" if len(robots) > 1 else ""
+        self._say(f"{verb} {names}{f': {command}{more}' if command else ''}")
 
     def _robots(self) -> list[ServedRobot]:
         """Those that no program has driven; the served are in the order of their groups."""

@@ -1,7 +1,6 @@
 """What a terminal shows until a run has ended: a panel or lines, runners that are missing, addresses of gateways."""
 
 import math
-from shlex import quote
 from types import TracebackType
 from typing import Self
 
@@ -151,7 +150,4 @@ class RobotsTold(Observer):
 
 
 def _row(robot: ServedRobot) -> tuple[str, str, str, str]:
-    command = (
-        f"swarmwire-agent run --config {quote(str(robot.file))}" if robot.file else "(without a run folder no settings)"
-    )
-    return robot.name, robot.kind, robot.address, command
+    return robot.name, robot.kind, robot.address, robot.command or "(without a run folder no settings)"
