@@ -17,7 +17,7 @@ from swarmwire.world.scenario_file import load_scenario
 
 FRAMES_HZ, FRAME_BYTES = 50, 200
 HEADERS_BYTES = 42  # Ethernet, IPv4, UDP
-# Each robot sends to the next one; a bound socket, whose buffer holds what nobody reads, answers nothing.
+# Each robot sends to the next one; a bound socket, whose buffer holds unread datagrams, answers nothing.
 SENDER = """
 import ipaddress, os, socket, sys, time
 
@@ -32,12 +32,7 @@ while True:
     out.sendto(bytes(size), (to, 9000))
     at += 1 / hz
 """
-STILL = """
-from swarmwire.agent import Agent, Robot
-
-class Still(Agent):
-    def step(self, robot: Robot) -> None: ...
-"""
+STANDING = Path(__file__).parents[1] / "examples" / "interfaces" / "standing.py"
 RADIOS: dict[str, dict[str, Any]] = {
     "disk": {"range_m": 30.0, "bit_rate_bps": 54_000_000, "max_payload_bytes": 1514, "queue_limit": 200},
     "wifi": {"preset": "wifi-a-6M"},
@@ -101,7 +96,6 @@ def interfaces_start(name: str, repeats: int, *, robots: int) -> None:
 
 
 def _scenario(folder: Path, radio: str, robots: int, duration_s: float) -> Scenario:
-    (folder / "still.py").write_text(STILL)
     (folder / "sender.py").write_text(SENDER)
     program = [sys.executable, "sender.py", str(robots), str(FRAMES_HZ), str(FRAME_BYTES - HEADERS_BYTES)]
     table = ", ".join(f"{key} = {value!r}" for key, value in RADIOS[radio].items())
@@ -115,7 +109,7 @@ radio = {{ {table}, interface = {{}} }}
 [robots.flock]
 body = "epuck2"
 count = {robots}
-agent = "still.py:Still"
+agent = "{STANDING}:Standing"
 program = {program}
 """
     )

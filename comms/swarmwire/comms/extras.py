@@ -26,6 +26,7 @@ class Extra:
 
 CERTIFICATES = Extra("swarmwire[fleet]", ("cryptography",))
 CLUSTER = Extra("swarmwire[cluster]", ("dask", "distributed"))
+CRAZYFLIE = Extra("swarmwire-agent[crazyflie]", ("cflib",))  # under the GPL
 FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "pip"))
 REPORT = Extra("swarmwire-metrics[report]", ("matplotlib", "imageio_ffmpeg", "jinja2"))
 ROS2 = Extra("swarmwire-agent[ros2]", ("rosbags", "xxhash"))

@@ -134,7 +134,7 @@ def _first_process(place: Place, command: list[str], alive: int) -> int:
     gone.register(alive, select.POLLHUP)
     if gone.poll(0):  # the parent ended before it could take this process along
         return NOT_ENTERED
-    # As far as allowed: containers often hide parts of /proc, and then let nobody mount it.
+    # As far as allowed: containers often hide parts of /proc, and then refuse to mount it.
     libc.mount(b"sysfs", b"/sys", b"sysfs", 0, None)
     libc.mount(b"proc", b"/proc", b"proc", 0, None)
     if place.hosts is not None:

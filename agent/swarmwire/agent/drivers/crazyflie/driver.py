@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, check_cflib
+from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink
 from swarmwire.agent.drivers.crazyflie.pilot import Pilot
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
 from swarmwire.comms.arrays import FloatArray
@@ -15,6 +15,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import CRAZYFLIE
 from swarmwire.comms.robots.crazyflie.readings import (
     ARMED_BIT,
     CRASHED_BIT,
@@ -28,6 +29,7 @@ from swarmwire.comms.robots.crazyflie.readings import (
     from_mm,
     turned,
 )
+from swarmwire.comms.sensors.simple import BatterySpec
 
 BLOCKS = (
     (
@@ -75,7 +77,7 @@ class CrazyflieDriver(Driver):
             expected = f'expected a URI of cflib, "radio://0/80/2M/E7E7E7E7E7" or "udp://host:port"; got {address!r}'
             raise BadInput("driver crazyflie", "address", expected)
         check_fits(body)
-        check_cflib()
+        CRAZYFLIE.need("driver crazyflie")
         self._options: CrazyflieOptions = options
         self._counts: Counter[str] = Counter()
         self._link: CrazyflieLink | None = None
@@ -196,7 +198,7 @@ class CrazyflieDriver(Driver):
         yaw = radians(read("stateEstimate.yaw"))
         forward, left = turned(read("stateEstimate.vx"), read("stateEstimate.vy"), -yaw)
         volts = read("pm.vbat")
-        told = {
+        own = {
             "flow.forward_mps": forward,
             "flow.left_mps": left,
             "imu.forward_mps2": G_MPS2 * read("acc.x"),
@@ -207,11 +209,11 @@ class CrazyflieDriver(Driver):
             "compass.heading_rad": yaw,
             "battery.voltage_v": volts,
         }
-        fields = {name: np.array([value]) for name, value in told.items()}
+        fields = {name: np.array([value]) for name, value in own.items()}
         battery = self.body.sensors.get("battery")
-        if battery is not None:
-            empty_v, full_v = getattr(battery, "empty_v", 3.0), getattr(battery, "full_v", 4.2)
-            fields["battery.charge"] = np.clip([(volts - empty_v) / (full_v - empty_v)], 0.0, 1.0)
+        if isinstance(battery, BatterySpec):
+            charge = (volts - battery.empty_v) / (battery.full_v - battery.empty_v)
+            fields["battery.charge"] = np.clip([charge], 0.0, 1.0)
         ranges_mm = [read(f"range.{name}") for name in DIRECTIONS_DEG]
         scan, proximity = self.body.scan, self.body.proximity
         if scan is not None:

@@ -9,18 +9,8 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.comms.clock import Clock, to_s
-from swarmwire.comms.errors import BadInput
 
 LOG_MS = 50
-
-
-def check_cflib() -> None:
-    """BadInput if cflib is not installed."""
-    try:
-        import cflib.crazyflie  # noqa: F401
-    except ImportError as error:
-        expected = "expected Bitcraze's cflib (GPL): pip install 'swarmwire-agent[crazyflie]'"
-        raise BadInput("driver crazyflie", "", f"{expected}; {error}") from error
 
 
 class CrazyflieLink:

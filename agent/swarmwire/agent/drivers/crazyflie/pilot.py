@@ -105,5 +105,5 @@ class Pilot:
             self._send()
 
     def _send(self) -> None:
-        told = self._command if self._link.height_m() >= CLEAR * self._cruise_m else STOP
-        self._link.hover(told.linear_mps, told.lateral_mps, degrees(told.angular_radps), self._height_m)
+        now = self._command if self._link.height_m() >= CLEAR * self._cruise_m else STOP
+        self._link.hover(now.linear_mps, now.lateral_mps, degrees(now.angular_radps), self._height_m)

@@ -131,8 +131,8 @@ class EmulatedCrazyflie:
 
     def _platform(self, channel: int, data: bytes) -> Packet | None:
         if channel == 1 and data[:1] in (b"\0", b"\1", b"\2"):
-            told = (PROTOCOL_VERSION.to_bytes(4, "little"), FIRMWARE, DEVICE)[data[0]]
-            return Packet(Port.PLATFORM, 1, data[:1] + told)
+            answer = (PROTOCOL_VERSION.to_bytes(4, "little"), FIRMWARE, DEVICE)[data[0]]
+            return Packet(Port.PLATFORM, 1, data[:1] + answer)
         if channel == 0 and data[:1] in (b"\1", b"\2"):  # arming and recovery, as clients of older firmware ask
             return self._supervisor(1, data)
         self._refuse("platform_commands_refused")
@@ -292,7 +292,7 @@ class EmulatedCrazyflie:
         x, y, z, yaw = estimate.x_m, estimate.y_m, flight.height_m, degrees(estimate.yaw_rad)
         target = flight.setpoint.place_m or (0.0, 0.0)
         info = flight.info(self._now_s)
-        told = {
+        logged = {
             **_named("stateEstimate", x=x, y=y, z=z, vx=vx, vy=vy, vz=flight.climb_mps, yaw=yaw),
             **_named("stabilizer", yaw=yaw, thrust=36000.0 if flight.setpoint.flies else 0.0),
             **_named("kalman", stateX=x, stateY=y, stateZ=z, varPX=SETTLED, varPY=SETTLED, varPZ=SETTLED),
@@ -303,7 +303,7 @@ class EmulatedCrazyflie:
             "supervisor.info": info,
             "acc.z": 1.0,
         }
-        self._values.update({name: value for name, value in told.items() if np.isfinite(value)})
+        self._values.update({name: value for name, value in logged.items() if np.isfinite(value)})
         self._fill_sensors(row)
 
     def _fill_sensors(self, row: dict[str, FloatArray]) -> None:
