@@ -23,7 +23,7 @@ HOVER = struct.pack("<Bffff", 10, 0.2, 0.1, 30.0, 0.5)  # m/s, m/s, degrees/s, m
 
 
 class Flown:
-    """A robot and its time; by its readings it goes where it is told."""
+    """A robot and its time; by its readings it goes to the commanded place."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()

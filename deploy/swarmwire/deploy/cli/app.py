@@ -16,7 +16,6 @@ from swarmwire.deploy.cli.certs import certs_app
 from swarmwire.deploy.cli.compare import compare_command, report_command, sim_to_real_command
 from swarmwire.deploy.cli.ctl import ctl_app
 from swarmwire.deploy.cli.ctl_events import events_app
-from swarmwire.deploy.cli.exec import exec_command
 from swarmwire.deploy.cli.export import draw_command, export_command
 from swarmwire.deploy.cli.inspect import (
     check_command,
@@ -30,7 +29,7 @@ from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.cli.radio import radio_app
 from swarmwire.deploy.cli.robots import robots_app
 from swarmwire.deploy.cli.router import router_command
-from swarmwire.deploy.cli.run import repeat_command, run_command
+from swarmwire.deploy.cli.run import exec_command, repeat_command, run_command
 from swarmwire.deploy.cli.sweep import sweep_command, tune_command
 from swarmwire.deploy.cli.view import ui_command, view_command
 from swarmwire.deploy.cli.world import join_command, world_command

@@ -1,4 +1,4 @@
-"""Unmodified cflib against emulated Crazyflies that move as they are told."""
+"""Unmodified cflib against emulated Crazyflies that follow commands."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +23,7 @@ TICK_S = 0.02
 
 
 class Room:
-    """A gateway of one Crazyflie, and a thread that moves it as it is told: flow and IMU are exact."""
+    """A gateway of one Crazyflie, and a thread that moves it as commanded: flow and IMU are exact."""
 
     def __init__(self) -> None:
         self.clock = WallClock()
