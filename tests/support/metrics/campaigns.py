@@ -56,9 +56,9 @@ def write_campaign(
 ) -> Path:
     """Write a campaign's folder and return its path.
 
-    Every parameter's every value is met with every other's, unless `points` are told. `failed` and `missing` are
+    Every parameter's every value is met with every other's, unless `points` are given. `failed` and `missing` are
     numbers of runs, `stopped` of those that a stop condition ended, with the time in s. With `parts` the rows stand in
-    so many files, as of a campaign that still runs. What a run draws belongs to `draws` and to the run's number. A time is
+    so many files, as of a running campaign. What a run draws belongs to `draws` and to the run's number. A time is
     null where it is None or beyond `limit_s`.
     """
     varied = {"radio.loss": [0.0, 0.2, 0.4]} if vary is None else dict(vary)
