@@ -163,6 +163,7 @@ def _check(parsed: argparse.Namespace) -> int:
 
 
 def _stop_motors(parsed: argparse.Namespace) -> int:
+    from swarmwire.agent.drivers.driver import MotorsOff
     from swarmwire.agent.on_robot.plan import driver_of
     from swarmwire.agent.on_robot.robot_lock import RobotLock
 
@@ -175,8 +176,9 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
         sys.stdout.write(f"{settings.name}: stopped, for good, by process {holder}, which drives it\n")
         return ENDED
     try:
-        driver.open()
-        driver.emergency_stop()
+        with suppress(MotorsOff):
+            driver.open()
+            driver.emergency_stop()
     finally:
         driver.close()
     if not parsed.standby:  # the guard reports it

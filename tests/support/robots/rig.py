@@ -30,6 +30,7 @@ Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width): of the d
 
 NEIGHBOUR = 1  # the other robot of the gateway's group, whose readings are others
 _SHARE = st.floats(0.0, 1.0)
+_SPEED, _PLACE = st.floats(-2.0, 2.0), st.floats(-50.0, 50.0)
 
 
 @dataclass
@@ -49,6 +50,7 @@ class Rig(ABC):
         limits: by "sensor.field", the least and the greatest that the wire can tell; others have none.
         speed_resolution: the same of commands, in m/s and rad/s.
         counts_steps: whether the robot counts the steps of its commands, whatever odometry is published.
+        stands_until_commanded: whether a robot that was never driven is at rest without being told.
         farthest_m: how far a wheel may roll in a tick for the wire to tell it.
         silent_s: drivers that are made call a robot lost that is silent for so long; long, for machines are busy.
         connect_s: drivers that are made wait so long for their robot.
@@ -58,6 +60,7 @@ class Rig(ABC):
     limits: ClassVar[dict[str, tuple[float, float]]] = {}
     speed_resolution: ClassVar[tuple[float, float]]
     counts_steps: ClassVar[bool] = False
+    stands_until_commanded: ClassVar[bool] = False
     farthest_m: ClassVar[float] = 3.0
 
     @classmethod
@@ -276,5 +279,7 @@ _OF: dict[str, Callable[[Body], st.SearchStrategy[Fields]]] = {
     "scan": _scan,
     "imu": _imu,
     "compass": lambda _: _numbers(compass__heading_rad=st.floats(-pi, pi)),
+    "flow": lambda _: _numbers(flow__forward_mps=_SPEED, flow__left_mps=_SPEED),
+    "positioning": lambda _: _numbers(positioning__x_m=_PLACE, positioning__y_m=_PLACE),
     "battery": _battery,
 }

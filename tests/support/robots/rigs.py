@@ -16,6 +16,7 @@ from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.gateway import Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import until
+from tests.support.robots.crazyflie import CrazyflieRig
 from tests.support.robots.rig import Fields, OwnWireRig, Rig
 
 STEP_M = pi * 0.04 / 1000
@@ -162,6 +163,7 @@ class StampedRmwRig(RmwRig):
 
 RIGS: dict[str, type[Rig]] = {
     "epuck2": Epuck2Rig,
+    "crazyflie": CrazyflieRig,
     "ros2 behind a bridge": Ros2Rig,
     "ros2 by rmw_zenoh": RmwRig,
     "ros2 by rmw_zenoh, stamped": StampedRmwRig,

@@ -196,6 +196,16 @@ def test_the_planner_takes_off_goes_to_a_place_and_lands_with_the_motors_off() -
     assert flown.robot.flight.state is State.READY
 
 
+def test_a_battery_is_low_after_five_seconds_below_the_parameters_voltage() -> None:
+    flown = Flown()
+    state = items(flown, 5)["pm.state"][0]
+    flown.send(5, 1, struct.pack("<BBBH", 6, 1, 0x44, state))
+    flown.send(5, 1, b"\3\1\x0a")
+    charged = flown.pass_ms(1000, battery__voltage_v=np.array(3.3))
+    low = flown.pass_ms(6000, battery__voltage_v=np.array(3.1))
+    assert [datagram[-1] for datagram in (charged[-1], low[30], low[-1])] == [0, 0, 3]
+
+
 def test_an_uploaded_trajectory_is_flown() -> None:
     flown = Flown()
     climb = piece_between(Goal(np.zeros(4), np.zeros(4)), Goal(np.array([1.0, 0, 0.7, 0]), np.zeros(4)), 4.0)

@@ -22,6 +22,10 @@ class DriverLost(SwarmwireError):
     """The robot does not answer, or no longer as its protocol says; `Driver.open` may bring it back."""
 
 
+class MotorsOff(DriverLost):
+    """The robot answers, with its motors off until a person has switched it on again."""
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """The command for one robot, within its limits."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Protocol
 
-from swarmwire.agent.drivers.driver import STOP, Driver, DriverLost
+from swarmwire.agent.drivers.driver import STOP, Driver, DriverLost, MotorsOff
 from swarmwire.agent.on_robot.controller import Controller, Decision, RobotSensors
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
@@ -154,7 +154,7 @@ class RobotLoop:
         self._pacer = Pacer(parts.clock, rate_hz)
         self._tick = -1
         self._leds_unknown = False  # a lost robot may have been switched off meanwhile
-        self._started = False
+        self._started = self._lost = False
         self.counts = Counter[str]()
 
     def run(self, duration_s: float | None = None) -> None:
@@ -178,7 +178,7 @@ class RobotLoop:
     def status(self) -> dict[str, Any]:
         """The state of the robot, in plain values."""
         parts = self._parts
-        state = STOP_REQUESTED if parts.motors.control.stopped else RUNNING if parts.motors.reachable else LOST
+        state = STOP_REQUESTED if parts.motors.control.stopped else LOST if self._lost else RUNNING
         return {
             "state": state,
             "tick": self._tick,
@@ -237,11 +237,12 @@ class RobotLoop:
         """Wait until the robot answers again; the agent is not stepped meanwhile, and its time does not pass."""
         parts = self._parts
         parts.watchdog.rest()
-        self._leds_unknown, parts.motors.reachable = True, False
+        self._leds_unknown = self._lost = True
+        parts.motors.reachable = isinstance(error, MotorsOff)
         self.counts["driver_lost"] += 1
         self._observer.say(f"the robot is lost, and tried again: {error}")
         if reconnect(parts.driver, parts.clock, self._end, self._wait):
-            parts.motors.reachable = True
+            parts.motors.reachable, self._lost = True, False
             self._observer.say("the robot answers again")
         self.counts["ticks_without_driver"] += self._pacer.resume()
 

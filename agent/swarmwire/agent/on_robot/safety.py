@@ -85,7 +85,7 @@ class Motors:
 
     Attributes:
         control: the emergency stop of these motors.
-        reachable: whether the robot answered the last call; the loop sets it.
+        reachable: whether the robot answered the last call, or its motors are off for good; the loop sets it.
     """
 
     def __init__(self, driver: Driver) -> None:

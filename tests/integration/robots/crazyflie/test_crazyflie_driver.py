@@ -1,16 +1,24 @@
 """The driver against an emulated Crazyflie: take-off, flight, landing, stops."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
+import numpy as np
+import psutil
 import pytest
 
 from swarmwire.agent.drivers.crazyflie import CrazyflieDriver, CrazyflieOptions
-from swarmwire.agent.drivers.driver import Command, DriverLost
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.agent.drivers.driver import Command, DriverLost, MotorsOff
+from swarmwire.comms.bodies.body import body_from, load_body
+from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
-from swarmwire.world.gateways.crazyflie.flight import State
+from swarmwire.world.gateways.crazyflie.flight import REST, State
 from tests.integration.robots.crazyflie.test_crazyflie_gateway import Room, room
+from tests.support.agent.on_robot.installed import Command as Program
+from tests.support.agent.on_robot.scripted import PLAYERS
 from tests.support.clocks import until
+from tests.support.deploy.runs import ROOT
 
 __all__ = ["room"]
 QUICK = CrazyflieOptions(climb_mps=1.0, settle_s=0.0)
@@ -66,10 +74,61 @@ def test_an_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver
     until(lambda: flight.height_m > 0.4)
     driver.emergency_stop()
     until(lambda: flight.state is State.LOCKED)
-    with pytest.raises(DriverLost, match="locked"):
+    with pytest.raises(MotorsOff, match="locked"):
         until(lambda: driver.act(Command(0.3)))
-    with pytest.raises(DriverLost, match="locked"):
+    with pytest.raises(MotorsOff, match="locked"):
         driver.open()
+
+
+def test_an_emergency_stop_on_the_floor_does_not_lock(room: Room, driver: CrazyflieDriver) -> None:
+    driver.emergency_stop()
+    driver.act(Command(0.3))  # no command starts the motors again, but a new connection does
+    driver.close()
+    assert room.gateway._robots[0].flight.height_m == 0.0
+    driver.open()
+    driver.act(Command(0.3))
+    until(lambda: room.gateway._robots[0].flight.motion.forward_mps == pytest.approx(0.3))
+
+
+def test_a_low_battery_lands_it_and_keeps_it_down(room: Room, driver: CrazyflieDriver) -> None:
+    flight = room.gateway._robots[0].flight
+    driver.act(Command(0.3))
+    until(lambda: flight.height_m > 0.4)
+    room.voltage_v = 3.1
+    until(lambda: driver.act(Command(0.3)) or driver.counts().get("low_battery_commands", 0) > 0)
+    until(lambda: flight.height_m == 0.0 and not flight.setpoint.flies)
+    driver.act(Command(0.3))
+    driver.close()
+    assert flight.height_m == 0.0
+    assert flight.state is not State.LOCKED
+
+
+def test_proximity_is_the_multi_rangers_from_the_rim(room: Room) -> None:
+    file = ROOT / "scenarios" / "robots" / "crazyflie.toml"
+    body = body_from(read_toml(file), str(file))
+    driver = CrazyflieDriver(room.uri, body, QUICK, room.clock)
+    driver.open()
+    sensed = driver.sense(frozenset({"proximity"}))["proximity.value"]
+    assert sensed == pytest.approx(np.array([[0.0, 1.0 - (0.4 - body.radius_m), 0.0, 0.0]]))
+    driver.close()
+
+
+def test_an_agent_that_is_killed_leaves_no_robot_in_the_air(room: Room, tmp_path: Path) -> None:
+    flight = room.gateway._robots[0].flight
+    of = ("--driver", "crazyflie", "--address", room.uri)
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
+    with Program(environment, "run", f"{PLAYERS}:Driving", *of, "--watchdog-s", "5") as command:
+        until(lambda: flight.height_m > 0.4 and flight.motion.forward_mps > 0.0)
+        guard = psutil.Process(command.process.pid)
+        until(lambda: len(guard.children()) == 2)
+        (process,) = (of for of in guard.children() if "--heartbeats" in of.cmdline())
+        process.kill()
+        code, _, said = command.wait()
+    until(lambda: flight.state is State.LOCKED and flight.height_m == 0.0 and flight.motion == REST)
+    assert code == 1
+    assert said.endswith("; the motors were stopped\n")
+    with Program(environment, "stop-motors", *of) as command:  # of a locked robot they are off
+        assert command.wait() == (0, "robot-0: stopped\n", "")
 
 
 def test_nobody_at_the_address_is_told(room: Room) -> None:

@@ -31,6 +31,7 @@ class Room:
         (self.uri,) = self.gateway.open()
         self.travelled_m = np.zeros(2)  # ahead and to the left
         self.turned_rad = 0.0
+        self.voltage_v = 3.9
         self._ended = Event()
         self._thread = Thread(target=self._pass, daemon=True)
         self._thread.start()
@@ -47,7 +48,7 @@ class Room:
         while not self._ended.is_set():
             fields = {"flow.forward_mps": speeds[:1], "flow.left_mps": speeds[1:2], "imu.turn_radps": speeds[2:]}
             fields["scan.range_m"] = np.array([[1.5, 0.4, np.inf, 2.0]])
-            fields["battery.voltage_v"] = np.array([3.9])
+            fields["battery.voltage_v"] = np.array([self.voltage_v])
             time_ns = round(tick * TICK_S * NS_PER_S)
             self.gateway.publish(time_ns, fields, np.array([True]))
             self.clock.sleep_until(began_ns + time_ns)

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink
 from swarmwire.agent.drivers.crazyflie.pilot import Pilot
-from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
+from swarmwire.agent.drivers.driver import Command, Driver, DriverLost, MotorsOff
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns
@@ -40,7 +40,7 @@ BLOCKS = (
         "stateEstimate.vy",
         "stateEstimate.yaw",
     ),
-    (*(f"range.{name}" for name in DIRECTIONS_DEG), "pm.vbat", "supervisor.info"),
+    (*(f"range.{name}" for name in DIRECTIONS_DEG), "pm.vbat", "pm.state", "supervisor.info"),
     ("acc.x", "acc.y", "gyro.z"),
 )
 ON_FLOOR_M = 0.1
@@ -64,7 +64,7 @@ class CrazyflieDriver(Driver):
     """One Crazyflie, by radio or UDP. It takes off with the first command, and hovers at its body's altitude.
 
     `stop` lets it hover on the spot, and lands it after two seconds without a command; `close` lands it;
-    `emergency_stop` switches the motors off in the air, and it must be switched on again.
+    `emergency_stop` switches the motors off in the air, and it must be switched on again. A low battery lands it.
     """
 
     options: ClassVar[type] = CrazyflieOptions
@@ -90,7 +90,7 @@ class CrazyflieDriver(Driver):
         return (OWN_SENSORS | frame) & self.body.sensors.keys()
 
     def open(self) -> None:
-        """As `Driver.open`; DriverLost also if the robot is locked. One that flies hovers on."""
+        """As `Driver.open`; MotorsOff if the robot is locked or crashed. One that flies hovers on."""
         self._disconnect()
         link = CrazyflieLink(self.address, BLOCKS, self._options.connect_s, self.clock)
         self._link = link
@@ -102,6 +102,7 @@ class CrazyflieDriver(Driver):
             link.set("kalman.resetEstimation", 0)
             self._wait(self._options.settle_s)
         if self.body.led_count:
+            self._show(link, 0)
             link.set("ring.effect", SOLID_COLOUR)
         self._check(link)
         from_m = height_m if height_m >= ON_FLOOR_M else 0.0
@@ -123,9 +124,9 @@ class CrazyflieDriver(Driver):
         most = self.body.max_linear_mps, self.body.max_linear_mps, self.body.max_angular_radps
         forward, left, turn = (max(-limit, min(limit, of)) for of, limit in zip(speeds, most, strict=True))
         for colour in command.leds.values():
-            for name, shift in (("Red", 16), ("Green", 8), ("Blue", 0)):
-                link.set(f"ring.solid{name}", colour >> shift & 0xFF)
-        if not int(link.values().get("supervisor.info", 0)) >> ARMED_BIT & 1:
+            self._show(link, colour)
+        self._counts["low_battery_commands"] += link.is_low()
+        if not link.has(ARMED_BIT):
             link.arm()
         if self._pilot is not None:
             self._pilot.command(replace(command, linear_mps=forward, lateral_mps=left, angular_radps=turn))
@@ -137,23 +138,27 @@ class CrazyflieDriver(Driver):
             pilot.hold()
 
     def emergency_stop(self) -> None:
-        """As `Driver.emergency_stop`: the motors are off at once, also in the air."""
+        """As `Driver.emergency_stop`: the motors are off at once, also in the air; on the floor it is not locked."""
         pilot = self._pilot
         if pilot is not None:
             pilot.cut()
 
     def counts(self) -> dict[str, int]:
         """As `Driver.counts`."""
-        return dict(self._counts)
+        return dict(+self._counts)
 
     def close(self) -> None:
         """As `Driver.close`: land first."""
         self._disconnect()
 
-    def _disconnect(self) -> None:
+    def _show(self, link: CrazyflieLink, colour: int) -> None:
+        for name, shift in (("Red", 16), ("Green", 8), ("Blue", 0)):
+            link.set(f"ring.solid{name}", colour >> shift & 0xFF)
+
+    def _disconnect(self, *, lands: bool = True) -> None:
         pilot, link = self._pilot, self._link
         if pilot is not None:
-            pilot.land()  # meanwhile an emergency stop still reaches it
+            pilot.end(lands=lands)  # meanwhile an emergency stop still reaches it
         self._pilot = self._link = None
         if link is not None:
             link.close()
@@ -166,15 +171,17 @@ class CrazyflieDriver(Driver):
         return link
 
     def _check(self, link: CrazyflieLink) -> None:
-        info = int(link.values().get("supervisor.info", 0))
-        why = link.lost
-        if link.silent_s > self._options.silent_s:
-            why = f"it has been silent for {link.silent_s:.1f} s"
-        if info >> LOCKED_BIT & 1 or info >> CRASHED_BIT & 1:
-            why = "it is locked or crashed: switch it off and on"
-        if why:
-            self._disconnect()
-            raise DriverLost(f"the Crazyflie at {self.address} is lost: {why}")
+        place = f"the Crazyflie at {self.address}"
+        if link.has(LOCKED_BIT) or link.has(CRASHED_BIT):
+            self._disconnect(lands=False)
+            raise MotorsOff(f"{place} is locked or crashed: switch it off and on")
+        if link.lost:
+            self._disconnect(lands=False)
+            raise DriverLost(f"{place} is lost: {link.lost}")
+        silent_s = link.silent_s
+        if silent_s > self._options.silent_s:
+            self._disconnect()  # the silence may end, and the firmware stops the motors after 2 s
+            raise DriverLost(f"{place} is lost: it has been silent for {silent_s:.1f} s")
 
     def _first_height(self, link: CrazyflieLink) -> float:
         """Wait for the first log variables; its height."""

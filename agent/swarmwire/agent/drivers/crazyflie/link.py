@@ -4,13 +4,15 @@
 
 import logging
 from collections.abc import Sequence
-from threading import Event, Lock
+from threading import Event, Lock, Thread
 from typing import Any
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.comms.clock import Clock, to_s
+from swarmwire.comms.robots.crazyflie.readings import FLYING_BIT, LOW_POWER
 
 LOG_MS = 50
+CLOSE_S = 0.5
 
 
 class CrazyflieLink:
@@ -69,10 +71,19 @@ class CrazyflieLink:
         """The newest estimate; 0 before the first."""
         return self.values().get("stateEstimate.z", 0.0)
 
+    def has(self, bit: int) -> bool:
+        """Whether a bit of the supervisor's newest state is set."""
+        return bool(int(self.values().get("supervisor.info", 0)) >> bit & 1)
+
+    def is_low(self) -> bool:
+        """Whether the firmware calls the battery low: for five seconds below `pm.lowVoltage`."""
+        return self.values().get("pm.state") == LOW_POWER
+
     def emergency_stop(self) -> None:
-        """Motors off until the Crazyflie is switched on again."""
-        self._cf.commander.send_stop_setpoint()
-        self._cf.supervisor.send_emergency_stop()
+        """Motors off, and, unless it stands on the floor, until the Crazyflie is switched on again."""
+        self.off()
+        if self.has(FLYING_BIT) or "supervisor.info" not in self.values():
+            self._cf.supervisor.send_emergency_stop()
 
     def arm(self) -> None:
         """Let the motors run, on a Crazyflie that does not arm itself."""
@@ -83,8 +94,10 @@ class CrazyflieLink:
         self._cf.param.set_value(name, value)
 
     def close(self) -> None:
-        """End the connection."""
-        self._cf.close_link()
+        """End the connection; cflib's threads end up to two seconds later, when the radio is free already."""
+        closing = Thread(target=self._cf.close_link, name="crazyflie closes", daemon=True)
+        closing.start()
+        closing.join(CLOSE_S)
 
     def _log(self, blocks: Sequence[Sequence[str]]) -> None:
         from cflib.crazyflie.log import LogConfig

@@ -5,7 +5,7 @@ second, also while the agent is late.
 """
 
 from math import degrees
-from threading import Event, Lock, Thread
+from threading import Lock, Thread
 from typing import Protocol
 
 from swarmwire.agent.drivers.driver import STOP, Command
@@ -33,13 +33,20 @@ class Hovering(Protocol):
         """The newest estimate."""
         ...
 
+    def is_low(self) -> bool:
+        """Whether the battery is nearly empty."""
+        ...
+
     def emergency_stop(self) -> None:
         """Motors off for good."""
         ...
 
 
 class Pilot:
-    """Flies one Crazyflie at one height, from its first command to its landing."""
+    """Flies one Crazyflie at one height, from its first command to its landing.
+
+    A low battery lands it, and no command takes it off again.
+    """
 
     def __init__(self, link: Hovering, height_m: float, climb_mps: float, from_m: float, clock: Clock) -> None:
         """`from_m` is the height at which it is now; above the floor it hovers, until `HOLD_S` is over."""
@@ -48,7 +55,6 @@ class Pilot:
         self._command, self._held_ns = STOP, clock.now_ns()
         self._up, self._lands, self._ended = from_m > 0.0, False, False
         self._touching = 0  # steps with the set-point on the floor
-        self._down = Event()
         self._lock = Lock()
         self._thread = Thread(target=self._fly, name="crazyflie set-points", daemon=True)
         self._thread.start()
@@ -72,11 +78,11 @@ class Pilot:
             self._ended = True
             self._link.emergency_stop()
 
-    def land(self) -> None:
-        """Land, and return when the motors are off."""
+    def end(self, *, lands: bool) -> None:
+        """Send no more set-points; if it `lands`, return when the motors are off."""
         with self._lock:
-            self._lands, self._command = True, STOP
-        self._down.wait()
+            self._lands = True
+            self._ended |= not lands
         self._thread.join()
 
     def _fly(self) -> None:
@@ -85,8 +91,8 @@ class Pilot:
             next_ns = max(next_ns + NS_PER_S // RATE_HZ, self._clock.now_ns())
             self._clock.sleep_until(next_ns)
             with self._lock:
+                self._lands = self._lands or self._link.is_low()
                 if self._ended or (self._lands and not self._up):
-                    self._down.set()
                     return
                 if self._up:
                     self._step()
@@ -105,5 +111,5 @@ class Pilot:
             self._send()
 
     def _send(self) -> None:
-        now = self._command if self._link.height_m() >= CLEAR * self._cruise_m else STOP
+        now = self._command if not self._lands and self._link.height_m() >= CLEAR * self._cruise_m else STOP
         self._link.hover(now.linear_mps, now.lateral_mps, degrees(now.angular_radps), self._height_m)

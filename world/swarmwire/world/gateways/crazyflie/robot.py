@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
-from math import degrees, radians
+from math import degrees, nan, radians
 from struct import calcsize, unpack_from
 from typing import Any
 
@@ -37,6 +37,7 @@ GREETING = b"Bitcraze Crazyflie".ljust(30, b"\0")
 MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
 SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
 MAX_TRAJECTORIES = 10
+LOW_BATTERY_MS = 5000  # pm_stm32f4.c: so long below pm.lowVoltage
 INFO = Packet(Port.LINK, 3, b"")  # the null packet
 
 
@@ -61,7 +62,7 @@ class EmulatedCrazyflie:
         self._memory = bytearray(MEMORY_BYTES)
         self._trajectories: dict[int, list[Piece]] = {}
         self._values = dict.fromkeys(VARIABLES, 0.0)
-        self._now_ms = 0
+        self._now_ms = self._charged_ms = 0
         self._moved_ms: int | None = None
         self._said_locked = False
         self._answers: dict[int, Callable[[int, bytes], Packet | None]] = {
@@ -320,8 +321,9 @@ class EmulatedCrazyflie:
         for field, (name, scale) in scaled.items():
             if field in row and np.isfinite(row[field]):
                 self._values[name] = scale * float(row[field])
-        is_low = "battery.voltage_v" in row and self._values["pm.vbat"] < self._parameters["pm.lowVoltage"]
-        self._values["pm.state"] = LOW_POWER if is_low else 0
+        if not float(row.get("battery.voltage_v", nan)) <= self._parameters["pm.lowVoltage"]:  # also if it is lost
+            self._charged_ms = self._now_ms
+        self._values["pm.state"] = LOW_POWER if self._now_ms - self._charged_ms > LOW_BATTERY_MS else 0
 
 
 def _named(group: str, **values: float) -> dict[str, float]:
