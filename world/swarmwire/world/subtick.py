@@ -46,13 +46,13 @@ class SubtickRadio:
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None, radio: Radio | None
-    ) -> tuple[Results, Results]:
-        """End the last tick, and begin one as `RadioMedium.step`; its results, and those of them not yet delivered."""
+    ) -> tuple[Results, ReceivedPackets, TxStatuses]:
+        """End the last tick, and begin one as `RadioMedium.step`; its results, and what of them is not yet delivered."""
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
         undelivered = self._medium.advance(start_ns)
-        return self._medium.step(start_ns, pose, disruption, radio), undelivered
+        return self._medium.step(start_ns, pose, disruption, radio), *undelivered
 
     def send(self, put: SubtickPackets) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
@@ -76,8 +76,7 @@ class SubtickRadio:
         """Let time pass; return the receptions and transmit statuses that were not handed out before."""
         self._release(until_ns)
         self._now_ns = until_ns
-        results = self._medium.advance(until_ns)
-        return results.received, results.tx_status
+        return self._medium.advance(until_ns)
 
     def leave(self, over: BoolArray) -> None:
         """The arenas (arenas,) are over: what waits there for a turn is the medium's to end."""

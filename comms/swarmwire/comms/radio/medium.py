@@ -6,7 +6,6 @@ is final, and counts the fates.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from collections.abc import Callable
 from functools import partial, reduce
 from operator import add
 
@@ -16,7 +15,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import BROADCAST, NOWHERE, Fate, SentPackets, TxStatuses
+from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, Fate, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -34,7 +33,7 @@ from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.threads import Threads
 from swarmwire.comms.truth import Boundary, PacketCounts
 
-MAX_PARTS = 8  # parts of a tick's results that are kept before they are joined
+MANY_LINKS = 4096  # kept, of which final ones leave the table also within a tick: each `advance` reads them
 
 
 def wait_for_earlier(links: Links, first: int, rows: int) -> None:
@@ -135,6 +134,8 @@ class RadioMedium:
         self._others_alive = np.zeros(rows, np.int64)
         self._now_ns = 0
         self._parts: list[Results] = []  # results within the current tick
+        self._tx_status: list[TxStatuses] = []  # those of the current tick that `advance` returned
+        self._handed_ns = 0  # receptions up to then were returned by `advance`
         self._on_air = Transmissions.none()  # the packets of `_links`
         self._links = self._no_links = Links.none(len(radio.measures.columns))
 
@@ -165,12 +166,14 @@ class RadioMedium:
         if (self._is_new or self._anyone_out) and (now.anyone_out or self._active.anyone_out):
             self._keep_new(*self._model.disrupt(start_ns, now, self._liveness))
             self._cut_off(start_ns, now)
-        pending = self._threads.start(self._final(start_ns), len(self._links))
+        tx_status, self._tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(self._present)]), []
+        self._liveness.forget(self._model.queued.epoch)
+        pending = self._threads.start(partial(self._final, start_ns, self.radio), len(self._links))
         self._hold(pose, radio or self.radio)
         edges = self._model.edges(pose, self._present)
         final = Results.joined([*self._parts, pending()])
         self._parts = []
-        return Results(final.received, final.finished, final.departed, final.tx_status, final.tally, edges)
+        return Results(final.received, final.finished, final.departed, tx_status, final.tally, edges)
 
     def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
@@ -194,20 +197,27 @@ class RadioMedium:
             self._check(int(sent_at_ns[sent.sender].min()), sent)
             self._accept(sent_at_ns, sent)
 
-    def advance(self, until_ns: int) -> Results:
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Let time pass within a tick; the number of such calls changes nothing.
 
-        Returns the results since the last call, which the next `step` returns again; they have no edges.
+        Returns the packets received and the transmit statuses since the last call. The next `step` returns them again,
+        with all else that became final.
         """
         self._pass_time(until_ns)
-        final = self._final(until_ns)()
-        self._parts.append(final)
-        if len(self._parts) == MAX_PARTS:  # joined early, since the next tick waits for the last part
-            self._parts = [Results.joined(self._parts)]
-        return final
+        tx_status = self._model.tx_status(self._present)
+        if len(tx_status):
+            self._tx_status.append(tx_status)
+        since_ns, self._handed_ns = self._handed_ns, until_ns
+        received = results.received_between(
+            since_ns, until_ns, self._links, self._on_air, self.radio.measures.columns, self._robots
+        )
+        if len(self._links) >= MANY_LINKS:
+            self._take_final(until_ns)
+        return received, tx_status
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
+        self._take_final(self._handed_ns)
         self._counters.count_in_flight(self._links, self._without_left(self._model.drain()))
         self._keep(np.empty(0, np.int64))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
@@ -219,6 +229,7 @@ class RadioMedium:
 
         Packets left at their radios still run to their end, without results.
         """
+        self._take_final(self._handed_ns)
         leaving, queued = np.repeat(over, self._robots), self._without_left(self._model.queued)
         is_leaving = leaving[self._links.sender]
         self._counters.count_in_flight(
@@ -229,6 +240,7 @@ class RadioMedium:
         if self._parts:
             final = Results.joined(self._parts)
             counts, self._parts = counts + final.tally.of(over), [final.of(~over, self._robots)]
+        self._tx_status = [part.select(np.flatnonzero(~leaving[part.row])) for part in self._tx_status]
         self._left |= leaving
         self._running &= ~over
         self._present, self._is_new = self._present & ~leaving, True
@@ -263,37 +275,35 @@ class RadioMedium:
         self._now_ns = until_ns
         self._keep_new(*self._model.pass_time(until_ns, self._liveness))
 
-    def _final(self, until_ns: int) -> Callable[[], Results]:
-        """Returns what takes the results of links that are final by `until_ns`; the others are kept.
+    def _take_final(self, until_ns: int) -> None:
+        """Take the results of links that are final by `until_ns` before the next step does."""
+        if (self._links.final_at_ns <= until_ns).any():
+            self._parts.append(self._final(until_ns, self.radio))
+
+    def _final(self, until_ns: int, radio: Radio) -> Results:
+        """The results of links that are final by `until_ns`, without transmit statuses; the others are kept.
 
         It may be called in another thread while poses are held.
         """
-        self._liveness.forget(self._model.queued.epoch)
-        return partial(self._take_final, until_ns, self.radio, self._model.tx_status(self._present))
-
-    def _take_final(self, until_ns: int, radio: Radio, tx_status: TxStatuses) -> Results:
         links, packets, counts = self._links, self._on_air, self._counters.final
         received, finished, departed, still_open = results.final_by(
             until_ns, links, packets, radio, self._robots, counts
         )
         if len(still_open) < len(links):
             self._keep(still_open)
-        return Results(received, finished, departed, tx_status, self._counters.close())
+        return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
 
     def _check(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
-        if (sent.to == BROADCAST).all():
-            return
-        addressed = (sent.to != BROADCAST) & (sent.to != NOWHERE)
-        is_invalid = addressed & ((sent.to < 0) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots))
+        is_invalid = (sent.to < NOWHERE) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots)
         if is_invalid.any():
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[is_invalid][0]}")
 
     def _cut_off(self, now_ns: int, now: Disruption) -> None:
         """End receptions of robots that are dead `now`, and unfinished ones at radios that are off."""
         links = self._links
-        is_open = (links.fate == RECEIVED) & (links.receiver != THE_REST)
+        is_open = (links.fate == RECEIVED) & (links.receiver != THE_REST) & (links.final_at_ns > self._handed_ns)
         links.fate[is_open & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[is_open & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
 

@@ -129,6 +129,33 @@ class Results:
         )
 
 
+def received_between(
+    since_ns: int, until_ns: int, links: Links, packets: Transmissions, measures: tuple[str, ...], robots: int
+) -> ReceivedPackets:
+    """The packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay."""
+    payloads = packets.payloads
+    found = _received_between(since_ns, until_ns, links.table, packets.table, payloads.data, payloads.offset, robots)
+    (receiver, sender, sequence, received_at_ns, payload), index, data, offset = found
+    given = {name: links.given[:, column].take(index) for column, name in enumerate(measures)}
+    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, Payloads(data, offset))
+
+
+@njit()
+def _received_between(since_ns, until_ns, links, packets, data, offset, robots):
+    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
+    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
+    index, count = np.empty(len(fate), np.int64), 0
+    for row in range(len(fate)):
+        index[count] = row
+        count += (fate[row] == RECEIVED) & (since_ns < final_at_ns[row]) & (final_at_ns[row] <= until_ns)
+    index = index[:count]
+    if count > 0:
+        index = by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
+    kept, place = compacted(packet_of[index], packets.shape[1])
+    first_row = packets[packet.SENDER] // robots * robots
+    return _received(index, place, links, first_row), index, *payload_rows(data, offset, kept)
+
+
 def final_by(
     until_ns: int, links: Links, packets: Transmissions, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
 ) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords, IntArray]:

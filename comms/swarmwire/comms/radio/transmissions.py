@@ -66,8 +66,7 @@ class Transmissions:
     @classmethod
     def none(cls) -> "Transmissions":
         """No packets."""
-        # Payloads that may be written to, as those of kernels.
-        return cls(np.empty((COLUMNS, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
+        return _NONE
 
     def __len__(self) -> int:
         return self.table.shape[1]
@@ -116,6 +115,10 @@ class Transmissions:
         for name, values in columns.items():
             getattr(changed, name)[:] = values
         return changed
+
+
+# Payloads that may be written to, as those of kernels.
+_NONE = Transmissions(np.empty((COLUMNS, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
 
 
 @njit()

@@ -221,7 +221,7 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
 def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
     medium = sent(radio)
-    assert medium.advance(TICK_NS // 2).received.receiver.tolist() == [0, 2, 3]
+    assert medium.advance(TICK_NS // 2)[0].receiver.tolist() == [0, 2, 3]
     medium.leave(np.arange(2) == over)
     news, left = medium.step(TICK_NS, POSE), 1 - over
     assert news.received.receiver.tolist() == [[0, 2], [3]][left]
@@ -234,7 +234,7 @@ def test_nor_what_its_senders_learned(over: int):
     medium = make_medium(with_access("csma-802154"), ROBOTS, [1, 2])
     medium.step(0, POSE)
     medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
-    assert medium.advance(TICK_NS // 2).tx_status.row.tolist() == [1, 5]
+    assert medium.advance(TICK_NS // 2)[1].row.tolist() == [1, 5]
     medium.leave(np.arange(2) == over)
     tx_status = medium.step(TICK_NS, POSE).tx_status
     assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([[1, 5][1 - over]], [[41, 42][1 - over]])

@@ -160,16 +160,16 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
             disruption = Disruption.none(SIX)
             if tick == 1:
                 disruption.radio_on[out] = disruption.alive[(out + 1) % SIX] = False
-        within.append(medium.advance(start_ns).received)
+        within.append(medium.advance(start_ns)[0])
         news.append(medium.step(start_ns, pose + 0.01 * tick, disruption))
         sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
         for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
             if sender is None:
-                within.append(medium.advance(at_ns).received)
+                within.append(medium.advance(at_ns)[0])
             else:
                 medium.send_at(np.full(SIX, at_ns), packets(sender, size=12))
-    within.append(medium.advance(tick_start_ns(TICKS, RATE_HZ)).received)
+    within.append(medium.advance(tick_start_ns(TICKS, RATE_HZ))[0])
     news.append(medium.step(tick_start_ns(TICKS, RATE_HZ), pose))
     last = medium.end()
     tallies = sum((one.tally for one in news[1:]), news[0].tally) + last

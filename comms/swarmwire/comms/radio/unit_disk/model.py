@@ -112,7 +112,8 @@ class UnitDisk(RadioModel):
         self._queues = TxQueues(context.radio, len(context.keys) * context.robots)
         self._channel = Channel(context)
         self._pose = np.zeros((len(context.keys) * context.robots, 3))
-        self._disruption, self._columns = context.disruption, len(context.radio.measures.columns)
+        self._disruption = context.disruption
+        self._no_links = Links.none(len(context.radio.measures.columns))
         self._now_ns = 0
 
     @property
@@ -154,5 +155,5 @@ class UnitDisk(RadioModel):
 
     def _decided(self, packets: Transmissions, liveness: LivenessHistory) -> Decided:
         if not len(packets):
-            return packets, Links.none(self._columns)
+            return packets, self._no_links
         return packets, self._channel.decide(packets, self._pose, liveness)

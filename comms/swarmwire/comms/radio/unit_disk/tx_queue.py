@@ -12,7 +12,7 @@ from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import Admission, Transmissions
+from swarmwire.comms.radio.transmissions import FATE, OFF_AIR_AT, ON_AIR_AT, SENDER, Admission, Transmissions
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it
@@ -24,40 +24,37 @@ NO_LIMIT = 2**31  # where all but the newest packet end anyway
 def enter(
     sent_at_ns: IntArray,
     free_at_ns: IntArray,
-    queued_sender: IntArray,
-    queued_on_air_at_ns: IntArray,
-    sender: IntArray,
+    queued: IntArray,
+    packets: IntArray,
     airtime_ns: IntArray,
     too_large: BoolArray,
     queue_limit: IntArray,
-) -> tuple[IntArray, IntArray, IntArray]:
+) -> IntArray:
     """First in, first out: `on_air_at = max(sent_at, end of the sender's previous packet)`, all times in ns.
 
     A packet that must wait is refused while `queue_limit` others of its sender wait (go on air after `sent_at`).
-    `queue_limit`, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row; `queued_…` are packets
-    that may still wait.
-    Returns on_air_at_ns (k,) (sent_at of a refused packet), fate (k,) and the new free_at_ns (rows,).
+    `queue_limit`, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row; `queued` is the table of
+    packets that may still wait. Writes fate and times on and off air into the table `packets`, whose packets are new
+    and have all times at `sent_at`; returns the new free_at_ns (rows,).
     """
     free_at_ns = free_at_ns.copy()
     waiting = np.zeros(len(free_at_ns), np.int64)
+    queued_sender, queued_on_air_at_ns = queued[SENDER], queued[ON_AIR_AT]
     for p in range(len(queued_sender)):
         if queued_on_air_at_ns[p] > sent_at_ns[queued_sender[p]]:
             waiting[queued_sender[p]] += 1
-    on_air_at_ns = np.empty(len(sender), np.int64)
-    fate = np.full(len(sender), ACCEPTED, np.int64)
-    for p in range(len(sender)):
-        s = sender[p]
-        on_air_at_ns[p] = sent_at_ns[s]
+    for p in range(packets.shape[1]):
+        s = packets[SENDER, p]
         must_wait = free_at_ns[s] > sent_at_ns[s]
         if too_large[p]:
-            fate[p] = TOO_LARGE
+            packets[FATE, p] = TOO_LARGE
         elif must_wait and waiting[s] >= queue_limit[s]:
-            fate[p] = QUEUE_FULL
+            packets[FATE, p] = QUEUE_FULL
         else:
-            on_air_at_ns[p] = max(sent_at_ns[s], free_at_ns[s])
-            free_at_ns[s] = on_air_at_ns[p] + airtime_ns[p]
+            packets[ON_AIR_AT, p] = max(sent_at_ns[s], free_at_ns[s])
+            free_at_ns[s] = packets[OFF_AIR_AT, p] = packets[ON_AIR_AT, p] + airtime_ns[p]
             waiting[s] += must_wait
-    return on_air_at_ns, fate, free_at_ns
+    return free_at_ns
 
 
 def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> tuple[Transmissions, IntArray]:
@@ -156,8 +153,7 @@ class TxQueues:
         its broadcasts in this epoch.
         """
         packets = self._admission.take(sent_at_ns, sent, others_alive, epoch)
-        on_air_at_ns, off_air_at_ns, fate = self._access(sent_at_ns, packets.sender, packets.payload_bytes(self._radio))
-        packets = packets.replaced(on_air_at_ns=on_air_at_ns, off_air_at_ns=off_air_at_ns, fate=fate)
+        self._access(sent_at_ns, packets)
         self.queued = self.queued.followed_by(packets)
         if self._any_held:
             self.queued = newest_only(self.queued, self._backlog == NEWEST, sent_at_ns)
@@ -169,6 +165,8 @@ class TxQueues:
         A packet due while its radio is off ends at that time as BLACKOUT: the queue drains at the usual pace, unless
         its backlog is held.
         """
+        if not len(self.queued):
+            return NO_PACKETS
         packets = self._take_out(self.queued.on_air_at_ns < until_ns)
         if not disruption.anyone_out:
             return packets
@@ -203,14 +201,13 @@ class TxQueues:
         packets, self.queued = self.queued.parted(due)
         return packets
 
-    def _access(self, sent_at_ns: IntArray, sender: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    def _access(self, sent_at_ns: IntArray, packets: Transmissions) -> None:
+        """Write the fates and times on air of new packets into their table."""
         radio, free_at_ns, limit, held = self._radio, self._free_at_ns, self._limit, self._backlog != DROP
-        duration_ns = airtime_ns(radio, sizes + radio.overhead_bytes)
+        sizes = packets.payload_bytes(radio)
+        duration_ns, too_large = airtime_ns(radio, sizes + radio.overhead_bytes), sizes > radio.max_payload_bytes
         if self._any_held:
             free_at_ns, limit = np.where(held, FAR_NS, free_at_ns), np.where(self._backlog == NEWEST, NO_LIMIT, limit)
-        queued, too_large = self.queued, sizes > radio.max_payload_bytes
-        on_air_at_ns, fate, free_at_ns = enter(
-            sent_at_ns, free_at_ns, queued.sender, queued.on_air_at_ns, sender, duration_ns, too_large, limit
-        )
+        tables = self.queued.table, packets.table
+        free_at_ns = enter(sent_at_ns, free_at_ns, *tables, duration_ns, too_large, limit)
         self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns) if self._any_held else free_at_ns
-        return on_air_at_ns, on_air_at_ns + duration_ns * (fate == ACCEPTED), fate

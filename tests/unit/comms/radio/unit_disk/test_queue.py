@@ -10,6 +10,7 @@ from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import Admission
+from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run, run_disrupted, with_access
@@ -265,7 +266,7 @@ def test_packets_to_nobody_take_a_number_and_go_nowhere():
 AIRTIME_NS = 1_000_000
 SENDERS, WARM_UP, PACKETS = 1500, 150, 400
 STANDARD_ERRORS = 4.4
-NOBODY = np.empty(0, np.int64)
+NOBODY = np.empty((COLUMNS, 0), np.int64)
 
 
 @pytest.mark.parametrize(("load", "stated"), [(0.5, 0.5), (0.8, 2.0), (0.9, 4.5)])
@@ -277,14 +278,15 @@ def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: fl
     gaps_ns = np.random.default_rng(7).exponential(AIRTIME_NS / load, (WARM_UP + PACKETS, SENDERS))
     sent_at_ns = np.cumsum(gaps_ns, axis=0).astype(np.int64)
     free_at_ns, wait = np.zeros(SENDERS, np.int64), np.zeros(SENDERS)
-    sender, airtime_ns, fits = np.arange(SENDERS), np.full(SENDERS, AIRTIME_NS), np.zeros(SENDERS, bool)
+    airtime_ns, fits = np.full(SENDERS, AIRTIME_NS), np.zeros(SENDERS, bool)
+    packets = np.zeros((COLUMNS, SENDERS), np.int64)
+    packets[SENDER] = np.arange(SENDERS)
     for k, at_ns in enumerate(sent_at_ns):
-        on_air_at_ns, fate, free_at_ns = enter(
-            at_ns, free_at_ns, NOBODY, NOBODY, sender, airtime_ns, fits, np.full(len(free_at_ns), 10**9)
-        )
-        assert (fate == ACCEPTED).all()
+        packets[FATE] = ACCEPTED
+        free_at_ns = enter(at_ns, free_at_ns, NOBODY, packets, airtime_ns, fits, np.full(len(free_at_ns), 10**9))
+        assert (packets[FATE] == ACCEPTED).all()
         if k >= WARM_UP:
-            wait += (on_air_at_ns - at_ns) / AIRTIME_NS / PACKETS
+            wait += (packets[ON_AIR_AT] - at_ns) / AIRTIME_NS / PACKETS
     assert load / (2.0 * (1.0 - load)) == pytest.approx(stated, rel=1e-12)
     assert abs(wait.mean() - stated) < STANDARD_ERRORS * wait.std() / np.sqrt(SENDERS)
 
