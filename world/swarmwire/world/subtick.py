@@ -47,7 +47,7 @@ class SubtickRadio:
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None, radio: Radio | None
     ) -> tuple[Results, ReceivedPackets, TxStatuses]:
-        """End the last tick, and begin one as `RadioMedium.step`; its results, and what of them is not yet delivered."""
+        """End the last tick, and begin one as `RadioMedium.step`; its results, and what of them was not delivered."""
         self._release(start_ns)
         self._now_ns = start_ns
         # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.

@@ -30,6 +30,8 @@ class JammerTable:
     def __init__(self, context: ChannelContext) -> None:
         self._context, self._jammers = context, Jammers.none()
         self._power_mw = np.empty((0, context.robots))
+        whole = np.empty(0, np.int64)
+        self._none = JammerSchedule(whole, self._power_mw, np.empty(0, np.bool_), whole, whole, np.zeros(1, np.int64))
 
     @property
     def anything(self) -> bool:
@@ -48,6 +50,8 @@ class JammerTable:
 
     def between(self, from_ns: int, until_ns: int) -> JammerSchedule:
         """The state of jammers just before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""
+        if not self.anything:
+            return self._none
         at_ns, which = self._jammers.toggles(from_ns, until_ns)
         is_on = self._jammers.is_on(from_ns - 1)
         return JammerSchedule(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, SentPackets, TxStatuses
+from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -22,7 +22,7 @@ from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
-from swarmwire.comms.radio.phy.packets import PacketTable, final_statuses, statuses_to_nowhere
+from swarmwire.comms.radio.phy.packets import PacketTable, final_statuses, statuses_to_nowhere, used_packets
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
@@ -42,6 +42,7 @@ class Reporter:
 
     def __init__(self, context: ChannelContext, links: LinkTable) -> None:
         self._robots, self._links, self._columns = context.robots, links, len(context.radio.measures.columns)
+        self._no_links = Links.none(self._columns)
         self.tune(context)
 
     def tune(self, context: ChannelContext) -> None:
@@ -53,30 +54,24 @@ class Reporter:
     ) -> Decided:
         """Packets and links of the result rows in `parts`; `queued` and `packet` have the same rows."""
         if not parts:
-            return Transmissions.none(), Links.none(self._columns)
+            return Transmissions.none(), self._no_links
         rows = (
             parts[0]
             if len(parts) == 1
             else ResultBuffer._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
         )
-        # An addressed packet may have been received in an earlier call, and only now be done at its sender.
-        used = (packet["is_done"] > 0) & (packet["is_departed"] == 0)
-        used[rows.packet] = True
-        index, local = np.flatnonzero(used), np.cumsum(used) - 1
-        was_on_air, on_air_at_ns = packet["fate"] == RECEIVED, packet["on_air_at_ns"].copy()
-        on_air_at_ns[rows.packet] = rows.on_air_at_ns
-        packets = queued.select(index).replaced(
-            on_air_at_ns=on_air_at_ns[index],
-            off_air_at_ns=(on_air_at_ns + np.where(was_on_air, packet["airtime_ns"], 0))[index],
-            fate=packet["fate"][index],
+        payloads = queued.payloads
+        table, data, offset, local = used_packets(
+            queued.table, payloads.data, payloads.offset, packet, rows.packet, rows.on_air_at_ns
         )
+        packets = Transmissions(table, Payloads(data, offset))
         kept = rows.receiver != NO_ROBOT
         if liveness.any_dead:
             kept &= _is_intended(queued, rows, liveness)
         if not kept.all():
-            rows = ResultBuffer._make([*(column[kept] for column in rows[:-1]), rows.count])
+            rows, local = ResultBuffer._make([*(column[kept] for column in rows[:-1]), rows.count]), local[kept]
         in_range = self._count_reachable(packets, liveness)
-        links = Links.with_the_rest(packets, local[rows.packet], rows.receiver, in_range, self._columns)
+        links = Links.with_the_rest(packets, local, rows.receiver, in_range, self._columns)
         self._record(links.first(len(rows.packet)), rows, poses)
         return packets, links
 
@@ -97,6 +92,8 @@ class Reporter:
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
         reachable = np.zeros(len(packets), np.int64)
+        if (packets.fate == RECEIVED).all():
+            return reachable
         candidates = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
             return reachable
@@ -192,7 +189,7 @@ class SinrPhy(RadioModel):
             pose, links = self._poses[self._hold], len(self._links.link)
             losses = self._losses.losses(pose, self._hold_ns, self._now_ns, links)
             mac.order_queues(state, self._events, start)
-            max_links = int(max((state.places.stop - state.places.first).max(), _lengths(self._robot).max()))
+            max_links = self._context.robots
             capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
             done = False
             while not done:
@@ -200,6 +197,8 @@ class SinrPhy(RadioModel):
                 done = mac.run_until(self._params, losses, state, self._events, buffer, max_links, until_ns)
                 parts.append(take_rows(buffer))
             self._last_rows = sum(len(part.packet) for part in parts)
+            if not (self._last_rows or self._packets.any_done):
+                parts = []
         self._now_ns = until_ns
         return self._decided(parts, liveness)
 
@@ -264,7 +263,3 @@ class SinrPhy(RadioModel):
                 self._tx_status.append(final_statuses(packets.table, packets.queued.tx_status_id))
             packets.forget_done()
         return decided
-
-
-def _lengths(robot: Table) -> IntArray:
-    return robot["stop_link"] - robot["first_link"]

@@ -26,12 +26,15 @@ from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.truth import NO_ROBOT
 
+ON_AIR = int(Fate.RECEIVED)
 TOO_LARGE, RESULT_TOO_LARGE = int(Fate.TOO_LARGE), int(TxResult.TOO_LARGE)
 NO_ACKNOWLEDGEMENT = int(TxResult.NO_ACKNOWLEDGEMENT)
 
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     """Transmit statuses of packets that are done, where requested; senders that died get none."""
+    if (tx_status_id == NOT_MEASURED).all():
+        return NO_TX_STATUSES
     is_dead = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NO_RESULT)
     is_reported = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~is_dead
     index = np.flatnonzero(is_reported)
@@ -42,11 +45,13 @@ def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
 
 def statuses_to_nowhere(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
     """Transmit statuses of packets to NOWHERE, where requested: no acknowledgement comes."""
-    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_ids != NOT_MEASURED))
+    if sent.tx_status_id is None:
+        return NO_TX_STATUSES
+    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_id != NOT_MEASURED))
     if not len(index):
         return NO_TX_STATUSES
     return TxStatuses(
-        sent.sender[index], sent.tx_status_ids[index], initial_result(sent.payloads.sizes[index], max_payload_bytes)
+        sent.sender[index], sent.tx_status_id[index], initial_result(sent.payloads.sizes[index], max_payload_bytes)
     )
 
 
@@ -72,14 +77,20 @@ class PacketTable:
     def __len__(self) -> int:
         return len(self.table)
 
+    @property
+    def any_done(self) -> bool:
+        """Whether there are packets to forget."""
+        return bool(self.table["is_done"].any())
+
     def add(self, taken: Transmissions, radio: Radio, robots: int) -> None:
         """Append packets that radios admitted; each arena has `robots` robots."""
+        rows, waiting = packet_rows(taken, radio, robots), len(self.table)
         self.queued = self.queued.followed_by(taken)
-        waiting, table = (
-            len(self.table),
-            np.empty(len(self.queued), PACKET),
-        )  # np.concatenate compares each field's type
-        table[:waiting], table[waiting:] = self.table, packet_rows(taken, radio, robots)
+        if not waiting:
+            self.table = rows
+            return
+        table = np.empty(len(self.queued), PACKET)  # np.concatenate compares each field's type
+        table[:waiting], table[waiting:] = self.table, rows
         self.table = table
 
     def by_sender(self, rows: int) -> tuple[IntArray, IntArray]:
@@ -88,11 +99,9 @@ class PacketTable:
 
     def forget_done(self) -> None:
         """Drop packets that are done; packets with a recorded reception have no intended receivers left."""
-        settled = self.table["is_settled"] > 0
-        kept = np.flatnonzero(self.table["is_done"] == 0)
-        self.table["is_departed"] |= settled
-        queued = self.queued.replaced(intended=np.where(settled, 0, self.queued.intended))
-        self.queued, self.table = queued.select(kept), self.table[kept]
+        kept = _settle(self.table, self.queued.table)
+        if len(kept) < len(self.table):
+            self.queued, self.table = self.queued.select(kept), self.table[kept]
 
     def drain(self) -> Transmissions:
         """Take out all packets."""
@@ -124,6 +133,54 @@ def _fill(packet, taken, robots, sizes, max_payload_bytes, airtime_ns, pause_ns)
         row.airtime_ns, row.pause_ns = airtime_ns[k], pause_ns[k]
         row.refused = TOO_LARGE if is_too_large else 0
         row.result = RESULT_TOO_LARGE if is_too_large else NO_ACKNOWLEDGEMENT
+
+
+@njit()
+def _settle(packet, queued):
+    """Mark packets with a recorded reception, in both tables; the rows of those that are not done."""
+    kept, count = np.empty(len(packet), np.int64), 0
+    for p in range(len(packet)):
+        row = packet[p]
+        if row.is_settled:
+            row.is_departed = 1
+            queued[transmissions.INTENDED, p] = 0
+        kept[count] = p
+        count += row.is_done == 0
+    return kept[:count]
+
+
+@njit()
+def used_packets(queued, data, offset, packet, row_packet, row_on_air_at_ns):
+    """The packets with result rows, or done since: their columns and payloads, and the place in these of each row.
+
+    `queued` and its payloads are the table of transmissions, whose packets are the rows of `packet`; `row_…` are
+    columns of the result rows.
+    """
+    place, on_air_at_ns = np.full(len(packet), -1), np.empty(len(packet), np.int64)
+    for p in range(len(packet)):
+        row = packet[p]
+        on_air_at_ns[p] = row.on_air_at_ns
+        # An addressed packet may have been received in an earlier call, and only now be done at its sender.
+        if row.is_done and not row.is_departed:
+            place[p] = 0
+    for k in range(len(row_packet)):
+        place[row_packet[k]], on_air_at_ns[row_packet[k]] = 0, row_on_air_at_ns[k]
+    index, count = np.empty(len(packet), np.int64), 0
+    for p in range(len(packet)):
+        if place[p] == 0:
+            index[count], place[p] = p, count
+            count += 1
+    index = index[:count]
+    table = np.empty((len(queued), count), np.int64)
+    for column in range(len(queued)):
+        for k in range(count):
+            table[column, k] = queued[column, index[k]]
+    for k in range(count):
+        row, at_ns = packet[index[k]], on_air_at_ns[index[k]]
+        table[transmissions.ON_AIR_AT, k], table[transmissions.FATE, k] = at_ns, row.fate
+        table[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == ON_AIR else 0)
+    selected, starts = transmissions.payload_rows(data, offset, index)
+    return table, selected, starts, place[row_packet]
 
 
 @njit()
