@@ -6,6 +6,7 @@ knows, which is less than the fate.
 """
 
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -93,7 +94,7 @@ class Payloads:
     def of(cls, rows: list[bytes]) -> "Payloads":
         """A table of the given encoded messages."""
         data = np.frombuffer(b"".join(rows), np.uint8)
-        return cls(data, offsets(np.array([len(row) for row in rows], np.int64)))
+        return cls(data, np.array([0, *accumulate(map(len, rows))]))
 
     @classmethod
     def one(cls, row: bytes) -> "Payloads":

@@ -175,7 +175,9 @@ class Admission:
         `sent_at_ns` (rows,) is the send time of each robot, `others_alive` (rows,) the number of intended receivers of
         its broadcasts in this epoch.
         """
-        if (sent.sender[1:] < sent.sender[:-1]).any():  # results must not depend on how the backend was divided
+        if (
+            len(sent) > 1 and (sent.sender[1:] < sent.sender[:-1]).any()
+        ):  # results must not depend on how the backend was divided
             sent = sent.select(np.argsort(sent.sender, kind="stable"))
         # Copies: arrays from the wire are read-only, and a kernel would be compiled once more for these.
         columns = sent.sender.copy(), sent.to.copy(), sent.tx_status_ids.copy()

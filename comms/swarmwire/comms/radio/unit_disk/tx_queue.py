@@ -203,11 +203,13 @@ class TxQueues:
 
     def _access(self, sent_at_ns: IntArray, packets: Transmissions) -> None:
         """Write the fates and times on air of new packets into their table."""
-        radio, free_at_ns, limit, held = self._radio, self._free_at_ns, self._limit, self._backlog != DROP
+        radio, limit, tables = self._radio, self._limit, (self.queued.table, packets.table)
         sizes = packets.payload_bytes(radio)
         duration_ns, too_large = airtime_ns(radio, sizes + radio.overhead_bytes), sizes > radio.max_payload_bytes
-        if self._any_held:
-            free_at_ns, limit = np.where(held, FAR_NS, free_at_ns), np.where(self._backlog == NEWEST, NO_LIMIT, limit)
-        tables = self.queued.table, packets.table
+        if not self._any_held:
+            self._free_at_ns = enter(sent_at_ns, self._free_at_ns, *tables, duration_ns, too_large, limit)
+            return
+        held = self._backlog != DROP
+        free_at_ns, limit = np.where(held, FAR_NS, self._free_at_ns), np.where(self._backlog == NEWEST, NO_LIMIT, limit)
         free_at_ns = enter(sent_at_ns, free_at_ns, *tables, duration_ns, too_large, limit)
-        self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns) if self._any_held else free_at_ns
+        self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)
