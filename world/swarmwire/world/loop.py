@@ -214,9 +214,9 @@ class Loop:
         if self.medium is None:
             return None, ReceivedPackets.none(), NO_TX_STATUSES
         if self._subtick:
-            results, *undelivered = self._subtick.step(start_ns, world.pose, effects.disruption, effects.radio)
+            results, received, tx_status = self._subtick.step(start_ns, world.pose, effects.disruption, effects.radio)
             self._open = results.tally
-            return results, *undelivered
+            return results, received, tx_status
         results = self.medium.step(start_ns, world.pose, effects.disruption, effects.radio)
         self._open = results.tally
         packets = self._mailbox.hand_over(tick, results.received, world.alive)
