@@ -4,8 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
-from docs.pictures import parts, robots, runner_states, tick_figure
+from docs.pictures import epuck2_camera, parts, robots, runner_states, tick_figure
 from docs.pictures.radio import sheet
 from docs.pictures.radio.__main__ import FIGURES
 
@@ -25,3 +26,9 @@ def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypat
 def test_a_figure_of_the_design_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
     draw(tmp_path / "figure.svg")
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()[:1000]
+
+
+def test_the_picture_of_an_e_puck2s_camera_can_be_drawn(tmp_path: Path):
+    epuck2_camera.draw(tmp_path / "camera.png")
+    with Image.open(tmp_path / "camera.png") as image:
+        assert image.size == (640, 480)

@@ -98,10 +98,11 @@ def test_speeds_beyond_the_limits_are_cut_to_them(connected: Rig, sign: int) -> 
 
 
 def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connected: Rig) -> None:
-    red, dark = 0xFF0000, 0
+    dark = 0
     shown = dict.fromkeys(range(connected.body.led_count), dark)
+    own = dict.fromkeys(shown, 0xFF0000) | {9: 0x00FF00}  # the e-puck2's body LED is green
     for which in shown:
-        for colour in (red, dark, red):
+        for colour in (own[which], dark, own[which]):
             connected.driver.act(Command(0.01 * (which + 1), leds={which: colour}))
             connected.driver.sense(frozenset())
 
@@ -110,7 +111,7 @@ def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connect
                 return shown[which] == colour
 
             until(shows)
-    assert set(shown.values()) <= {red}
+    assert shown == {which: own[which] for which in shown}
 
 
 def test_an_open_driver_has_told_its_robot_to_rest(rig: Rig) -> None:

@@ -85,3 +85,12 @@ def shades_over(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
         for i in range(len(x)):
             shades[j, i] = shade_at(ground, x[i], y[j])
     return shades
+
+
+@njit()
+def shades_at(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
+    """The shade at each of these points in m, (n,) each."""
+    shades = np.empty(len(x))
+    for i in range(len(x)):
+        shades[i] = shade_at(ground, x[i], y[i])
+    return shades

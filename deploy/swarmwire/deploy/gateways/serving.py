@@ -117,7 +117,7 @@ class RunGateways:
             say(gateways.network.warning)
         static, keys, scaled = world.static, SwarmKeys(gateways.swarm), ScaledClock(clock, pace)
         with ExitStack() as stack:
-            groups, addresses = self._open(stack, static, scaled, say)
+            groups, addresses = self._open(stack, world, scaled, say)
             rows = {static.robot_names[row]: int(row) for group in groups for row in group.rows}
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
             bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, self._lent(static), access)))
@@ -143,9 +143,10 @@ class RunGateways:
             )
 
     def _open(
-        self, stack: ExitStack, static: Static, clock: DatedClock, say: Callable[[str], None]
+        self, stack: ExitStack, world: World, clock: DatedClock, say: Callable[[str], None]
     ) -> tuple[tuple[GatewayGroup, ...], dict[int, str]]:
         """The gateways, closed with the stack, and each robot's address by its row."""
+        static = world.static
         groups: list[GatewayGroup] = []
         addresses: dict[int, str] = {}
         for group in static.groups:
@@ -154,6 +155,7 @@ class RunGateways:
                 names = static.robot_names[group.start : group.stop]
                 gateway = chosen.made(names, group.body, chosen.address, chosen.options, clock)
                 stack.callback(gateway.close)
+                gateway.enter(world.scene, group.start)
                 differences = gateway.differences()
                 if differences:
                     say(f"{group.name}: body {group.body.name} as {chosen.kind}: {'; '.join(differences)}")

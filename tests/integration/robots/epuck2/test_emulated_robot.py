@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.robots.epuck2.commands import RobotCommand
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot
 from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 from tests.support.robots.epuck2 import command
@@ -21,7 +22,7 @@ class Task:
     def __init__(self, stack: ExitStack) -> None:
         self.commands: list[RobotCommand] = []
         self.counts = Counter[str]()
-        self.robot = EmulatedRobot(self.commands.append, lambda: b"\x02" + bytes(104), self.counts)
+        self.robot = EmulatedRobot(self.commands.append, lambda header: bytes(PAYLOAD_BYTES[header]), self.counts)
         self._unread, self._stack = stack.enter_context(closing(UnreadBytes())), stack
         stack.callback(self.robot.hang_up)
 

@@ -17,6 +17,7 @@ from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from tests.support.clocks import until
 from tests.support.robots.epuck2 import SENSORS, command, read
+from tests.support.world.scenes import scene
 
 BODY = load_body("epuck2")
 STEP_M = pi * 0.04 / 1000
@@ -57,6 +58,11 @@ def received(robot: socket.socket, size: int) -> bytes:
     return answer
 
 
+def faults(gateway: Epuck2Gateway) -> dict[str, int]:
+    """The counts but for that of constant readings, which each request for the sensors has."""
+    return {name: count for name, count in gateway.counts().items() if name != "constant_readings"}
+
+
 def three(value: object) -> np.ndarray:
     return np.array([value] * ROBOTS, np.float64)
 
@@ -92,6 +98,7 @@ def test_readings_stand_where_the_fact_sheet_says(gateway: Epuck2Gateway) -> Non
     assert told["magnetometer"][1] == pytest.approx(0.0, abs=1e-5)
     assert told["battery"] == round(4.2 * 4096 * 0.6 / 3.0)
     assert (told["selector"], told["temperature"], told["button"]) == (15, 25, 0)
+    assert told["microphones"] == (30,) * 4
 
 
 def test_what_no_sense_tells_is_as_of_a_robot_at_rest(gateway: Epuck2Gateway) -> None:
@@ -155,7 +162,7 @@ def test_speeds_are_clipped_wheel_by_wheel_as_the_firmware_does(gateway: Epuck2G
     assert commands.drive.tolist() == [False, False, True]
     assert commands.linear_mps[2] == pytest.approx((550 - 1100) / 2 * STEP_M)
     assert commands.angular_radps[2] == pytest.approx((550 + 1100) * STEP_M / 0.053)
-    assert gateway.counts() == {"speeds_clipped": 1}
+    assert faults(gateway) == {"speeds_clipped": 1}
     assert not gateway.take().drive.any()
 
 
@@ -168,6 +175,41 @@ def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) 
     assert changes.rows.tolist() == [1, 1]
     assert dict(zip(changes.place.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
     assert dict(zip(later.place.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
+
+
+def test_front_and_body_led_are_the_last_two_of_the_body(gateway: Epuck2Gateway) -> None:
+    with program(gateway, robot=1) as robot:
+        exchanged(robot, command(leds=0b110000))
+        changes = gateway.take().leds
+    assert dict(zip(changes.place.tolist(), changes.value.tolist(), strict=True)) == {8: 0xFF0000, 9: 0x00FF00}
+    assert faults(gateway) == {}
+
+
+def test_a_program_that_asks_for_the_image_sees_what_is_ahead(gateway: Epuck2Gateway) -> None:
+    looked_at = scene([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 1.0, pi]], BODY)
+    looked_at.leds[0, 1, 9] = 0x00FF00  # the body LED of the robot ahead of the first
+    gateway.enter(looked_at, 0)
+    gateway.publish(0, {}, ALIVE)
+    with program(gateway, robot=0) as near, program(gateway, robot=2) as turned_away:
+        for robot in (near, turned_away):
+            assert exchanged(robot, command(request=1), 38401)[0] == 1
+        gateway.publish(1, {}, ALIVE)
+
+        def greens() -> list[bool]:
+            return [
+                is_green(middle_pixel(exchanged(robot, command(request=1), 38401))) for robot in (near, turned_away)
+            ]
+
+        until(lambda: greens() == [True, False])
+
+
+def middle_pixel(image: bytes) -> int:
+    """The RGB565 pixel in the middle of an image, behind its first byte."""
+    return int.from_bytes(image[1 + 2 * (60 * 160 + 80) :][:2], "big")
+
+
+def is_green(pixel: int) -> bool:
+    return (pixel >> 5 & 63) > 2 * (pixel & 31) + 8
 
 
 def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2Gateway) -> None:
@@ -210,8 +252,6 @@ def steps(robot: socket.socket) -> tuple[int, int]:
     [
         ({"settings": 1}, "calibration_refused"),
         ({"settings": 2}, "avoidance_refused"),
-        ({"leds": 0b010000}, "body_led_refused"),
-        ({"leds": 0b100000}, "front_led_refused"),
         ({"sound": 4}, "sound_refused"),
     ],
 )
@@ -223,7 +263,8 @@ def test_what_it_does_not_do_is_counted_once_a_robot_and_the_rest_applies(
             for _ in range(3):
                 exchanged(robot, command(left=100, right=100, **asked))
     assert gateway.take().linear_mps[:2] == pytest.approx([100 * STEP_M] * 2)
-    assert gateway.counts() == {count: 2}
+    assert faults(gateway) == {count: 2}
+    assert gateway.counts()["constant_readings"] == 2
 
 
 def test_what_is_no_command_is_counted_and_hung_up_on(gateway: Epuck2Gateway) -> None:
@@ -231,7 +272,7 @@ def test_what_is_no_command_is_counted_and_hung_up_on(gateway: Epuck2Gateway) ->
         robot.sendall(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n")
         with pytest.raises((EOFError, ConnectionResetError)):
             received(robot, 1)
-    assert gateway.counts() == {"malformed_commands": 1}
+    assert faults(gateway) == {"malformed_commands": 1}
     with program(gateway) as robot:
         assert exchanged(robot, command())[0] == 2
 
@@ -240,7 +281,7 @@ def test_a_program_that_leaves_within_a_command_is_counted_and_the_part_forgotte
     with program(gateway) as robot:
         exchanged(robot, command(left=100, right=100))
         robot.sendall(command(left=300, right=300)[:20])
-    until(lambda: gateway.counts() == {"half_commands": 1})
+    until(lambda: faults(gateway) == {"half_commands": 1})
     assert gateway.take().linear_mps[0] == pytest.approx(100 * STEP_M)
     with program(gateway) as robot:
         assert exchanged(robot, command())[0] == 2
@@ -261,9 +302,9 @@ def test_a_second_program_waits_until_the_first_has_gone(gateway: Epuck2Gateway)
 def test_a_program_that_is_kept_waiting_is_counted(gateway: Epuck2Gateway) -> None:
     with program(gateway) as served:
         exchanged(served, command())
-        assert gateway.counts() == {}
+        assert faults(gateway) == {}
         with program(gateway):
-            until(lambda: gateway.counts() == {"clients_kept_waiting": 1})
+            until(lambda: faults(gateway) == {"clients_kept_waiting": 1})
 
 
 def test_a_driver_names_the_reason_why_another_program_keeps_it_from_stopping_a_robot(gateway: Epuck2Gateway) -> None:

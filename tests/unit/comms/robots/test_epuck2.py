@@ -91,22 +91,27 @@ def test_wheels_are_never_told_more_than_they_can_and_the_curve_stays(linear_mps
     assert angular == pytest.approx(angular_radps * slower, abs=5e-3)
 
 
+DARK = dict.fromkeys(range(10), 0)
+
+
 @given(which=st.sampled_from([1, 3, 5, 7]), rgb=st.integers(0, 0xFFFFFF))
 def test_a_colour_comes_back_within_a_hundredth(which: int, rgb: int) -> None:
-    shown = ALL_DARK.with_changed({which: rgb}).shown({})
+    shown = ALL_DARK.with_changed({which: rgb}).shown(DARK)
     for shift in (0, 8, 16):
         assert abs((shown[which] >> shift & 0xFF) - (rgb >> shift & 0xFF)) <= 255 / 200 + 0.5
     assert not any(colour for place, colour in shown.items() if place != which)
 
 
-def test_a_red_led_is_lit_by_what_is_at_least_half_red() -> None:
-    shown = ALL_DARK.with_changed({0: 0x800000, 2: 0x7FFFFF, 4: 0xFFFFFF, 6: 0x00FF00}).shown({})
-    assert [shown[place] for place in (0, 2, 4, 6)] == [0xFF0000, 0, 0xFF0000, 0]
+def test_an_led_of_one_colour_is_lit_by_what_has_at_least_half_of_it() -> None:
+    ring = {0: 0x800000, 2: 0x7FFFFF, 4: 0xFFFFFF, 6: 0x00FF00}
+    shown = ALL_DARK.with_changed(ring | {8: 0xFF0000, 9: 0x008000}).shown(DARK)
+    assert [shown[place] for place in (0, 2, 4, 6, 8, 9)] == [0xFF0000, 0, 0xFF0000, 0, 0xFF0000, 0x00FF00]
+    assert ALL_DARK.with_changed({8: 0x00FFFF, 9: 0xFF7FFF}).switched == 0
 
 
 def test_an_led_that_no_e_puck_has_is_refused() -> None:
-    with pytest.raises(ValueError, match="0 to 7"):
-        ALL_DARK.with_changed({8: 0xFF0000})
+    with pytest.raises(ValueError, match="0 to 9"):
+        ALL_DARK.with_changed({10: 0xFF0000})
 
 
 @given(start=STEPS, gone=st.lists(st.tuples(st.integers(-32768, 32767), st.integers(-32768, 32767)), max_size=30))

@@ -14,6 +14,7 @@ from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import NoParameters
 from swarmwire.comms.plugins import installed_class, installed_points
 from swarmwire.comms.tick_io import SparseTable
+from swarmwire.world.sensors.sensor import Scene
 
 GROUP = "swarmwire.gateways"  # of entry points
 
@@ -65,6 +66,9 @@ class Gateway(ABC):
             for words, names in (("no program receives its", missing), ("no program moves its", without_actuator))
             if names
         )
+
+    def enter(self, scene: Scene, first: int) -> None:  # noqa: B027 - most gateways need readings alone
+        """Called once, before `open`: the arena, always the present, and the index in it of the first robot."""
 
     @abstractmethod
     def open(self) -> tuple[str, ...]:

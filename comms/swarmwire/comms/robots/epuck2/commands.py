@@ -1,8 +1,8 @@
 """Commands to the e-puck2: wheel steps, lights, the 21-byte command, and the packets in a byte stream.
 
-Clockwise from ahead the lights are LED1 (red), LED2 (any colour), LED3 (red), and so on to LED8; the body's spec has
-them in that order. The red LEDs are on or off. The firmware of the radio module shows the state of the WiFi with LED2,
-whether or not a command sets them.
+Clockwise from ahead the lights are LED1 (red), LED2 (any colour), LED3 (red), and so on to LED8; then the front LED
+(red) and the body LED (green). The body's spec has them in that order. The LEDs of one colour are on or off. The
+firmware of the radio module shows the state of the WiFi with LED2, whether or not a command sets them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -30,9 +30,12 @@ from swarmwire.comms.sensors.simple import GroundSpec
 STEPS_PER_TURN = 1000
 M_PER_STEP = pi * 0.04 / STEPS_PER_TURN  # wheels of 40 mm
 MAX_STEPS_PER_S = 1100  # the firmware's limit of a wheel
-COUNT = 8  # LEDs
-BODY_LED, FRONT_LED = 1 << 4, 1 << 5  # bits of `Lights.switched`
-RED = 0xFF0000
+RING = 8  # LEDs of the ring, every other one of any colour
+RED, GREEN = 0xFF0000, 0x00FF00
+FRONT_LED, BODY_LED = 8, 9  # by index in the body's spec
+# The LEDs of one colour: their bits in `Lights.switched`, and their colours.
+SWITCHED = {0: (1, RED), 2: (2, RED), 4: (4, RED), 6: (8, RED), FRONT_LED: (32, RED), BODY_LED: (16, GREEN)}
+COUNT = 10  # LEDs
 BRIGHTEST = 100  # of red, green and blue on the wire; above it a component keeps its value
 # Sensors of a body that an e-puck2 can read.
 READABLE_SENSORS = frozenset({"proximity", "scan", "ground", "light", "odometry", "imu", "compass", "battery"})
@@ -65,34 +68,35 @@ def body_speeds(left: int, right: int, wheel_base_m: float) -> tuple[float, floa
 class Lights:
     """The lights in a command."""
 
-    switched: int = 0  # a bit each: LED1, LED3, LED5, LED7, the body's LED, the one ahead
+    switched: int = 0  # a bit each: LED1, LED3, LED5, LED7, body LED, front LED
     colours: bytes = bytes(12)  # red, green and blue, 0 to 100, of LED2, LED4, LED6 and LED8; more: as it is
 
     def with_changed(self, leds: Mapping[int, int]) -> "Lights":
         """A copy with some LEDs (index in the body's spec) in another colour 0xRRGGBB.
 
-        A red LED is on if the colour has at least half of all red. ValueError if there is no such LED.
+        An LED of one colour is on if this colour is at least half as bright as it can be. ValueError if there is no
+        such LED.
         """
         switched, colours = self.switched, bytearray(self.colours)
         for which, rgb in leds.items():
             if not 0 <= which < COUNT:
                 raise ValueError(f"expected LEDs from 0 to {COUNT - 1}, got {which}")
-            place, coloured = divmod(which, 2)
-            if coloured:
-                colours[3 * place : 3 * place + 3] = _to_wire(rgb)
+            if which in SWITCHED:
+                bit, own = SWITCHED[which]
+                switched = switched | bit if (rgb & own) > own // 2 else switched & ~bit
             else:
-                on = (rgb >> 16 & 0xFF) >= 0x80
-                switched = switched | 1 << place if on else switched & ~(1 << place)
+                at = 3 * (which // 2)
+                colours[at : at + 3] = _to_wire(rgb)
         return Lights(switched, bytes(colours))
 
     def shown(self, before: Mapping[int, int]) -> dict[int, int]:
-        """The colour 0xRRGGBB of each LED, by index in the body's spec, from the colours before."""
-        shown = dict(before)
-        for place in range(COUNT // 2):
-            shown[2 * place] = RED if self.switched >> place & 1 else 0
-            colour = self.colours[3 * place : 3 * place + 3]
-            shown[2 * place + 1] = _from_wire(colour, before.get(2 * place + 1, 0))
-        return shown
+        """The colour 0xRRGGBB of each LED in `before`, by index in the body's spec, from the colours before."""
+        switched = {which: own if self.switched & bit else 0 for which, (bit, own) in SWITCHED.items()}
+        coloured = {which: self.colours[3 * (which // 2) :][:3] for which in range(1, RING, 2)}
+        return {
+            which: switched[which] if which in switched else _from_wire(coloured[which], rgb)
+            for which, rgb in before.items()
+        }
 
 
 ALL_DARK = Lights()
@@ -154,7 +158,7 @@ def check_fits(body: Body) -> None:
         _check(body, "sensors.scan.rays", scan.rays == 1, "1 ray")
     if isinstance(ground, GroundSpec):
         _check(body, "sensors.ground.points_m", len(ground.points_m) == 3, "3 points")
-    _check(body, "leds", body.led_count in {0, COUNT}, f"{COUNT} LEDs")
+    _check(body, "leds", body.led_count in {0, RING, COUNT}, f"{COUNT} LEDs, or the {RING} of the ring")
 
 
 def _check(body: Body, key: str, fits: bool, expected: str) -> None:

@@ -21,7 +21,7 @@ from threading import Event, Thread
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.commands import RobotCommand
-from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PAYLOAD_BYTES, PORT, Header, PacketRequest
+from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest
 from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 
 MAX_HOSTS = 254  # of a network of the last byte
@@ -30,8 +30,6 @@ BACKLOG = 16
 PASS_NS = to_ns(0.01)  # the task sleeps for ten ticks of 1 ms
 FLUSH_COMMANDS = 5  # if so many have come, all but the last are dropped
 SEND_BUFFER_BYTES = 5744  # of the module's TCP; with more, a slow client on another machine would read older answers
-_BLACK_IMAGE = bytes([Header.IMAGE]) + bytes(PAYLOAD_BYTES[Header.IMAGE])
-_EMPTY = bytes([Header.EMPTY])
 WHERE = "gateway epuck2"
 EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
 
@@ -66,10 +64,10 @@ class EmulatedRobot:
     """
 
     def __init__(
-        self, on_command: Callable[[RobotCommand], None], sensors: Callable[[], bytes], counts: Counter[str]
+        self, on_command: Callable[[RobotCommand], None], part: Callable[[Header], bytes], counts: Counter[str]
     ) -> None:
-        """`sensors` returns the newest answer with sensors, its first byte included."""
-        self._on_command, self._sensors, self._counts = on_command, sensors, counts
+        """`part` returns the newest content of such a part of an answer, without its first byte."""
+        self._on_command, self._part, self._counts = on_command, part, counts
         self._waiting: deque[socket.socket] = deque()
         self._alive = True
         self._serve(None)
@@ -112,7 +110,8 @@ class EmulatedRobot:
                     self._parts.extend(_parts_of(self._command.request))
                 return
             if not self._unsent:
-                self._unsent = memoryview(self._part(self._parts.popleft()))
+                header = self._parts.popleft()
+                self._unsent = memoryview(bytes([header]) + self._part(header))
             while self._unsent:
                 self._unsent = self._unsent[client.send(self._unsent) :]
         except BlockingIOError:  # as long as the client does not read, the robot waits
@@ -159,9 +158,6 @@ class EmulatedRobot:
             dropped = whole if more else whole - 1
             client.recv(dropped * COMMAND_BYTES)
             self._counts["commands_flushed"] += dropped
-
-    def _part(self, header: Header) -> bytes:
-        return {Header.IMAGE: _BLACK_IMAGE, Header.EMPTY: _EMPTY}.get(header) or self._sensors()
 
 
 def _parts_of(request: PacketRequest) -> list[Header]:

@@ -17,12 +17,17 @@ from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.clock import DatedClock, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, Header
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec
+from swarmwire.world.gateways.epuck2.camera import picture
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets
 from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.sensors.sensor import Scene
+
+BLACK = bytes(PAYLOAD_BYTES[Header.IMAGE])
 
 
 @dataclass(frozen=True)
@@ -102,6 +107,8 @@ class Epuck2Gateway(Gateway):
         self._received = ReceivedCommands(len(self.names), body, self._counts)
         self._packets = SensorPackets(body, len(self.names), options.compass)
         self._answers = self._packets.answers()
+        self._view: tuple[Scene, int] | None = None  # what cameras look at, and the index of the first robot
+        self._pictures: dict[int, bytes] = {}  # of robots whose client asks for them
         self._alive = np.ones(len(self.names), bool)
         self._published_ns = 0
         self._server: Server | None = None
@@ -109,6 +116,10 @@ class Epuck2Gateway(Gateway):
     def differences(self) -> tuple[str, ...]:
         """As `Gateway.differences`."""
         return (*differences_of(self.body), *super().differences())
+
+    def enter(self, scene: Scene, first: int) -> None:
+        """As `Gateway.enter`; without a scene, pictures are black."""
+        self._view = scene, first
 
     def open(self) -> tuple[str, ...]:
         """As `Gateway.open`; opened once more it has the same addresses."""
@@ -125,7 +136,11 @@ class Epuck2Gateway(Gateway):
         self._packets.count(steps, self._received.counters() | dict.fromkeys(revived, (0, 0)))
         self._published_ns = time_ns
         self._packets.fill(fields)
-        self._answers = self._packets.answers()  # as a whole, so that the other thread sees these or those before
+        # As a whole, so that the other thread sees these or those before.
+        self._answers = self._packets.answers()
+        if self._view is not None:
+            scene, first = self._view
+            self._pictures = {i: picture(scene, first + i) for i in sorted(self._received.watching) if alive[i]}
         if not np.array_equal(alive, self._alive):
             for robot in revived:
                 self._received.halt(robot)
@@ -148,4 +163,9 @@ class Epuck2Gateway(Gateway):
             server.close()
 
     def _robot(self, i: int) -> EmulatedRobot:
-        return EmulatedRobot(partial(self._received.add, i), lambda: self._answers[i], self._counts)
+        return EmulatedRobot(partial(self._received.add, i), partial(self._part, i), self._counts)
+
+    def _part(self, i: int, header: Header) -> bytes:
+        if header is Header.IMAGE:
+            return self._pictures.get(i, BLACK)
+        return self._answers[i] if header is Header.SENSORS else b""

@@ -15,13 +15,15 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
 from swarmwire.comms.robots.epuck2.commands import (
     BODY_LED,
+    COUNT,
     FRONT_LED,
     MAX_STEPS_PER_S,
+    SWITCHED,
     RobotCommand,
     body_speeds,
     limited,
 )
-from swarmwire.comms.robots.epuck2.packets import SENSORS, Header, PacketRequest, RobotSettingsBits
+from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands
@@ -30,9 +32,9 @@ Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 
 WIFI_SELECTOR = 15  # selector position of a robot that answers over WiFi
 ROOM_C = 25
+QUIET = 30  # volume of a quiet room, of 4095; the robots' own sounds are not emulated
 LEVEL_UT, DOWN_UT = 22.0, 42.0  # the earth's field in central Europe
 UPRIGHT_DEG, OVER_DEG = 5.0, 160.0  # the firmware reports no orientation for a smaller or greater tilt
-_ANSWER = np.dtype([("header", "u1"), ("sensors", SENSORS)])
 
 
 class ReceivedCommands:
@@ -40,12 +42,14 @@ class ReceivedCommands:
 
     Attributes:
         steps_per_s: (n, 2) speeds of the left and the right wheel that were taken last.
+        watching: robots whose last command asks for the image.
     """
 
     def __init__(self, robots: int, body: Body, counts: Counter[str]) -> None:
         self._robots, self._wheel_base_m, self._counts = robots, body.wheels.wheel_base_m, counts
         self._lock = Lock()
         self.steps_per_s = np.zeros((robots, 2))
+        self.watching: frozenset[int] = frozenset()
         self._speeds: dict[int, tuple[int, int]] = {}  # steps/s
         self._refused: set[tuple[int, str]] = set()  # robot and what it was asked for
         self._leds: dict[tuple[int, int], int] = {}  # robot and place -> 0xRRGGBB
@@ -55,9 +59,11 @@ class ReceivedCommands:
     def add(self, robot: int, command: RobotCommand) -> None:
         """Keep a command for a robot."""
         with self._lock:
-            asked = {(robot, name) for name in _refused(command)}
+            asked = {(robot, name) for name in _refused(command, len(self._shown[robot]))}
             self._counts.update(name for _, name in asked - self._refused)
             self._refused |= asked
+            others = self.watching - {robot}
+            self.watching = others | {robot} if command.request & PacketRequest.IMAGE else others
             if command.settings & RobotSettingsBits.SET_STEPS:
                 self._counters[robot] = command.left, command.right
             else:
@@ -94,16 +100,18 @@ class ReceivedCommands:
         return Commands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float)))
 
 
-def _refused(command: RobotCommand) -> list[str]:
-    """What a command asks for that an emulated robot does not do; everything else in it applies."""
-    switched = command.lights.switched
+def _refused(command: RobotCommand, leds: int) -> list[str]:
+    """What a command asks for that an emulated robot does not do; everything else in it applies.
+
+    Some readings are constant, and are counted with the first request for the sensors.
+    """
     asked = {
         "avoidance_refused": command.settings & RobotSettingsBits.AVOID,
         "calibration_refused": command.settings & RobotSettingsBits.CALIBRATE,
-        "body_led_refused": switched & BODY_LED,
-        "front_led_refused": switched & FRONT_LED,
         "sound_refused": command.sound,
-        "image_black": command.request & PacketRequest.IMAGE,
+        "body_led_refused": leds < COUNT and command.lights.switched & SWITCHED[BODY_LED][0],
+        "front_led_refused": leds < COUNT and command.lights.switched & SWITCHED[FRONT_LED][0],
+        "constant_readings": command.request & PacketRequest.SENSORS,
     }
     return [name for name, value in asked.items() if value]
 
@@ -116,9 +124,7 @@ class SensorPackets:
 
     def __init__(self, body: Body, robots: int, compass: Compass) -> None:
         self._body, self._compass = body, compass
-        self._answers = np.zeros(robots, _ANSWER)
-        self._answers["header"] = Header.SENSORS
-        self._rows = self._answers["sensors"]
+        self._rows = np.zeros(robots, SENSORS)
         self._steps = np.zeros((robots, 2))  # of the left and the right motor, without wrap
         self._to_wire: dict[str, tuple[str, Callable[[FloatArray], AnyArray]]] = {
             "proximity.value": ("proximity", readings.to_proximity),
@@ -147,8 +153,8 @@ class SensorPackets:
         self._rows["steps"] = _wrapped(np.rint(self._steps).astype(np.int64))
 
     def answers(self) -> list[bytes]:
-        """Header and sensors' packet of each robot."""
-        data, size = self._answers.tobytes(), _ANSWER.itemsize
+        """The sensors' packet of each robot."""
+        data, size = self._rows.tobytes(), SENSORS.itemsize
         return [data[start : start + size] for start in range(0, len(data), size)]
 
     def _at_rest(self) -> None:
@@ -156,7 +162,8 @@ class SensorPackets:
         rows = self._rows
         rows["acceleration"][:, 2] = rows["acceleration_size"] = readings.PER_G
         rows["ambient"], rows["distance_mm"] = readings.AMBIENT_DARK, readings.SEES_NOTHING_MM
-        rows["temperature_c"], rows["selector"], rows["battery"] = ROOM_C, WIFI_SELECTOR, round(4.2 * readings.PER_V)
+        rows["temperature_c"], rows["microphones"], rows["selector"] = ROOM_C, QUIET, WIFI_SELECTOR
+        rows["battery"] = round(4.2 * readings.PER_V)
 
     def _set(self, name: str, value: AnyArray) -> None:
         self._rows[name] = np.where(np.isnan(value), self._rows[name], value)
