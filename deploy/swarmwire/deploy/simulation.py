@@ -161,7 +161,10 @@ class Simulation:
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         loop = self._entered()
-        with suppress(Interrupted):  # while it waited for runners: the summary says how far it came
+        with (
+            self._parts.priority(),
+            suppress(Interrupted),
+        ):  # while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
             loop.run(until, self._parts.stopped, self._parts.hold)
 

@@ -29,6 +29,7 @@ from swarmwire.deploy.interfaces import InterfacesLog, OpenInterfaces, RunInterf
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.observers import Guarded, TooLarge
+from swarmwire.deploy.priority import before_other_processes
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
@@ -232,6 +233,12 @@ class RunParts:
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
             *([self._open_interfaces.programs.follow] if self._open_interfaces else []),
         )
+
+    def priority(self) -> AbstractContextManager[None]:
+        """In real time the loop goes before other processes within the context; sub-ticks make that worth a message."""
+        if self.pace is None:
+            return nullcontext()
+        return before_other_processes(self.folder.say if self._subtick_s else self.folder.note)
 
     def entered_loop(self) -> Loop:
         """The loop of a run that has begun; RuntimeError before."""
