@@ -62,6 +62,11 @@ class Driver(ABC):
         return self.address
 
     @property
+    def device(self) -> str:
+        """The device of its machine that the driver needs for itself, such as a radio on USB; empty: none."""
+        return ""
+
+    @property
     @abstractmethod
     def measures(self) -> frozenset[str]:
         """The sensors of the body that the driver can read, by their names in specs and `needs`."""

@@ -23,7 +23,8 @@ RUNS = b"."  # heartbeat: its process runs
 STOPPED = b"S"  # it runs, and its motors were stopped for good
 NOTHING = b""  # no heartbeat yet, and no motor moves
 CLOSED = b"E"  # the motors are off, and the driver is closed
-GRACE_S = 3.0  # from the first signal to the end; systemd waits longer
+GRACE_S = 8.0  # from the first signal to the end, within which a robot that flies lands; systemd waits longer
+LEFT_S = 3.0  # from the last heartbeat to the end
 GO = b"!"  # to the process that stands by
 ENDED, FAILED = 0, 1  # as in exit_codes.py
 PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -79,7 +80,7 @@ def _watch(beats: int, silent_s: float, begin: Callable[[], None]) -> tuple[str,
     """
     last = NOTHING
     while True:
-        allowed_s = {NOTHING: None, CLOSED: GRACE_S}.get(last, silent_s)
+        allowed_s = {NOTHING: None, CLOSED: LEFT_S}.get(last, silent_s)
         ready, _, _ = select.select([beats], [], [], allowed_s)
         if not ready:
             left = f"it was done {allowed_s:g} s ago, and something of it still ran"

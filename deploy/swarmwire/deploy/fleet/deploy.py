@@ -7,10 +7,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from swarmwire.agent.on_robot.plan import robot_config
+from swarmwire.agent.drivers.driver import Driver
+from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.fleet.clashes import clashes
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
 from swarmwire.deploy.fleet.packages import Environments, Target
@@ -215,8 +217,8 @@ def driver_endpoint(driver: Mapping[str, Any]) -> tuple[str, int] | None:
     return (rest, known) if rest and known else None
 
 
-def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> str:
-    """What the robot will be, in words; BadInput names the place in `fleet.toml` of what does not fit.
+def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> RobotConfig:
+    """What the robot will be; BadInput names the place in `fleet.toml` of what does not fit.
 
     The files of its release are read as the robot would read them.
     """
@@ -227,7 +229,7 @@ def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> str:
             path.write_bytes(entry.data)
         file = Path(folder, SETTINGS_FILE)
         try:
-            return str(robot_config(read_settings(file, {}), str(file), WallClock()))
+            return robot_config(read_settings(file, {}), str(file), WallClock())
         except BadInput as error:
             raise BadInput(*_place_in(fleet, robot, error, Path(folder))) from None
 
@@ -252,14 +254,26 @@ class Contents:
 
 
 def contents_of(fleet: Fleet, robots: Sequence[Robot]) -> Contents:
-    """The contents for these robots; nothing is raised for what is wrong with one."""
-    revoked = fleet.revoked()
-    contents = Contents()
-    for robot in robots:
+    """The contents for these robots; nothing is raised for what is wrong with one.
+
+    A robot whose driver clashes with that of any other of the fleet is wrong.
+    """
+    revoked, mine = fleet.revoked(), {robot.name for robot in robots}
+    contents, drivers = Contents(), dict[str, Driver]()
+    for robot in fleet.robots:
         try:
             entries = release_entries(fleet, robot, revoked)
-            contents.told[robot.name] = check_robot(fleet, robot, entries)
-            contents.entries[robot.name] = entries
+            plan = check_robot(fleet, robot, entries)
         except BadInput as error:
-            contents.faults[robot.name] = error
+            if robot.name in mine:
+                contents.faults[robot.name] = error
+            continue
+        drivers[robot.name] = plan.driver
+        if robot.name in mine:
+            contents.told[robot.name], contents.entries[robot.name] = str(plan), entries
+    places = {robot.name: robot.places["driver"] for robot in fleet.robots}
+    for later, owner, expected in clashes(fleet.robots, drivers):
+        name = later if later in mine else owner
+        if name in mine:
+            contents.faults[name] = BadInput(str(fleet.file), f"{places[name]}.address", expected)
     return contents

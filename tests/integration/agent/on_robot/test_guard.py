@@ -220,7 +220,7 @@ def test_an_agent_that_freezes_is_ended(tmp_path, capfd):
 
 def test_what_an_agent_leaves_behind_ends_with_it(tmp_path, monkeypatch, capfd):
     """A child of it that holds the pipe, and maybe the robot's only connection."""
-    monkeypatch.setattr(guard_module, "GRACE_S", SHORT_S)
+    monkeypatch.setattr(guard_module, "LEFT_S", SHORT_S)
     agent = f"tell({RUNS!r})\ntell({CLOSED!r})\nif os.fork() == 0:\n    signal.pause()\n"
     assert guarded(tmp_path, agent) == (FAILED, "stopped")
     assert "it was done 0.2 s ago, and something of it still ran" in capfd.readouterr().err

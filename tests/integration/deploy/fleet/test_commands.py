@@ -14,6 +14,7 @@ from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.fleet import deploy as check_module
 from swarmwire.deploy.fleet import units as estop_module
 from tests.support.deploy.fleet.fleets import AGENT
+from tests.support.deploy.runs import ROOT
 
 PLAIN = Network(listen=("tcp/127.0.0.1:0",))
 KEYS = SwarmKeys("lab")
@@ -394,3 +395,28 @@ def test_a_fetch_replaces_nothing_but_logs(robots, host, tmp_path):
     code, lines = robots("logs", "--fetch", tmp_path / "file")
     assert (code, len(lines)) == (2, 1)
     assert lines[0].startswith(f"error: --fetch: {tmp_path}/file: ")
+
+
+def test_one_base_machine_drives_two_crazyflies_each_by_a_radio_of_its_own(fleet, robots, impatient):
+    sheet = ROOT / "scenarios" / "robots" / "crazyflie.toml"
+    (fleet.folder / "crazyflie.toml").write_bytes(sheet.read_bytes())
+    fleet.table["defaults"] |= {"body": "crazyflie.toml", "driver": {"name": "crazyflie"}}
+    base = fleet.add("cf-0", driver={"address": "radio://0/80/2M/E7E7E7E701"})
+    fleet.add("cf-1", base, driver={"address": "radio://0/90/2M/E7E7E7E702"})
+    code, lines = robots("deploy")
+    assert (code, len(lines), base.commands) == (2, 1, [])
+    assert "robots.cf-1.driver.address: expected another device than Crazyradio 0 " in lines[0]
+
+    fleet.table["robots"]["cf-1"]["driver"]["address"] = "radio://1/90/2M/E7E7E7E702"
+    fleet.write()
+    assert [line.split()[:2] for line in robots("deploy")[1]] == [["cf-0", "deployed"], ["cf-1", "deployed"]]
+    first = base.current("cf-1")
+    fleet.table["robots"]["cf-1"]["max_linear_mps"] = 0.2
+    fleet.write()
+    assert "deployed" in robots("deploy")[1][1]
+    assert [line.split()[1] for line in robots("start")[1]] == ["started:", "started:"]
+    assert robots("estop") == (
+        0,
+        [f"{name} stopped, confirmed by SSH (over the network: no answer)" for name in ("cf-0", "cf-1")],
+    )
+    assert robots("rollback", "--robots", "cf-1") == (0, [f"cf-1 back to {first}"])

@@ -13,6 +13,10 @@ from swarmwire.agent.drivers.driver import Command, DriverLost, MotorsOff
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.wire.keys import SwarmKeys
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.crazyflie.flight import REST, State
 from tests.integration.robots.crazyflie.test_crazyflie_gateway import Room, room
 from tests.support.agent.on_robot.installed import Command as Program
@@ -129,6 +133,28 @@ def test_an_agent_that_is_killed_leaves_no_robot_in_the_air(room: Room, tmp_path
     assert said.endswith("; the motors were stopped\n")
     with Program(environment, "stop-motors", *of) as command:  # of a locked robot they are off
         assert command.wait() == (0, "robot-0: stopped\n", "")
+
+
+def test_an_operators_emergency_stop_is_confirmed_and_the_agent_ends_well(room: Room, tmp_path: Path) -> None:
+    flight = room.gateway._robots[0].flight
+    network = Network(listen=("tcp/127.0.0.1:0",))
+    session = open_swarm(network)
+    of = ("--driver", "crazyflie", "--address", room.uri, "--radio", "zenoh", "--watchdog-s", "5")
+    connect = ("--connect", endpoints_of(session, network)[0])
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
+    try:
+        with Program(environment, "run", f"{PLAYERS}:Driving", *of, *connect) as command:
+            until(lambda: flight.height_m > 0.4)
+            assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
+            until(lambda: flight.state is State.LOCKED)
+            # Again, when its driver has noticed that the robot is locked: its motors are off.
+            assert command.process.stderr is not None
+            assert any("locked" in line for line in iter(command.process.stderr.readline, ""))
+            assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
+            command.process.terminate()
+            assert command.wait()[0] == 0
+    finally:
+        close_session(session)
 
 
 def test_nobody_at_the_address_is_told(room: Room) -> None:

@@ -77,6 +77,8 @@ class SmallFleet:
 
     def add(self, robot: str, host: FakeHost | None = None, **said: Any) -> FakeHost:
         """One more robot, on a host of its own or one that has others; its key is known."""
+        if host:
+            said.setdefault("driver", {"address": f"127.0.0.1:{1 + len(self.hosts)}"})
         host = host or self.servers.add(self.folder.parent / f"home-{robot}")
         self.hosts[robot] = host
         self.table["robots"][robot] = {"address": "127.0.0.1", "port": host.port, **said}

@@ -62,6 +62,53 @@ def test_the_examples_agent_fits_its_robots(tmp_path):
     assert {entry.name for entry in contents.entries["flock-0"]} == {"robot.toml", "shy.py"}
 
 
+RADIO = {"name": "crazyflie", "address": "radio://0/80/2M/E7E7E7E701"}
+BEHAVIOURS = "swarmwire.agent.behaviours"
+
+
+@pytest.mark.parametrize(
+    ("other", "at", "expected"),
+    [
+        ("radio://1/80/2M/E7E7E7E702", "10.0.0.1", None),
+        ("radio://0/80/2M/E7E7E7E702", "10.0.0.2", None),
+        ("radio://0/90/2M/E7E7E7E702", "10.0.0.1", "another device than Crazyradio 0 at pi@10.0.0.1: a has it"),
+        ("radio://1/80/2M/e7e7e7e701", "10.0.0.1", "another robot: a has it"),
+        ("radio://0/80/2M/E7E7E7E701", "10.0.0.2", "another robot: a has it"),  # in reach of both radios
+        ("radio://0/81", "10.0.0.2", None),
+        ("radio://0/126/2M/E7E7E7E702", "10.0.0.2", "a URI of cflib"),
+        ("80/2M/E7E7E7E702", "10.0.0.2", "a URI of cflib"),
+    ],
+)
+def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expected):
+    from swarmwire.deploy.fleet.deploy import contents_of
+
+    defaults = {"user": "pi", "agent": f"{BEHAVIOURS}:Avoidance", "body": "crazyflie.toml"}
+    (tmp_path / "crazyflie.toml").write_bytes((ROOT / "scenarios" / "robots" / "crazyflie.toml").read_bytes())
+    robots = {
+        "a": {"address": "10.0.0.1", "driver": RADIO},
+        "b": {"address": at, "driver": {**RADIO, "address": other}},
+    }
+    fleet = read(tmp_path, defaults=defaults, robots=robots)
+    faults = contents_of(fleet, fleet.robots).faults
+    assert "a" not in faults
+    assert ("b" in faults) == (expected is not None)
+    if expected:
+        assert str(faults["b"]).startswith(f"{fleet.file}: robots.b.driver.address: expected {expected}")
+    (only,) = contents_of(fleet, fleet.robots[:1]).faults or [None]
+    assert only == ("a" if expected and "has it" in expected else None)  # also if the other is not chosen
+
+
+def test_a_robot_at_a_machines_own_address_is_another_one_on_each_machine(tmp_path):
+    from swarmwire.deploy.fleet.deploy import contents_of
+
+    driver = {"name": "epuck2", "address": "127.0.0.1:1000"}
+    defaults = {**LEAST["defaults"], "agent": f"{BEHAVIOURS}:Avoidance", "driver": driver}
+    robots = {name: {"address": at} for name, at in (("a", "10.0.0.1"), ("b", "10.0.0.2"), ("c", "10.0.0.1"))}
+    fleet = read(tmp_path, defaults=defaults, robots=robots)
+    ((robot, fault),) = contents_of(fleet, fleet.robots).faults.items()
+    assert (robot, fault.key) == ("c", "defaults.driver.address")
+
+
 def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path):
     defaults = {**LEAST["defaults"], "rate_hz": 1, "watchdog_s": 3.0, "seed": 1, "params": {"x": 1, "y": 1, "z": 1}}
     groups = {"red": {"rate_hz": 2, "params": {"y": 2, "z": 2}}, "blue": {"seed": 3, "params": {"z": 3}}}
@@ -188,6 +235,7 @@ PI = {
 def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
     assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "msgspec", "numpy"]
     assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
+    assert {"cflib", "pyusb", "libusb-package"} <= {pin.name for pin in pins(["crazyflie"], [], (3, 11))}
     assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
     with pytest.raises(BadInput, match="^packages: not-there: "):
         pins(["epuck2"], ["not-there"], (3, 11))

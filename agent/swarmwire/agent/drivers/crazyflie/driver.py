@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink
 from swarmwire.agent.drivers.crazyflie.pilot import Pilot
+from swarmwire.agent.drivers.crazyflie.uri import parsed
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost, MotorsOff
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
@@ -45,6 +46,7 @@ BLOCKS = (
 )
 ON_FLOOR_M = 0.1
 RESET_S = 0.1
+MAX_LANDING_S = 5.0  # the guard waits longer for the agent's end
 
 
 @dataclass(frozen=True)
@@ -73,15 +75,26 @@ class CrazyflieDriver(Driver):
     def __init__(self, address: str, body: Body, options: Any, clock: DatedClock) -> None:
         """As `Driver`; BadInput also if cflib is not installed."""
         super().__init__(address, body, options, clock)
-        if not address.startswith(("radio://", "udp://", "usb://")):
-            expected = f'expected a URI of cflib, "radio://0/80/2M/E7E7E7E7E7" or "udp://host:port"; got {address!r}'
-            raise BadInput("driver crazyflie", "address", expected)
+        self._uri = parsed(address)
         check_fits(body)
+        if body.altitude_m > MAX_LANDING_S * options.climb_mps:
+            least = f"expected to land within {MAX_LANDING_S:g} s, {body.altitude_m / MAX_LANDING_S:g} m/s"
+            raise BadInput("driver crazyflie", "climb_mps", f"{least}; got {options.climb_mps!r}")
         CRAZYFLIE.need("driver crazyflie")
         self._options: CrazyflieOptions = options
         self._counts: Counter[str] = Counter()
         self._link: CrazyflieLink | None = None
         self._pilot: Pilot | None = None
+
+    @property
+    def target(self) -> str:
+        """As `Driver.target`, the same for each Crazyradio."""
+        return self._uri.target
+
+    @property
+    def device(self) -> str:
+        """As `Driver.device`: a process claims its Crazyradio."""
+        return f"Crazyradio {self._uri.radio}" if self._uri.radio else ""
 
     @property
     def measures(self) -> frozenset[str]:
